@@ -1,16 +1,33 @@
-import { ActionIcon, Anchor, Tooltip, useComputedColorScheme, useMantineColorScheme } from "@mantine/core";
+import {
+  ActionIcon,
+  Anchor,
+  Loader,
+  Tooltip,
+  useComputedColorScheme,
+  useMantineColorScheme,
+} from "@mantine/core";
+import { lazy, Suspense } from "react";
 
-import { CatalogueView } from "./catalogue/CatalogueView";
-import { EditorView } from "./editor/EditorView";
-import { RunsView } from "./run/RunsView";
-import { RunView } from "./run/RunView";
 import { IconMoon, IconSun } from "./ui/icons";
 import { NoticeList } from "./ui/notices";
 import { hashOf, useAddress } from "./ui/address";
+import { useTitle } from "./ui/titles";
+
+// What a view needs is loaded when it is first shown.
+const CatalogueView = lazy(async () => ({
+  default: (await import("./catalogue/CatalogueView")).CatalogueView,
+}));
+const EditorView = lazy(async () => ({ default: (await import("./editor/EditorView")).EditorView }));
+const ImportView = lazy(async () => ({ default: (await import("./exchange/ImportView")).ImportView }));
+const RunView = lazy(async () => ({ default: (await import("./run/RunView")).RunView }));
+const SweepsView = lazy(async () => ({ default: (await import("./sweeps/SweepsView")).SweepsView }));
+const SweepView = lazy(async () => ({ default: (await import("./sweeps/SweepView")).SweepView }));
+const RunsView = lazy(async () => ({ default: (await import("./run/RunsView")).RunsView }));
 
 /** One window: catalogue, editor and run. */
 export function App() {
   const address = useAddress();
+  const title = useTitle("scenario" in address ? address.scenario : "");
   const { setColorScheme } = useMantineColorScheme();
   const dark = useComputedColorScheme("light") === "dark";
   const toggle = dark ? "Use light colours" : "Use dark colours";
@@ -42,8 +59,14 @@ export function App() {
                 href={hashOf({ view: "editor", scenario: address.scenario })}
                 aria-current={address.view === "editor" ? "page" : undefined}
               >
-                {address.scenario}
+                {title}
               </Anchor>
+            </>
+          )}
+          {address.view === "imported" && (
+            <>
+              <span aria-hidden="true">›</span>
+              <span aria-current="page">Import</span>
             </>
           )}
           {address.view === "run" && (
@@ -56,6 +79,23 @@ export function App() {
             <>
               <span aria-hidden="true">›</span>
               <span aria-current="page">Runs</span>
+            </>
+          )}
+          {(address.view === "sweeps" || address.view === "sweep") && (
+            <>
+              <span aria-hidden="true">›</span>
+              <Anchor
+                href={hashOf({ view: "sweeps", scenario: address.scenario })}
+                aria-current={address.view === "sweeps" ? "page" : undefined}
+              >
+                Sweeps
+              </Anchor>
+            </>
+          )}
+          {address.view === "sweep" && (
+            <>
+              <span aria-hidden="true">›</span>
+              <span aria-current="page">{address.sweep}</span>
             </>
           )}
         </nav>
@@ -73,12 +113,19 @@ export function App() {
         </Tooltip>
       </header>
       <main id="main" tabIndex={-1} className="main">
-        {address.view === "catalogue" && <CatalogueView />}
-        {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}
-        {address.view === "run" && (
-          <RunView key={address.run} scenario={address.scenario} run={address.run} />
-        )}
-        {address.view === "runs" && <RunsView key={address.scenario} scenario={address.scenario} />}
+        <Suspense fallback={<Loader m="xl" aria-label="Loading the page" />}>
+          {address.view === "catalogue" && <CatalogueView />}
+          {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}
+          {address.view === "imported" && <ImportView key={address.scenario} scenario={address.scenario} />}
+          {address.view === "run" && (
+            <RunView key={address.run} scenario={address.scenario} run={address.run} />
+          )}
+          {address.view === "sweeps" && <SweepsView key={address.scenario} scenario={address.scenario} />}
+          {address.view === "sweep" && (
+            <SweepView key={address.sweep} scenario={address.scenario} sweep={address.sweep} />
+          )}
+          {address.view === "runs" && <RunsView key={address.scenario} scenario={address.scenario} />}
+        </Suspense>
       </main>
       <NoticeList />
     </div>

@@ -38,6 +38,7 @@ test("a body goes out as JSON, a form as a form, and no body as none", async () 
     {
       method: "POST",
       headers: { "Content-Type": "application/json" },
+      keepalive: true,
       body: '{"version":3}',
     },
   ]);

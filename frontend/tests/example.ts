@@ -8,6 +8,7 @@ export const BY_LENGTH: RouteChoice = {
   iterations: 20,
   gap: 0.01,
   interval: 900,
+  spread: 0.03,
   informed: 0,
   period: 60,
   shares: [],
@@ -19,6 +20,7 @@ export const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
   model: null,
   spawn,
   goal: null,
+  via: [],
   speed: null,
   lateral_offset: 0.5,
   depart: 0,
@@ -37,6 +39,7 @@ export const flow = (id: string, spawn: string): Flow => ({
   end: 3600,
   mix: { car: 1 },
   speed: null,
+  initial_speed: null,
   profile: null,
 });
 export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): ScenarioDocument => ({
@@ -68,6 +71,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
     counts: [],
     background: [],
     routes: BY_LENGTH,
+    parking: { begin: 0, end: 0, stay: 3600, within: 300 },
   },
   transit: { stops: [], lines: [] },
   signals: { control: "fixed", bus_priority: false, junctions: [] },
@@ -82,6 +86,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   },
   study: { warm_up: 0, interval: null, detectors: [], sections: [], cordons: [] },
   rules: [],
+  criteria: [],
   parameters: {},
   formulas: {},
 });

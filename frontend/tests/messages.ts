@@ -38,6 +38,7 @@ export const summary = (
   insertion_error_max: null,
   figures: {},
   gridlock: null,
+  criteria: [],
   expectations: [],
   problems: [],
   notes: [],

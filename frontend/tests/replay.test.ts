@@ -3,7 +3,7 @@ import { expect, test } from "vitest";
 import type { Incident, ReplayColumns } from "../src/api/runs";
 import { compared } from "../src/run/figures";
 import { FIGURES } from "./figures";
-import { marksAt, sentence } from "../src/run/incidents";
+import { markKind, marksAt, sentence } from "../src/run/incidents";
 import { between, momentAt, Replay } from "../src/run/replay";
 import { thinned, ticks } from "../src/run/scale";
 import { hashOf, parseAddress } from "../src/ui/address";
@@ -80,6 +80,19 @@ test("incidents are reported in words and marked from when they happen", () => {
   expect(marksAt([crash], 3)).toEqual([{ x: 1, y: 2, kind: "collision", fresh: true }]);
   expect(marksAt([crash], 30)[0]?.fresh).toBe(false);
   expect(marksAt([{ time: 0, kind: "emergency_stop", actor: "a" }], 1)).toEqual([]);
+});
+
+test("every kind of event is a sentence with a subject and has a mark of its own", () => {
+  const jam: Incident = { time: 60, kind: "jam_begin", actor: "car-1", queue: 7, x: 1, y: 2 };
+  const over: Incident = { time: 400, kind: "jam_end", actor: "", waited: 340 };
+  const words = (incident: Incident) => sentence(incident, new Map());
+  expect(words(jam)).toBe("A jam of 7 vehicles began at car-1");
+  expect(words(over)).toBe("A jam ended after 6 min");
+  expect(words({ ...over, waited: 42 })).toBe("A jam ended after 42 s");
+  expect(words({ time: 1, kind: "measure_begin", actor: "works-1" })).toBe("Measure works-1 began");
+  expect([jam, over].map(markKind)).toEqual(["jam", "jam"]);
+  expect(markKind({ time: 1, kind: "measure_end", actor: "works-1" })).toBe("measure");
+  expect(markKind({ time: 1, kind: "teleport_start", actor: "a" })).toBe("teleported");
 });
 
 test("two runs are compared figure by figure", () => {

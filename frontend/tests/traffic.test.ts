@@ -29,6 +29,7 @@ const empty: Demand = {
   counts: [],
   background: [],
   routes: BY_LENGTH,
+  parking: { begin: 0, end: 0, stay: 3600, within: 300 },
 };
 const background: Background = {
   id: "background",

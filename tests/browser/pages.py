@@ -121,6 +121,15 @@ class MapView:
                 for _ in range(round(abs(away) / pixels)):
                     self.page.keyboard.press(modifier + (forth if away > 0 else back))
 
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Hold the button down from one place to another, in steps as a hand does."""
+        mouse = self.page.mouse
+        a, b = self.at(*start), self.at(*end)
+        mouse.move(*a)
+        mouse.down()
+        mouse.move(*b, steps=8)
+        mouse.up()
+
     def hover(self, point: tuple[float, float]) -> None:
         self.page.mouse.move(*self.at(*point))
 
@@ -267,6 +276,17 @@ class OdscenPage:
         with self.page.expect_response(lambda answer: bool(asked.search(answer.url))):
             yield
         expect(self.page.get_by_text("All changes saved")).to_be_visible()
+
+    @property
+    def time_bar(self) -> Locator:
+        """That of the editor, or of a run."""
+        return self.page.get_by_role("region", name="Time bar")
+
+    def open_time_bar(self) -> None:
+        """Show the time bar of the editor, and wait for its plan."""
+        below = self.page.get_by_role("radiogroup", name="Below the map")
+        below.get_by_text("Time", exact=True).click()
+        expect(self.page.get_by_text("Drag the blocks")).to_be_visible()
 
     # Run
 

@@ -22,6 +22,7 @@ from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
 from tests.browser.conftest import ARTEFACTS, CROSSING
 from tests.browser.pages import FAILED, OdscenPage, settle
+from tests.browser.test_signals import open_program, saved
 from tools import page as tool
 
 AXE = tool.ROOT / "frontend/node_modules/axe-core/axe.min.js"
@@ -90,6 +91,7 @@ def visit(scheme: str, open_page: Callable[..., OdscenPage]) -> Iterator[Callabl
     )
 
 
+@pytest.mark.slow
 def test_the_first_screen(
     visit: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -109,6 +111,19 @@ def test_the_catalogue(visit: Callable[..., Any], served: tool.Served, sampled: 
     inspector.look("catalogue-remove")
 
 
+@pytest.mark.slow
+def test_the_program_of_a_light_that_can_be_changed(
+    visit: Callable[..., Any], served: tool.Served
+) -> None:
+    user, inspector = visit(served.url)
+    light = open_program(user, saved(served))
+    inspector.look("editor-signals")
+    for summary in ("Shortest and longest greens", "Signal groups and their movements"):
+        light.get_by_text(summary).click()
+    inspector.look("editor-signals-open")
+
+
+@pytest.mark.slow
 def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.page.goto("/#/edit/nowhere")
@@ -165,6 +180,61 @@ def test_measures_and_public_transport(
     inspector.look("editor-public-transport")
 
 
+def test_the_study(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    user, inspector = visit(served.url)
+    user.open_editor(sampled)
+    user.step("Study").click()
+    user.choose("Kind of station", "Travel-time section")
+    user.page.get_by_role("button", name="Choose it on the map").click()
+    user.map.click(user.graph.middle("r2"))
+    with user.changing():
+        user.map.click(user.graph.middle("r3"))
+    user.choose("Analysis interval", "Another")
+    inspector.look("editor-study")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1440, 390])
+def test_the_time_bar(
+    visit: Callable[..., Any], served: tool.Served, sampled: str, width: int
+) -> None:
+    user, inspector = visit(served.url, viewport={"width": width, "height": 900})
+    user.open_editor(sampled)
+    user.step("Road users").click()
+    user.open_time_bar()
+    inspector.look(f"editor-time-{width}")
+    user.time_bar.get_by_role("slider", name="Planned moment").press("PageUp")
+    expect(user.page.get_by_text("each alone on the road")).to_be_visible()
+    inspector.look(f"editor-planned-{width}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1440, 1024, 390])
+def test_an_open_form_of_a_rule(
+    visit: Callable[..., Any], served: tool.Served, sampled: str, width: int
+) -> None:
+    user, inspector = visit(served.url, viewport={"width": width, "height": 900})
+    user.open_editor(sampled)
+    user.step("Rules").click()
+    user.page.get_by_role("button", name="Add a rule").click()
+    user.choose("Condition", "Any of several holds")
+    user.page.get_by_role("button", name="Add a condition").click()
+    user.page.get_by_role("button", name="When it counts").first.click()
+    user.choose("Condition 2", "Something does not hold")
+    user.choose("Action", "Follow a path")
+    for point in ("0, 5", "8, 20"):
+        user.page.get_by_label("Points: one more", exact=True).fill(point)
+        user.page.keyboard.press("Enter")
+    user.choose("How fast", "A speed at each point")
+    user.page.get_by_role("button", name="Then another action").click()
+    user.page.get_by_role("button", name="At the same time as action 2").click()
+    user.choose("Action 2, part 2", "Set its lights")
+    inspector.look(f"editor-rule-form-{width}")
+    with user.changing():
+        user.page.get_by_role("button", name="Add the rule").click()
+    inspector.look(f"editor-rules-{width}")
+
+
 def test_traffic_and_counts(
     visit: Callable[..., Any], served: tool.Served, sampled: str, tmp_path: Path
 ) -> None:
@@ -209,6 +279,7 @@ def test_traffic_and_counts(
     inspector.look("run-counts")
 
 
+@pytest.mark.slow
 def test_a_long_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)
@@ -242,6 +313,7 @@ def test_the_tour(visit: Callable[..., Any], served: tool.Served, sampled: str) 
     expect(user.tour).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_the_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.page.goto(f"/#/run/{sampled}/nowhere")

@@ -44,6 +44,7 @@ def left(server: StandIn) -> list[str]:
     return [a["type_id"] for a in server.actors() if a["type_id"].startswith(kinds)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_run_is_shown_in_carla_and_its_picture_in_the_page(
     open_page: Callable[..., OdscenPage],
@@ -77,6 +78,7 @@ def test_a_run_is_shown_in_carla_and_its_picture_in_the_page(
     assert not inspector.wrong.views, inspector.wrong
 
 
+@pytest.mark.slow
 def test_without_carla_the_page_says_so_and_runs_all_the_same(
     open_page: Callable[..., OdscenPage], one_map: Path, tmp_path: Path
 ) -> None:

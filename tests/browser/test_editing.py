@@ -72,6 +72,51 @@ def test_a_region_never_falls_apart(region: OdscenPage) -> None:
     assert region.document()["roi"] == before[:-1]
 
 
+def test_the_whole_map_is_one_click_and_one_step_of_undo(editor: OdscenPage) -> None:
+    with editor.changing():
+        editor.page.get_by_role("button", name="Take the whole map").click()
+    assert sorted(editor.document()["roi"]) == sorted(one["id"] for one in editor.graph.segments)
+    with editor.changing():
+        editor.undo.click()
+    assert editor.document()["roi"] == []
+
+
+def test_a_rectangle_and_what_is_in_sight_become_the_region(editor: OdscenPage) -> None:
+    graph = editor.graph
+    junction = graph.junction()
+    x, y = graph.middle(junction)
+    keyboard = editor.page.keyboard
+    keyboard.down("Shift")
+    with editor.changing():
+        editor.map.drag((x - 30, y - 30), (x + 30, y + 30))
+    keyboard.up("Shift")
+    assert editor.document()["roi"] == [junction]
+    with editor.changing():
+        editor.page.get_by_role("button", name="Take all that I see").click()
+    assert len(editor.document()["roi"]) == len(graph.segments)
+
+
+def test_roads_and_road_users_are_found_by_name_without_a_mouse(region: OdscenPage) -> None:
+    name = place(region, "Bus")
+    road = region.graph.neighbours(region.graph.junction())[0]
+    keyboard = region.page.keyboard
+    for searched, kind in ((road, "Road"), (name, "Bus")):
+        keyboard.press("Escape")
+        keyboard.press("Control+k")
+        region.page.get_by_role("combobox", name="Name").fill(f"{kind.lower()} {searched}")
+        expect(region.page.get_by_role("option").first).to_contain_text(searched)
+        keyboard.press("Enter")
+        expect(region.page.get_by_role("dialog")).to_have_count(0)
+        x, y, _ = region.map.view()
+        if kind == "Bus":
+            spawn = region.graph.place(region.document()["actors"][0]["spawn"])
+            assert np.hypot(x - spawn[0], y - spawn[1]) < 5
+        else:
+            middle = region.graph.middle(road)
+            assert np.hypot(x - middle[0], y - middle[1]) < 30
+    expect(region.names.first).to_have_attribute("aria-pressed", "true")
+
+
 def test_neighbours_are_not_offered_before_they_are_known(editor: OdscenPage) -> None:
     held: list[Route] = []
 
@@ -122,7 +167,7 @@ def test_a_goal_is_chosen_on_the_map_and_made_random_again(region: OdscenPage) -
     name = place(region, "Car", 3)
     actor = region.document()["actors"][0]
     goals = region.get(f"/scenarios/{region.scenario}/goals?spawn={actor['spawn']}")["goals"]
-    region.page.get_by_role("button", name="Show goals").click()
+    region.page.get_by_role("button", name="Choose on the map").click()
     with region.changing():
         region.map.click(region.graph.place(goals[0]))
     assert region.document()["actors"][0]["goal"] == goals[0]
@@ -164,6 +209,7 @@ def test_nothing_is_lost_by_a_reload(region: OdscenPage) -> None:
     expect(region.names).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_a_second_tab_overwrites_nothing_and_says_so(
     region: OdscenPage, open_page: Callable[..., OdscenPage], served: Served
 ) -> None:

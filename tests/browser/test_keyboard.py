@@ -72,6 +72,7 @@ def test_shortcuts_are_listed_and_the_list_gives_the_focus_back(
     user.page.keyboard.press("Enter")
     sheet = user.page.get_by_role("dialog")
     expect(sheet).to_contain_text("Ctrl+Z")
+    expect(sheet).to_contain_text("Ctrl+K")
     user.page.keyboard.press("Escape")
     expect(sheet).to_have_count(0)
     expect(user.help).to_be_focused()

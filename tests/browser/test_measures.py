@@ -130,6 +130,7 @@ def test_a_place_that_is_not_on_the_map_is_refused_with_its_name(
     assert user.document()["measures"] == []
 
 
+@pytest.mark.slow
 def test_a_light_is_put_out_of_order_with_the_keyboard_alone(
     user: OdscenPage, crossing: str
 ) -> None:

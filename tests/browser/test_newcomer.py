@@ -80,3 +80,16 @@ def test_a_newcomer_runs_a_scenario_within_twenty_clicks_and_types_nothing(
     user.result.get_by_role("button", name="Back to the editor").click()
     user.wait_for_editor()
     assert user.document()["actors"] == actors
+
+
+def test_the_first_load_is_below_250_kilobytes(
+    empty: tool.Served, open_page: Callable[..., OdscenPage]
+) -> None:
+    user = open_page(empty.url)
+    user.open_catalogue()
+    sizes = user.page.evaluate(
+        "performance.getEntries().filter((one) => 'transferSize' in one)"
+        ".filter((one) => !one.name.includes('/api/')).map((one) => [one.name, one.transferSize])"
+    )
+    assert any(".js" in name and size > 1000 for name, size in sizes)
+    assert sum(size for _, size in sizes) < 250_000

@@ -37,6 +37,7 @@ def two(served: Served, request: pytest.FixtureRequest) -> str:
     return name
 
 
+@pytest.mark.slow
 def test_a_cut_in_is_made_with_the_mouse_changed_removed_and_taken_back(
     user: OdscenPage, two: str
 ) -> None:
@@ -67,6 +68,7 @@ def test_a_cut_in_is_made_with_the_mouse_changed_removed_and_taken_back(
     assert user.document()["rules"] == [rule]
 
 
+@pytest.mark.slow
 def test_a_rule_is_made_with_the_keyboard_alone(user: OdscenPage, two: str) -> None:
     user.open_editor(two)
     press(user, user.step("Rules"))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import psutil
+import pytest
 from playwright.sync_api import expect
 
 from tests.browser.pages import FAILED, OdscenPage
@@ -34,6 +35,7 @@ def stand_still(user: OdscenPage) -> None:
         seen, shown = shown, user.time()
 
 
+@pytest.mark.slow
 def test_a_run_is_held_stepped_and_sped_up_and_the_scenario_stays_as_it_is(
     user: OdscenPage, sampled: str
 ) -> None:
@@ -64,6 +66,7 @@ def test_a_stopped_run_shows_what_there_is(user: OdscenPage, sampled: str) -> No
     expect(user.result).to_contain_text("stopped")
 
 
+@pytest.mark.slow
 def test_a_run_that_crashes_says_so_and_harms_no_other(
     user: OdscenPage, open_page: Callable[..., OdscenPage], served: Served, sampled: str
 ) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from playwright.sync_api import expect
+import pytest
+from playwright.sync_api import Locator, expect
 
 from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.scenario.document.scenario_document import MapReference
@@ -27,6 +28,7 @@ def saved(served: Served) -> str:
     return "signals"
 
 
+@pytest.mark.slow
 def test_a_click_on_a_signal_shows_its_program_and_a_run_where_it_is_in_its_cycle(
     user: OdscenPage, served: Served
 ) -> None:
@@ -63,3 +65,69 @@ def test_a_click_on_a_signal_shows_its_program_and_a_run_where_it_is_in_its_cycl
         expect(light.get_by_text(re.compile("^Now: "))).to_contain_text(stage)
         expect(light.locator("[aria-current=step]")).to_contain_text(stage)
     expect(light.get_by_role("table", name="Detectors")).to_contain_text("of the last minute")
+
+
+def open_program(user: OdscenPage, scenario: str) -> Locator:
+    """Open the program of the crossing's light in the editor."""
+    user.open_editor(scenario)
+    user.step("Run").click()
+    user.page.get_by_role("button", name="Show the signal programs").click()
+    light = user.page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
+    expect(light.get_by_role("slider", name="Cycle")).to_be_visible()
+    return light
+
+
+def drag(user: OdscenPage, handle: Locator, bar: Locator, seconds: float, *, span: float) -> None:
+    """Drag a handle along a bar that is ``span`` seconds wide."""
+    box, whole = handle.bounding_box(), bar.bounding_box()
+    assert box is not None
+    assert whole is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    mouse = user.page.mouse
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x + seconds * whole["width"] / span, y, steps=6)
+    mouse.up()
+
+
+@pytest.mark.slow
+def test_a_green_is_made_longer_by_mouse_and_by_keyboard_run_and_undone(
+    user: OdscenPage, served: Served
+) -> None:
+    workspace = Workspace.open(served.workspace)
+    sha256 = workspace.map(CROSSING).info["sha256"]
+    one = scenario(None, until=30.0, walkers=0.0)
+    one = one.model_copy(update={"map": MapReference(name=CROSSING, sha256=sha256)})
+    write_scenario(one, workspace.scenarios / f"splits{SUFFIX}")
+    page = user.page
+    light = open_program(user, "splits")
+    splits = light.get_by_role("table", name="Splits")
+    first, second = (light.get_by_role("slider", name=f"Green of stage {n}") for n in "12")
+    assert [one.get_attribute("aria-valuetext") for one in (first, second)] == ["13 s", "13 s"]
+    with user.changing():
+        drag(user, first, light.locator(".ring"), 5.0, span=1.25 * 52.0)
+    expect(splits.get_by_role("row").nth(1)).to_contain_text("18 s")
+    expect(light.get_by_role("slider", name="Cycle")).to_have_attribute("aria-valuetext", "57 s")
+    user.tab_to(second)
+    with user.changing():
+        page.keyboard.press("PageUp")
+        page.keyboard.press("Enter")
+    expect(splits.get_by_role("row").nth(2)).to_contain_text("18 s")
+    saved = user.get("/scenarios/splits")["document"]["signals"]["junctions"]
+    assert [(entry["junction"], entry["green"]) for entry in saved] == [(JUNCTION, [18.0, 18.0])]
+
+    drag(user, first, light.locator(".ring"), -14.0, span=1.25 * 62.0)
+    expect(user.refusal).to_contain_text("4 s is too short for a green")
+    expect(first).to_have_attribute("aria-valuetext", "18 s")
+    page.get_by_role("button", name="Close this message").click()
+    light.get_by_role("button", name="Close the traffic light").click()
+
+    user.choose_pace("As fast as possible")
+    user.run.click()
+    expect(user.result).to_contain_text("finished")
+    page.get_by_role("button", name="Back to the editor").first.click()
+    user.wait_for_editor()
+    for _ in range(2):
+        with user.changing():
+            user.undo.click()
+    assert user.get("/scenarios/splits")["document"]["signals"]["junctions"] == []

@@ -8,7 +8,7 @@ import httpx2
 import pytest
 from starlette.testclient import TestClient
 
-from odscen.carla.client import Address
+from odscen.carla.server.client import Address
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
 from odscen.workspace.store import Workspace
@@ -54,6 +54,7 @@ def test_another_release_is_told_apart_from_nobody(page: TestClient, standin: St
     assert "0.9.15" in info["message"]
 
 
+@pytest.mark.slow
 def test_without_a_server_it_says_so_and_runs_go_on(workspace: Workspace, sampled: str) -> None:
     nobody = Address("127.0.0.1", 9, 0.5)
     with TestClient(create_app(workspace, hosts=None, carla=nobody)) as client:
@@ -68,6 +69,7 @@ def test_without_a_server_it_says_so_and_runs_go_on(workspace: Workspace, sample
         assert "no CARLA server at 127.0.0.1:9" in info["error"]
 
 
+@pytest.mark.slow
 def test_a_mirrored_run_is_watched_steered_and_kept(
     page: TestClient, standin: StandIn, sampled: str
 ) -> None:
@@ -93,6 +95,7 @@ def test_a_mirrored_run_is_watched_steered_and_kept(
     assert left(standin) == []
 
 
+@pytest.mark.slow
 def test_pictures_come_while_it_runs(workspace: Workspace, standin: StandIn, sampled: str) -> None:
     carla = Address(standin.host, standin.port, 5.0)
     with serving(workspace, carla=carla) as host, httpx2.Client(timeout=30.0) as client:

@@ -101,6 +101,7 @@ def test_a_whole_day_keeps_who_is_there_and_is_one_step_for_undo(
     assert (matrix["profile"], matrix["begin"], matrix["end"]) == ("weekday", 0, 86_400)
     assert sum(row[2] for row in matrix["trips"]) == pytest.approx(made["trips"], rel=0.02)
     assert made["volume"] < made["capacity"]
+    assert "busiest hour is usable with 2 seeds" in made["found"]
     assert not [one for one in made["scenario"]["problems"] if one["severity"] == "error"]
     again = client.post("/api/scenarios/mine/demand/day", json=wish)
     assert again.status_code == 409

@@ -73,6 +73,7 @@ def test_large_answers_are_compressed_and_packed_ones_left_alone(
     assert "content-encoding" not in client.get("/api/health").headers
 
 
+@pytest.mark.slow
 def test_the_load_bench_measures_every_kind_of_load() -> None:
     from bench.server_load import measure
 

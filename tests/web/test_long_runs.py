@@ -51,6 +51,7 @@ def interrupted_after(client: TestClient, run: str, slices: int) -> None:
     wait_for(lambda: client.get(f"/api/runs/{run}").json()["state"] == "interrupted")
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_to_the_same_end(
     client: TestClient, workspace: Workspace, busy: str
 ) -> None:
@@ -77,6 +78,7 @@ def test_an_interrupted_run_goes_on_to_the_same_end(
     assert client.post(f"/api/runs/{whole}/resume", json={}).status_code == 409
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_leaves_a_long_run_that_can_go_on(client: TestClient, busy: str) -> None:
     run = start(client, busy, speed=1000, **WISH)
     wait_for(lambda: client.get(f"/api/runs/{run}").json()["slices"])

@@ -1,13 +1,13 @@
 from __future__ import annotations
 
 import inspect
-import json
 import threading
 from string import Formatter
 from typing import get_args
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 from starlette.testclient import TestClient
 
 from odscen.app.maps import load_map
@@ -17,8 +17,9 @@ from odscen.lanegraph.query import node_id, node_index
 from odscen.scenario import edits
 from odscen.scenario.document.document_parts import Part
 from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.document.measures_document import Measure
 from odscen.scenario.document.rules_document import StoryRule
-from odscen.scenario.document.scenario_document import Actor, Flow, Matrix
+from odscen.scenario.document.scenario_document import Actor, Flow, Matrix, Scenario
 from odscen.scenario.edits.edit_messages import MESSAGES, EditBase
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 from odscen.scenario.forms.any_form import read_any
@@ -35,11 +36,18 @@ RULE = {
     "when": {"time": {"after": 4}, "delay": 1},
     "then": [{"brake": {"by": 4, "hold": 2}}],
 }
+GROUPS = [
+    *({"id": f"K{n}", "movements": [f"r{n}"]} for n in range(1, 5)),
+    *({"id": f"F{n}", "movements": [f"walk r{n}"]} for n in range(1, 5)),
+]
+STAGES = [
+    {"id": "1", "protected": ["F2", "F4"], "permissive": ["K1", "K3"], "green": 20},
+    {"id": "2", "protected": ["F1", "F3"], "permissive": ["K2", "K4"], "green": 15},
+]
 ALL = (
     ("grow_roi", {"segment": "j10001"}),
     ("grow_roi", {"segment": "r1"}),
-    ("grow_roi", {"segment": "r2"}),
-    ("grow_roi", {"segment": "r3"}),
+    ("extend_roi", {"segments": ["r2", "r3"]}),
     ("add_actor", {"category": "car", "spawn": "SPAWN0", "speed": 12.5, "style": "sporty"}),
     ("add_actor", {"category": "truck", "spawn": "SPAWN1", "id": "big", "depart": 3}),
     ("add_actor", {"category": "pedestrian", "spawn": "WALK0"}),
@@ -57,6 +65,12 @@ ALL = (
     ("set_drivers", {"saturation_flow": 1900, "gap_acceptance": 0.5}),
     ("set_signal_control", {"control": "actuated"}),
     ("set_timing", {"junction": "10001", "offset": 5}),
+    ("set_green", {"junction": "10001", "stage": "1", "green": 18}),
+    ("set_offset", {"junction": "10001", "offset": 7}),
+    ("clear_timing", {"junction": "10001"}),
+    ("set_timing", {"junction": "10001", "groups": GROUPS, "stages": STAGES}),
+    ("set_stage", {"junction": "10001", "stage": "2", "on_call": True}),
+    ("set_turn", {"junction": "10001", "approach": "r1", "treatment": "both"}),
     ("clear_timing", {"junction": "10001"}),
     ("set_simulation", {"duration": 120}),
     ("set_seed", {"seed": 9}),
@@ -67,6 +81,7 @@ ALL = (
     ("fill_roi", {"share": 0.3, "seed": 4}),
     ("set_clock", {"clock": 25_200}),
     ("set_routes", {"by": "travel_time", "informed": 0.2}),
+    ("set_parking", {"end": 0.2, "stay": 600}),
     ("set_zone", {"zone": "west", "segments": ["r1"]}),
     ("set_zone", {"zone": "east", "segments": ["r2"]}),
     ("set_profile", {"profile": "morning", "shares": [1, 3, 2]}),
@@ -81,9 +96,16 @@ ALL = (
     ("set_measure", {"measure": {"id": "shut", "kind": "closure", "places": ["r1>r2"]}}),
     ("remove_measure", {"measure": "shut"}),
     ("add_actor", {"category": "van", "spawn": "SPAWN0", "id": "white"}),
+    ("set_study", {"warm_up": 60, "detectors": [{"id": "here", "nodes": ["SPAWN0"]}]}),
+    ("set_criteria", {"criteria": ["collided == 0", "mean_delay <= 40 s"]}),
+    ("set_parameter", {"parameter": "v", "value": 8, "unit": "m/s", "min": 5, "max": 12}),
+    ("set_formula", {"place": "actors/white/speed", "formula": "$v + 1"}),
+    ("set_parameter", {"parameter": "v", "value": 9}),
+    ("remove_parameter", {"parameter": "v"}),
     ("set_rule", {"rule": RULE}),
     ("remove_rule", {"rule": "halt"}),
 )
+PARTS = {"set_measure": TypeAdapter(Measure), "set_rule": TypeAdapter(StoryRule)}
 
 
 @pytest.fixture
@@ -171,8 +193,9 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         answer = post_edit(client, new, state["version"], kind, **arguments)
         assert answer.status_code == 200, (kind, answer.text)
         known = {"graph": graph, "lights": loaded.lights, "usable": loaded.usable}
-        if kind == "set_rule":  # a part of the document, not its data
-            arguments = {"rule": StoryRule.model_validate(arguments["rule"])}
+        if part := PARTS.get(kind):  # a part of the document, not its data
+            name = kind.removeprefix("set_")
+            arguments = {name: part.validate_python(arguments[name])}
         function = getattr(edits, kind)
         wanted = inspect.signature(function).parameters
         ours = function(ours, **{k: v for k, v in known.items() if k in wanted}, **arguments)
@@ -180,7 +203,7 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         state = answer.json()
         file = workspace.scenarios / "mine.scenario.json"
         assert file.read_text(encoding="utf-8") == dumps(ours), kind
-        assert loads(json.dumps(state["document"])) == ours
+        assert Scenario.model_validate(state["document"]) == ours
         checked = check_scenario(workspace, ours)
         assert [p["code"] for p in state["problems"]] == [p.code for p in checked]
 
@@ -397,3 +420,38 @@ def test_goals_ways_and_neighbours_are_those_of_the_graph(
     roi = client.get(f"/api/scenarios/{sampled}/roi").json()
     assert roi["inside"] == list(scenario.roi)
     assert roi["candidates"] == list(edits.eligible_segments(scenario, graph))
+
+
+def test_the_plan_has_each_actor_at_its_start_when_it_departs_and_at_its_goal_at_the_end(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    state = client.get(f"/api/scenarios/{sampled}").json()
+    first = state["document"]["actors"][0]
+    wish = {"kind": "change_actor", "actor": first["id"], "depart": 7.5, "speed": 8.0}
+    asked = {"version": state["version"], "edits": [wish]}
+    assert client.post(f"/api/scenarios/{sampled}/edits", json=asked).status_code == 200
+    found = client.get(f"/api/scenarios/{sampled}/plan").json()
+    scenario = loads((workspace.scenarios / f"{sampled}{SUFFIX}").read_text())
+    graph = load_map(workspace.map(CROSSING)).sumo.graph
+    names = [user["id"] for user in found["users"]]
+    assert sorted(names) == sorted(actor.id for actor in scenario.actors)
+    assert (found["left_out"], found["not_planned"]) == ([], 0)
+    for actor in scenario.actors:
+        row = names.index(actor.id)
+        begin, end = found["first"][row], found["first"][row + 1] - 1
+        start = place_of(graph, actor.spawn)
+        assert start is not None
+        nodes = graph.walks if start.walk else graph.lanes
+        away = np.hypot(
+            nodes.x[start.node] - found["x"][begin], nodes.y[start.node] - found["y"][begin]
+        )
+        assert found["time"][begin] == pytest.approx(actor.depart, abs=0.01)
+        assert away == pytest.approx(abs(actor.lateral_offset), abs=0.02)
+        assert found["time"][end] > actor.depart
+    row = names.index(first["id"])
+    rows = slice(found["first"][row], found["first"][row + 1])
+    x, y, times = (np.array(found[name][rows]) for name in ("x", "y", "time"))
+    # Once it has its 8 m/s it covers 16 m in 2 s, whatever way it goes.
+    late = np.array([times[-1] - 3.0, times[-1] - 1.0])
+    gone = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    assert np.diff(np.interp(late, times, gone))[0] == pytest.approx(16.0, abs=0.2)

@@ -32,6 +32,8 @@ CHECKS = [
     content_type_conformance,
     response_schema_conformance,
 ]
+PATIENCE = 300.0
+"""Seconds for an answer: what a busy machine takes says nothing of the schema."""
 OPERATIONS = [
     (path, method)
     for path, methods in create_app(Workspace(Path("nowhere"))).openapi()["paths"].items()
@@ -79,6 +81,8 @@ def test_the_server_keeps_to_its_schema(
     known = {
         "name": f"{CROSSING}-0001",
         "run": "x-1",
+        "sweep": "x-1",
+        "case": "case-001",
         "job": "job-1",
         "junction": light,
         "item": item,
@@ -92,9 +96,11 @@ def test_the_server_keeps_to_its_schema(
     )
     @given(case=operation.as_strategy())
     def check(case: schemathesis.Case) -> None:
-        case.call_and_validate(checks=CHECKS)
+        if path.endswith("/demand/day") and isinstance(case.body, dict):
+            case.body["trial"] = False  # minutes of SUMO each; see app/test_sized_demand.py
+        case.call_and_validate(checks=CHECKS, timeout=PATIENCE)
         if method != "delete":  # once more where there is something
             case.path_parameters = {k: known[k] for k in case.path_parameters or {}}
-            case.call_and_validate(checks=CHECKS)
+            case.call_and_validate(checks=CHECKS, timeout=PATIENCE)
 
     check()

@@ -213,3 +213,122 @@ def test_a_map_tells_where_its_signals_are(client: TestClient) -> None:
     assert len(light.paths) == len(light.walks) == len(light.signals) == 24
     assert sum(light.walks) == 4
     assert light.paths[0][0] == (22.0, 5.75)
+
+
+def state(client: TestClient, name: str) -> dict[str, Any]:
+    found: dict[str, Any] = client.get(f"/api/scenarios/{name}").json()
+    return found
+
+
+def edited(client: TestClient, name: str, **edit: Any) -> Any:
+    wish = {"version": state(client, name)["version"], "edits": [edit]}
+    return client.post(f"/api/scenarios/{name}/edits", json=wish)
+
+
+def post(client: TestClient, name: str, path: str, **wish: Any) -> Any:
+    body = {"version": state(client, name)["version"], **wish}
+    return client.post(f"/api/scenarios/{name}/{path}", json=body)
+
+
+def shown(client: TestClient, name: str) -> dict[str, Any]:
+    found: dict[str, Any] = client.get(f"/api/scenarios/{name}/signals/{JUNCTION}").json()
+    return found
+
+
+def test_a_green_five_seconds_longer_is_in_sumos_file_and_in_what_a_run_shows(
+    client: TestClient, sampled: str
+) -> None:
+    before = shown(client, sampled)["plans"][0]
+    assert [one["end"] - one["begin"] for one in before["stages"]] == [13.0, 13.0]
+    wish = {"kind": "set_green", "junction": JUNCTION, "stage": "1", "green": 18}
+    assert edited(client, sampled, **wish).status_code == 200
+    after = shown(client, sampled)["plans"][0]
+    assert [one["end"] - one["begin"] for one in after["stages"]] == [18.0, 13.0]
+    assert after["cycle"] == before["cycle"] + 5.0
+    file = client.get(f"/api/scenarios/{sampled}/signals.add.xml")
+    assert file.headers["content-type"].startswith("application/xml")
+    assert 'duration="18"' in file.text
+    run = client.post("/api/runs", json={"scenario": sampled, "until": 90}).json()["run"]
+    assert finished(client, run)["state"] == "completed"
+    (lights,) = client.get(f"/api/runs/{run}/signals").json()["lights"]
+    green = next(one["state"] for one in after["phases"] if one["stage"] == "1")
+    times = [*lights["times"], 90.0]
+    lasted = [
+        times[n + 1] - times[n]
+        for n, row in enumerate(lights["shown"])
+        if lights["states"][row] == green
+    ]
+    assert lasted[0] == pytest.approx(18.0, abs=0.5)
+    version = state(client, sampled)["version"]
+    undone = client.post(f"/api/scenarios/{sampled}/undo", json={"version": version}).json()
+    assert undone["document"]["signals"]["junctions"] == []
+
+
+def test_a_refused_green_says_why_and_changes_nothing(client: TestClient, own: str) -> None:
+    before = state(client, own)
+    wish = {"kind": "set_green", "junction": JUNCTION, "stage": "1", "green": 36, "plan": "day"}
+    refused = edited(client, own, **wish)
+    assert refused.status_code == 422
+    assert "max_green of 35 s" in refused.json()["error"]["message"]
+    assert state(client, own) == before
+
+
+def test_the_maps_program_is_taken_over_and_its_turn_gets_an_arrow(
+    client: TestClient, sampled: str
+) -> None:
+    turn = {"approach": "r1", "turn": "left", "treatment": "permissive", "alone": True}
+    assert shown(client, sampled)["turns"][0] == turn
+    answer = post(client, sampled, f"signals/{JUNCTION}/own")
+    assert answer.json()["label"] == f"Take over the program of {JUNCTION}"
+    assert shown(client, sampled)["origin"] == "scenario"
+    again = post(client, sampled, f"signals/{JUNCTION}/own")
+    assert again.status_code == 422
+    wish = {"kind": "set_turn", "junction": JUNCTION, "approach": "r1", "treatment": "both"}
+    assert edited(client, sampled, **wish).status_code == 200
+    light = shown(client, sampled)
+    assert light["turns"][0] == {**turn, "treatment": "both"}
+    assert [stage["id"] for stage in light["plans"][0]["stages"]] == ["1", "3", "2"]
+
+
+def test_a_cycle_is_stretched_as_a_whole_and_too_short_a_one_refused(
+    client: TestClient, own: str
+) -> None:
+    path = f"signals/{JUNCTION}/cycle"
+    assert post(client, own, path, cycle=100, plan="day").status_code == 200
+    day, evening = shown(client, own)["plans"]
+    assert (day["cycle"], evening["cycle"]) == (100.0, 76.0)
+    refused = post(client, own, path, cycle=30, plan="day")
+    assert refused.status_code == 422
+    assert "least greens and intergreens" in refused.json()["error"]["message"]
+    assert post(client, own, path, cycle=90, plan="night").status_code == 404
+
+
+def test_lights_are_timed_after_the_demand_and_programs_go_out_and_come_back(
+    client: TestClient, sampled: str, workspace: Workspace
+) -> None:
+    one = scenario(None, vehicles=500.0, walkers=0.0, until=120.0)
+    name = saved(workspace, one, "demand")
+    timed = post(client, name, "signal-times/webster").json()
+    assert timed["notes"][0].startswith(f"Junction {JUNCTION}: cycle ")
+    (timing,) = timed["state"]["document"]["signals"]["junctions"]
+    assert len(timing["green"]) == 2
+    file = client.get(f"/api/scenarios/{name}/signals.add.xml").content
+    version = state(client, sampled)["version"]
+    taken = client.post(
+        f"/api/scenarios/{sampled}/signal-times/import",
+        data={"version": version},
+        files={"file": ("signals.add.xml", file)},
+    ).json()
+    (back,) = taken["state"]["document"]["signals"]["junctions"]
+    assert back["junction"] == JUNCTION
+    assert taken["state"]["label"] == "Import signal programs"
+    wrong = client.post(
+        f"/api/scenarios/{sampled}/signal-times/import",
+        data={"version": version + 1},
+        files={"file": ("roads.xml", b"<net/>")},
+    )
+    assert wrong.status_code == 422
+    assert "roads.xml" in wrong.text
+    alone = post(client, name, "signal-times/corridor", junctions=[JUNCTION])
+    assert alone.status_code == 422
+    assert "needs two traffic lights" in alone.json()["error"]["message"]

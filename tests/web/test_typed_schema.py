@@ -161,6 +161,7 @@ def test_the_summary_of_a_run_is_what_the_schema_says(
     assert written["figures"]["mean_speed"] > 0
 
 
+@pytest.mark.slow
 def test_the_summary_of_a_long_run_with_expectations_and_one_that_failed_too(
     workspace: Workspace, sampled: str, tmp_path: Path
 ) -> None:

@@ -88,6 +88,9 @@ async function refusal(response: Response): Promise<ApiError> {
 const unanswered = (status: number, kind: string, message: string): ApiError =>
   new ApiError(status, { kind, message, problems: [], current: null });
 
+/** Longest body that is sent even when the page is left meanwhile, characters. */
+const MOST_KEPT = 16_000;
+
 /** Asks the server; arguments and answer are those of its schema. Throws {@link ApiError}. */
 export async function call<M extends Method, P extends Route<M>>(
   method: M,
@@ -97,12 +100,15 @@ export async function call<M extends Method, P extends Route<M>>(
   const given = wish as AnyWish | undefined;
   const body = given?.body;
   const json = body !== undefined && !(body instanceof FormData);
+  const text = json ? JSON.stringify(body) : null;
   let response: Response;
   try {
     response = await fetch(filled(path, given), {
       method: method.toUpperCase(),
       headers: json ? { "Content-Type": "application/json" } : {},
-      body: json ? JSON.stringify(body) : ((body as FormData | undefined) ?? null),
+      // Survives the page that has sent it; browsers take no more than 64 kB of these.
+      ...(text !== null && text.length < MOST_KEPT && { keepalive: true }),
+      body: text ?? (body as FormData | undefined) ?? null,
     });
   } catch {
     throw unanswered(0, "offline", "The server cannot be reached. Is it still running?");
@@ -153,6 +159,8 @@ export const api = {
     call("get", "/api/scenarios/{name}/goals", { path: { name }, query: { spawn } }),
   path: (name: string, spawn: string, goal: string) =>
     call("get", "/api/scenarios/{name}/path", { path: { name }, query: { spawn, goal } }),
+  /** Where road users are planned to be before any run. */
+  plan: (name: string) => call("get", "/api/scenarios/{name}/plan", { path: { name } }),
   roi: (name: string) => call("get", "/api/scenarios/{name}/roi", { path: { name } }),
   downloadUrl: (name: string, form: "json" | "graphml") =>
     address("/api/scenarios/{name}/download", { path: { name }, query: { form } }),

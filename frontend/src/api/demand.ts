@@ -8,6 +8,7 @@ export type Zone = Schemas["Zone"];
 export type Matrix = Schemas["Matrix"];
 export type Counts = Schemas["Counts"];
 export type RouteChoice = Schemas["RouteChoice"];
+export type TripParking = Schemas["TripParking"];
 export type VehicleInput = Schemas["VehicleInput"];
 /** Where vehicles can drive into the region. */
 export type Entry = Schemas["EntryPlace"];
@@ -29,6 +30,6 @@ export const demand = {
     return call("post", "/api/scenarios/{name}/demand/table", { path: { name }, body: form(fields) });
   },
   entries: (name: string) => call("get", "/api/scenarios/{name}/demand/entries", { path: { name } }),
-  day: (name: string, version: number, day: "weekday" | "weekend", trips: number) =>
-    call("post", "/api/scenarios/{name}/demand/day", { path: { name }, body: { version, day, trips } }),
+  day: (name: string, version: number, wish: Omit<Schemas["WholeDay"], "version">) =>
+    call("post", "/api/scenarios/{name}/demand/day", { path: { name }, body: { version, ...wish } }),
 };

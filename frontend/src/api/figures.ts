@@ -4,6 +4,12 @@ import type { components } from "./schema";
 /** What a figure of a run is; the server's registry says it. */
 export type FigureInfo = components["schemas"]["FigureInfo"];
 
+/** What a criterion can ask of one road user. */
+export type ActorMeasureInfo = components["schemas"]["ActorMeasureInfo"];
+
+/** All measures of single road users. */
+export const actorMeasures = (): Promise<ActorMeasureInfo[]> => call("get", "/api/figures/actors");
+
 let asked: Promise<FigureInfo[]> | null = null;
 
 /** All figures of a run; asked for once, and again after a failure. */

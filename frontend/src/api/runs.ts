@@ -15,11 +15,14 @@ export type RunFile = Schemas["RunFile"];
 export type FitRow = Schemas["FitRow"];
 export type Summary = Schemas["RunSummary"];
 /** Whether the figures of a run can be used. */
+export type CriterionInfo = Schemas["CriterionInfo"];
 export type Verdict = Schemas["UsabilityInfo"];
 /** Something that went wrong on the road. */
 export type Incident = Schemas["IncidentInfo"];
 /** Who was where: rows `first[i]` to `first[i + 1]` belong to `times[i]`. */
 export type ReplayColumns = Schemas["ReplayColumns"];
+/** What became of a vehicle under test. */
+export type EgoOutcome = Schemas["EgoOutcome"];
 /** Texts of the live view. */
 export type LiveMessage = Schemas["LiveMessage"];
 export type LiveActor = Schemas["LiveActor"];
@@ -44,6 +47,7 @@ export const runs = {
       body: speed === undefined ? { action } : { action, speed },
     }),
   events: (run: string) => call("get", "/api/runs/{run}/events", { path: { run } }),
+  egos: (run: string) => call("get", "/api/runs/{run}/egos", { path: { run } }),
   curves: (run: string) => call("get", "/api/runs/{run}/curves", { path: { run } }),
   content: (run: string) => call("get", "/api/runs/{run}/content", { path: { run } }),
   replay: (run: string) =>

@@ -444,6 +444,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/scenarios/{name}/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Plan
+         * @description Where road users are planned to be, each alone on the road; see ``docs/server.md``.
+         */
+        get: operations["plan_api_scenarios__name__plan_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/scenarios/{name}/roi": {
         parameters: {
             query?: never;
@@ -535,7 +555,7 @@ export interface paths {
         put?: never;
         /**
          * Day
-         * @description Give a scenario 24 hours of traffic on its whole map; takes seconds.
+         * @description Give a scenario 24 hours of traffic on its whole map; takes seconds, with a trial minutes.
          */
         post: operations["day_api_scenarios__name__demand_day_post"];
         delete?: never;
@@ -732,6 +752,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/runs/{run}/egos": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Egos
+         * @description What became of the vehicles under test of a finished run.
+         */
+        get: operations["egos_api_runs__run__egos_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/runs/{run}/curves": {
         parameters: {
             query?: never;
@@ -772,6 +812,174 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sweeps": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Sweeps
+         * @description All sweeps, or those of one scenario, the newest last.
+         */
+        get: operations["list_sweeps_api_sweeps_get"];
+        put?: never;
+        /**
+         * Start
+         * @description Sweep a scenario as it is now.
+         */
+        post: operations["start_api_sweeps_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sweeps/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan
+         * @description What a sweep would take; runs one of its cases, and takes as long as that does.
+         */
+        post: operations["plan_api_sweeps_plan_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sweeps/{sweep}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Show
+         * @description How far a sweep is.
+         */
+        get: operations["show_api_sweeps__sweep__get"];
+        put?: never;
+        post?: never;
+        /**
+         * Remove
+         * @description Delete a sweep with all of its runs.
+         */
+        delete: operations["remove_api_sweeps__sweep__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sweeps/{sweep}/stop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop
+         * @description Stop a sweep; what has run is kept, and it can be resumed.
+         */
+        post: operations["stop_api_sweeps__sweep__stop_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sweeps/{sweep}/resume": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Resume
+         * @description Run what is missing of a sweep; it ends as if it had not been stopped.
+         */
+        post: operations["resume_api_sweeps__sweep__resume_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sweeps/{sweep}/cases": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Cases
+         * @description The table of a sweep, of those cases that have ended if it has not, and the boundary.
+         */
+        get: operations["cases_api_sweeps__sweep__cases_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sweeps/{sweep}/cases/{case}/scenario": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Open Case
+         * @description Save a case as a scenario; the one that it was saved as before, if that is unchanged.
+         */
+        post: operations["open_case_api_sweeps__sweep__cases__case__scenario_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sweeps/{sweep}/files/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * File
+         * @description A file of a sweep: its page, the table, a case, the report of a run.
+         */
+        get: operations["file_api_sweeps__sweep__files__name__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/scenarios/{name}/signals/{junction}": {
         parameters: {
             query?: never;
@@ -784,6 +992,126 @@ export interface paths {
          * @description What a light is told to show in a scenario, with all plans of the day.
          */
         get: operations["of_scenario_api_scenarios__name__signals__junction__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/signals/{junction}/cycle": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Set Cycle
+         * @description Give a light another cycle: greens in proportion to what they are.
+         */
+        post: operations["set_cycle_api_scenarios__name__signals__junction__cycle_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/signals/{junction}/own": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Take Over
+         * @description Make the map's program of a light one of the scenario, which can be changed.
+         */
+        post: operations["take_over_api_scenarios__name__signals__junction__own_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/signal-times/webster": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Webster
+         * @description Time lights after the demand: cycle and splits by Webster's method.
+         */
+        post: operations["webster_api_scenarios__name__signal_times_webster_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/signal-times/corridor": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Corridor
+         * @description Coordinate lights: one cycle, and the offsets with the widest bands.
+         */
+        post: operations["corridor_api_scenarios__name__signal_times_corridor_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/signal-times/import": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Programs
+         * @description Take programs over from SUMO's ``tlLogic``, with ``WAUT`` as plans of the day, and loops.
+         */
+        post: operations["import_programs_api_scenarios__name__signal_times_import_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/signals.add.xml": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Programs
+         * @description SUMO's additional file with the programs that the scenario gives to lights.
+         */
+        get: operations["export_programs_api_scenarios__name__signals_add_xml_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -884,6 +1212,26 @@ export interface paths {
          * @description How well a finished run meets the counts of its scenario.
          */
         get: operations["fit_api_runs__run__fit_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/figures/actors": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Actor Measures
+         * @description All measures of single actors, in the order in which they are offered.
+         */
+        get: operations["actor_measures_api_figures_actors_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1112,6 +1460,106 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/imports/openscenario": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Openscenario
+         * @description Make a scenario of an OpenSCENARIO file, in the background; the result is its name.
+         */
+        post: operations["import_openscenario_api_imports_openscenario_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/import": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Import Report
+         * @description What became of each element of the file that a scenario was imported from.
+         */
+        get: operations["import_report_api_scenarios__name__import_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/import/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Import Plan
+         * @description Plan of the sweep that the imported file describes, for ``odscen sweep --plan``.
+         */
+        get: operations["import_plan_api_scenarios__name__import_plan_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/export/notes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Notes
+         * @description What an export would hold, and what its format cannot say; refused if it cannot be made.
+         */
+        get: operations["export_notes_api_scenarios__name__export_notes_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/scenarios/{name}/export": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Scenario
+         * @description Download a scenario in another format, as a ZIP with all that it needs.
+         */
+        get: operations["export_scenario_api_scenarios__name__export_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -1141,6 +1589,7 @@ export interface components {
             horn?: components["schemas"]["Honking"] | null;
             ignore?: components["schemas"]["Ignoring-Input"] | null;
             release?: components["schemas"]["Releasing"] | null;
+            own?: components["schemas"]["OwnAction-Input"] | null;
             /** Together */
             together?: components["schemas"]["Action-Input"][] | null;
         };
@@ -1169,6 +1618,7 @@ export interface components {
             horn: components["schemas"]["Honking"] | null;
             ignore: components["schemas"]["Ignoring-Output"] | null;
             release: components["schemas"]["Releasing"] | null;
+            own: components["schemas"]["OwnAction-Output"] | null;
             /** Together */
             together: components["schemas"]["Action-Output"][] | null;
         };
@@ -1181,7 +1631,8 @@ export interface components {
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
          *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
          *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
-         *     ``None`` is from rest.
+         *     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
+         *     their order; an open goal is one that can be reached from the last of them.
          */
         Actor: {
             /** Id */
@@ -1193,6 +1644,11 @@ export interface components {
             spawn: string;
             /** Goal */
             goal: string | null;
+            /**
+             * Via
+             * @default []
+             */
+            via: string[];
             /** Speed */
             speed: number | null;
             /**
@@ -1229,6 +1685,29 @@ export interface components {
             ignores_red: boolean;
         };
         /**
+         * ActorMeasureInfo
+         * @description What a criterion can ask of one actor.
+         */
+        ActorMeasureInfo: {
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+            /** Label */
+            label: string;
+            /** Definition */
+            definition: string;
+        };
+        /**
+         * ActorStatus
+         * @description What has become of an actor when the run ended.
+         *
+         *     ``waiting`` is planned, but not inserted; ``running`` is inserted and has not arrived;
+         *     ``stranded`` was taken out because a measure had closed every route to its goal.
+         * @enum {string}
+         */
+        ActorStatus: "arrived" | "running" | "waiting" | "stranded";
+        /**
          * AddActorEdit
          * @description Place an actor on a node.
          */
@@ -1247,6 +1726,8 @@ export interface components {
             spawn: string;
             /** Goal */
             goal?: string | null;
+            /** Via */
+            via?: string[];
             /** Speed */
             speed?: number | null;
             /** Lateral Offset */
@@ -1297,6 +1778,8 @@ export interface components {
             };
             /** Speed */
             speed?: number | null;
+            /** Initial Speed */
+            initial_speed?: number | null;
             /** Profile */
             profile?: string | null;
         };
@@ -1479,6 +1962,35 @@ export interface components {
             /** Converter */
             converter?: ("odscen" | "netconvert") | null;
         };
+        /** Body_import_openscenario_api_imports_openscenario_post */
+        Body_import_openscenario_api_imports_openscenario_post: {
+            /**
+             * Files
+             * @description A scenario (.xosc), and if need be its map (.xodr) and catalogs.
+             */
+            files: string[];
+            /**
+             * Ego
+             * @default story
+             * @enum {string}
+             */
+            ego?: "story" | "sumo";
+        };
+        /** Body_import_programs_api_scenarios__name__signal_times_import_post */
+        Body_import_programs_api_scenarios__name__signal_times_import_post: {
+            /**
+             * File
+             * @description SUMO's programs: .tll.xml, .add.xml, .net.xml.
+             */
+            file: string;
+            /** Version */
+            version: number;
+            /**
+             * Junction
+             * @description Only this light.
+             */
+            junction?: string | null;
+        };
         /** Body_table_api_scenarios__name__demand_table_post */
         Body_table_api_scenarios__name__demand_table_post: {
             /**
@@ -1560,6 +2072,14 @@ export interface components {
             message: string;
         };
         /**
+         * CaseName
+         * @description Name of the scenario that a case becomes; made from the sweep's if not given.
+         */
+        CaseName: {
+            /** Name */
+            name?: string | null;
+        };
+        /**
          * Category
          * @description Exactly seven; the order is that of the interface.
          * @enum {string}
@@ -1597,6 +2117,8 @@ export interface components {
             spawn?: string;
             /** Goal */
             goal?: string | null;
+            /** Via */
+            via?: string[];
             /** Speed */
             speed?: number | null;
             /** Lateral Offset */
@@ -1649,6 +2171,8 @@ export interface components {
             };
             /** Speed */
             speed?: number | null;
+            /** Initial Speed */
+            initial_speed?: number | null;
             /** Profile */
             profile?: string | null;
             /** Flow */
@@ -1785,6 +2309,7 @@ export interface components {
             appeared?: components["schemas"]["OneActor-Input"] | null;
             touched?: components["schemas"]["Touching-Input"] | null;
             off_road?: components["schemas"]["OneActor-Input"] | null;
+            own?: components["schemas"]["OwnCondition-Input"] | null;
             /** All */
             all?: components["schemas"]["Condition-Input"][] | null;
             /** Any */
@@ -1825,6 +2350,7 @@ export interface components {
             appeared: components["schemas"]["OneActor-Output"] | null;
             touched: components["schemas"]["Touching-Output"] | null;
             off_road: components["schemas"]["OneActor-Output"] | null;
+            own: components["schemas"]["OwnCondition-Output"] | null;
             /** All */
             all: components["schemas"]["Condition-Output"][] | null;
             /** Any */
@@ -1934,6 +2460,37 @@ export interface components {
             exits: string[];
         };
         /**
+         * CorridorWish
+         * @description Lights to be coordinated: junctions in driving order, or those along roads.
+         *
+         *     ``speed`` is that of progression, m/s; the speed limits if not given. ``cycle`` in seconds; the
+         *     longest of the lights if not given.
+         */
+        CorridorWish: {
+            /** Version */
+            version: number;
+            /**
+             * Junctions
+             * @default []
+             */
+            junctions?: string[];
+            /**
+             * Along
+             * @default []
+             */
+            along?: string[];
+            /**
+             * Favoured
+             * @default both
+             * @enum {string}
+             */
+            favoured?: "both" | "out" | "back";
+            /** Speed */
+            speed?: number | null;
+            /** Cycle */
+            cycle?: number | null;
+        };
+        /**
          * Counts
          * @description Vehicles that were counted: rows of place, begin and end of the slice, and number.
          *
@@ -1967,6 +2524,24 @@ export interface components {
                 number,
                 number
             ][];
+        };
+        /**
+         * CriterionInfo
+         * @description A criterion of the scenario: ``value`` in ``unit``, and when it came about, s.
+         */
+        CriterionInfo: {
+            /** Criterion */
+            criterion: string;
+            /** Words */
+            words: string;
+            /** Value */
+            value: number | null;
+            /** Unit */
+            unit: string;
+            /** Passed */
+            passed: boolean;
+            /** Time */
+            time: number | null;
         };
         /**
          * CrosswalkInfo
@@ -2030,11 +2605,23 @@ export interface components {
             over: number;
         };
         /**
+         * CycleWish
+         * @description Another cycle for a light, seconds; ``plan`` is a plan of the day where it has several.
+         */
+        CycleWish: {
+            /** Version */
+            version: number;
+            /** Cycle */
+            cycle: number;
+            /** Plan */
+            plan?: string | null;
+        };
+        /**
          * DayMade
          * @description A scenario that was given a day of traffic, and what that asks of the busiest junction.
          *
          *     ``volume`` and ``capacity`` are vehicles per hour at ``place`` in the busiest hour, in which
-         *     ``peak_trips`` set out.
+         *     ``peak_trips`` depart. ``found`` says what was tried by runs, and is null without a trial.
          */
         DayMade: {
             scenario: components["schemas"]["ScenarioState"];
@@ -2048,6 +2635,8 @@ export interface components {
             volume: number;
             /** Capacity */
             capacity: number;
+            /** Found */
+            found: string | null;
         };
         /**
          * DayPlan
@@ -2161,7 +2750,7 @@ export interface components {
          * Demand
          * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
          *
-         *     ``routes`` says how its trips choose their routes.
+         *     ``routes`` says how its trips choose their routes, ``parking`` which of them park.
          */
         Demand: {
             /**
@@ -2205,12 +2794,22 @@ export interface components {
              *       "iterations": 20,
              *       "gap": 0.01,
              *       "interval": 900,
+             *       "spread": 0.03,
              *       "informed": 0,
              *       "period": 60,
              *       "shares": []
              *     }
              */
             routes: components["schemas"]["RouteChoice"];
+            /**
+             * @default {
+             *       "begin": 0,
+             *       "end": 0,
+             *       "stay": 3600,
+             *       "within": 300
+             *     }
+             */
+            parking: components["schemas"]["TripParking"];
         };
         /**
          * Detector
@@ -2229,7 +2828,8 @@ export interface components {
          *     ``label`` names it in the pictures, where its shape has its id as ``data-detector``. ``bus`` if
          *     it is an area of ``length`` metres that sees buses only, which have priority for its stages.
          *     ``calls`` are begin and end of the times in which it saw a road user, seconds of a run; none
-         *     without a run, and none of an area for buses, which SUMO does not log.
+         *     without a run, and none of an area for buses, which SUMO does not log. ``place`` are points
+         *     along it in driving direction, x and y in metres.
          */
         DetectorInfo: {
             /** Id */
@@ -2250,6 +2850,11 @@ export interface components {
             gap: number;
             /** Calls */
             calls: [
+                number,
+                number
+            ][];
+            /** Place */
+            place: [
                 number,
                 number
             ][];
@@ -2483,9 +3088,32 @@ export interface components {
             /** Version */
             version: number;
             /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetParkingEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["SetParameterEdit"] | components["schemas"]["RemoveParameterEdit"] | components["schemas"]["SetFormulaEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ExtendRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetCriteriaEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetGreenEdit"] | components["schemas"]["SetOffsetEdit"] | components["schemas"]["SetStageEdit"] | components["schemas"]["SetTurnEdit"] | components["schemas"]["SetStudyEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
             /** Label */
             label?: string | null;
+        };
+        /**
+         * EgoOutcome
+         * @description What became of a vehicle under test; seconds, m/s.
+         *
+         *     ``travel_time`` and ``delay`` are known of one that arrived.
+         */
+        EgoOutcome: {
+            /** Id */
+            id: string;
+            status: components["schemas"]["ActorStatus"];
+            /** Travel Time */
+            travel_time: number | null;
+            /** Delay */
+            delay: number | null;
+            /** Mean Speed */
+            mean_speed: number | null;
+            /** Collisions */
+            collisions: number;
+            /** Emergency Stops */
+            emergency_stops: number;
+            /** Teleports */
+            teleports: number;
         };
         /**
          * ElementOutcome
@@ -2579,6 +3207,41 @@ export interface components {
             passed: boolean;
         };
         /**
+         * ExportInfo
+         * @description Files of an export, and what its format says in part only, or not at all.
+         */
+        ExportInfo: {
+            /** Files */
+            files: string[];
+            /** Approximated */
+            approximated: components["schemas"]["ExportNote"][];
+            /** Left Out */
+            left_out: components["schemas"]["ExportNote"][];
+        };
+        /**
+         * ExportNote
+         * @description A part of a scenario, and what becomes of it.
+         */
+        ExportNote: {
+            /** Place */
+            place: string;
+            /** Reason */
+            reason: string;
+        };
+        /**
+         * ExtendRoiEdit
+         * @description Add several segments to the region of interest at once, in any order (R29).
+         */
+        ExtendRoiEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "extend_roi";
+            /** Segments */
+            segments: string[];
+        };
+        /**
          * FigureDisplay
          * @description How to write a value: times ``factor``, in ``unit``; ``clock``: as minutes and seconds.
          */
@@ -2664,7 +3327,8 @@ export interface components {
          *
          *     Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
          *     actor of the flow draws its own goal from the candidates. With a ``profile``, ``per_hour`` is
-         *     the mean of a day, and the profile says when there are more and when fewer.
+         *     the mean of a day, and the profile says when there are more and when fewer. ``initial_speed``
+         *     is that of its vehicles at departure, m/s; ``None`` is from rest.
          */
         Flow: {
             /** Id */
@@ -2696,12 +3360,16 @@ export interface components {
             };
             /** Speed */
             speed: number | null;
+            /** Initial Speed */
+            initial_speed: number | null;
             /** Profile */
             profile: string | null;
         };
         /**
          * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+         *
+         *     ``ahead``: drive in front of it at that gap, seconds at its speed.
          */
         "GapKeeping-Input": {
             /** To */
@@ -2710,6 +3378,11 @@ export interface components {
             metres?: number | null;
             /** Seconds */
             seconds?: number | null;
+            /**
+             * Ahead
+             * @default false
+             */
+            ahead?: boolean;
             /** Lasting */
             lasting?: number | null;
             /**
@@ -2721,6 +3394,8 @@ export interface components {
         /**
          * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+         *
+         *     ``ahead``: drive in front of it at that gap, seconds at its speed.
          */
         "GapKeeping-Output": {
             /** To */
@@ -2729,6 +3404,11 @@ export interface components {
             metres: number | null;
             /** Seconds */
             seconds: number | null;
+            /**
+             * Ahead
+             * @default false
+             */
+            ahead: boolean;
             /** Lasting */
             lasting: number | null;
             /**
@@ -2903,6 +3583,53 @@ export interface components {
              * @default false
              */
             right_of_way: boolean;
+        };
+        /**
+         * ImportInfo
+         * @description What became of each element of the file that a scenario was imported from.
+         *
+         *     ``added`` says whether its map came with it; ``sweep`` whether there is a plan of a sweep.
+         */
+        ImportInfo: {
+            /** Scenario */
+            scenario: string;
+            /** File */
+            file: string;
+            /** Map */
+            map: string;
+            /** Added */
+            added: boolean;
+            /** Sweep */
+            sweep: boolean;
+            /** Refused */
+            refused: components["schemas"]["ImportRow"][];
+            /** Approximated */
+            approximated: components["schemas"]["ImportRow"][];
+            /** Ignored */
+            ignored: components["schemas"]["ImportRow"][];
+            /** Taken */
+            taken: components["schemas"]["ImportRow"][];
+        };
+        /**
+         * ImportRow
+         * @description An element of a file, and why it is in its list.
+         *
+         *     ``x`` and ``y`` are metres in the OpenDRIVE frame: the place on the map that it is about, if
+         *     that is known.
+         */
+        ImportRow: {
+            /** File */
+            file: string;
+            /** Xpath */
+            xpath: string;
+            /** Line */
+            line: number;
+            /** Reason */
+            reason: string;
+            /** X */
+            x: number | null;
+            /** Y */
+            y: number | null;
         };
         /**
          * Incident
@@ -3294,6 +4021,7 @@ export interface components {
          * @description What a light is told to show. ``site`` is the junction with its detectors, as SVG.
          *
          *     ``ground`` is what the pictures of the stages refer to: it has to be in the page with them.
+         *     ``turns`` are those across oncoming traffic; none in a run.
          */
         LightProgramInfo: {
             /** Id */
@@ -3316,6 +4044,8 @@ export interface components {
             plans: components["schemas"]["DayPlanInfo"][];
             /** Detectors */
             detectors: components["schemas"]["DetectorInfo"][];
+            /** Turns */
+            turns: components["schemas"]["TurnInfo"][];
             /** Site */
             site: string;
             /** Ground */
@@ -3681,6 +4411,44 @@ export interface components {
             of: string | null;
         };
         /**
+         * OwnAction
+         * @description An action of an installed package.
+         */
+        "OwnAction-Input": {
+            /** Kind */
+            kind: string;
+            /** To */
+            to?: string | null;
+            /** Place */
+            place?: string | [
+                number,
+                number
+            ] | null;
+            /** Values */
+            values?: {
+                [key: string]: number | string;
+            };
+        };
+        /**
+         * OwnAction
+         * @description An action of an installed package.
+         */
+        "OwnAction-Output": {
+            /** Kind */
+            kind: string;
+            /** To */
+            to: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ] | null;
+            /** Values */
+            values: {
+                [key: string]: number | string;
+            };
+        };
+        /**
          * OwnBounded
          * @description A value of one actor: ``of``, or the rule's own.
          */
@@ -3701,6 +4469,52 @@ export interface components {
             below: number | null;
             /** Above */
             above: number | null;
+            /** Of */
+            of: string | null;
+        };
+        /**
+         * OwnCondition
+         * @description A condition of an installed package; ``of`` is whose value it is, the rule's actor's if not.
+         *
+         *     See :mod:`odscen.scenario.story.own_kinds`.
+         */
+        "OwnCondition-Input": {
+            /** Kind */
+            kind: string;
+            /** To */
+            to?: string | null;
+            /** Place */
+            place?: string | [
+                number,
+                number
+            ] | null;
+            /** Values */
+            values?: {
+                [key: string]: number | string;
+            };
+            /** Of */
+            of?: string | null;
+        };
+        /**
+         * OwnCondition
+         * @description A condition of an installed package; ``of`` is whose value it is, the rule's actor's if not.
+         *
+         *     See :mod:`odscen.scenario.story.own_kinds`.
+         */
+        "OwnCondition-Output": {
+            /** Kind */
+            kind: string;
+            /** To */
+            to: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ] | null;
+            /** Values */
+            values: {
+                [key: string]: number | string;
+            };
             /** Of */
             of: string | null;
         };
@@ -3855,6 +4669,75 @@ export interface components {
             picture: string;
             /** Words */
             words: string;
+        };
+        /**
+         * PlannedColumns
+         * @description Planned motion: rows ``first[i]`` up to ``first[i + 1]`` belong to ``users[i]``.
+         *
+         *     Per row a time (seconds after the start of the run), the centre of the body (metres) and its
+         *     heading (radians); between two rows it moves straight on, evenly in time. ``left_out`` are ids
+         *     of actors and flows that cannot be planned; ``not_planned`` is how many road users more there
+         *     are than are planned at most.
+         */
+        PlannedColumns: {
+            /** Users */
+            users: components["schemas"]["PlannedUser"][];
+            /** First */
+            first: number[];
+            /** Time */
+            time: number[];
+            /** X */
+            x: number[];
+            /** Y */
+            y: number[];
+            /** Hdg */
+            hdg: number[];
+            /** Left Out */
+            left_out: string[];
+            /** Not Planned */
+            not_planned: number;
+        };
+        /**
+         * PlannedSweep
+         * @description How many cases a sweep has, and what they will take, from a trial of ``tried``.
+         *
+         *     ``seconds`` is wall time of all cases, null if the one that was tried takes longer than
+         *     ``patience`` seconds; ``disk`` and ``free`` are bytes.
+         */
+        PlannedSweep: {
+            /** Cases */
+            cases: number;
+            /** Tried */
+            tried: string;
+            /** Case Seconds */
+            case_seconds: number;
+            /** Seconds */
+            seconds: number | null;
+            /** Disk */
+            disk: number;
+            /** Free */
+            free: number;
+            /** Processes */
+            processes: number;
+            /** Patience */
+            patience: number;
+        };
+        /**
+         * PlannedUser
+         * @description A road user that is planned; metres. ``flow`` is the flow that it is a member of.
+         */
+        PlannedUser: {
+            /** Id */
+            id: string;
+            category: components["schemas"]["Category"];
+            /** Length */
+            length: number;
+            /** Width */
+            width: number;
+            /** Ego */
+            ego: boolean;
+            /** Flow */
+            flow: string | null;
         };
         /**
          * ProblemInfo
@@ -4114,6 +4997,19 @@ export interface components {
             measure: string;
         };
         /**
+         * RemoveParameterEdit
+         * @description Remove a parameter; numbers that were computed from it stay as they are, without formulas.
+         */
+        RemoveParameterEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_parameter";
+            /** Parameter */
+            parameter: string;
+        };
+        /**
          * RemoveRuleEdit
          * @description Remove a rule by its id; a rule that waits for it then has an error in the checks.
          */
@@ -4251,6 +5147,17 @@ export interface components {
             ][];
         };
         /**
+         * ResumeSweep
+         * @description Go on with a sweep that was stopped.
+         */
+        ResumeSweep: {
+            /**
+             * Processes
+             * @default 1
+             */
+            processes?: number;
+        };
+        /**
          * RoadClosure
          * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
          */
@@ -4381,7 +5288,8 @@ export interface components {
          *     By ``length`` each takes the shortest. By ``travel_time`` the run is repeated, at most
          *     ``iterations`` times, and each time some trips change to the route that was quickest, until
          *     ``gap``, the share of travel time that could be saved, is small enough. Travel times are means
-         *     of ``interval`` seconds.
+         *     of ``interval`` seconds. With a ``spread`` drivers tell routes apart only roughly: of two routes
+         *     one of which takes longer by that share of the time, it is taken ``e`` times as rarely.
          *
          *     ``informed`` is the share of drivers who look for a quicker route on the way, every ``period``
          *     seconds, whichever route they began with. ``shares`` deal out trips to routes beforehand.
@@ -4408,6 +5316,11 @@ export interface components {
              * @default 900
              */
             interval: number;
+            /**
+             * Spread
+             * @default 0.03
+             */
+            spread: number;
             /**
              * Informed
              * @default 0
@@ -4475,6 +5388,14 @@ export interface components {
             shares: components["schemas"]["RunShares"];
         };
         /**
+         * RunEgos
+         * @description The vehicles under test of a finished run, in the order of the scenario.
+         */
+        RunEgos: {
+            /** Egos */
+            egos: components["schemas"]["EgoOutcome"][];
+        };
+        /**
          * RunEvents
          * @description Incidents of a finished run, as the live view reports them; ``left_off`` were too many.
          */
@@ -4497,12 +5418,18 @@ export interface components {
         /**
          * RunFit
          * @description All counts of a run's scenario against the run; ``rmse`` in vehicles per slice.
+         *
+         *     ``hours`` are those that slices of a place make up, ``hours_met`` how many of them are met.
          */
         RunFit: {
             /** Rows */
             rows: components["schemas"]["FitRow"][];
             /** Met */
             met: number;
+            /** Hours */
+            hours: number;
+            /** Hours Met */
+            hours_met: number;
             /** Rmse */
             rmse: number | null;
             /** Contradictions */
@@ -4530,7 +5457,8 @@ export interface components {
          * RunInfo
          * @description A run, going on or finished; ``summary`` is that of ``summary.json``.
          *
-         *     ``finished`` is when its results were written, in seconds since 1970. ``carla`` says that it is
+         *     ``finished`` is when its results were written, in seconds since 1970. ``preparing`` says how far
+         *     routes by travel time have been found before it begins. ``carla`` says that it is
          *     shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
          *     ``slices``; one that is ``interrupted`` can go on from the last of them.
          */
@@ -4560,6 +5488,8 @@ export interface components {
              */
             carla: boolean;
             slices: components["schemas"]["RunSlices"] | null;
+            /** Preparing */
+            preparing: string | null;
         };
         /**
          * RunProgress
@@ -4698,6 +5628,8 @@ export interface components {
                 [key: string]: number | null;
             };
             gridlock: components["schemas"]["GridlockInfo"] | null;
+            /** Criteria */
+            criteria: components["schemas"]["CriterionInfo"][];
             /** Expectations */
             expectations: components["schemas"]["ExpectationInfo"][];
             /** Problems */
@@ -4790,7 +5722,14 @@ export interface components {
              *         "interval": 900,
              *         "iterations": 20,
              *         "period": 60,
-             *         "shares": []
+             *         "shares": [],
+             *         "spread": 0.03
+             *       },
+             *       "parking": {
+             *         "begin": 0,
+             *         "end": 0,
+             *         "stay": 3600,
+             *         "within": 300
              *       }
              *     }
              */
@@ -4838,6 +5777,11 @@ export interface components {
              * @default []
              */
             rules: components["schemas"]["StoryRule-Output"][];
+            /**
+             * Criteria
+             * @default []
+             */
+            criteria: string[];
             /** Parameters */
             parameters: {
                 [key: string]: components["schemas"]["Parameter"];
@@ -5036,6 +5980,19 @@ export interface components {
             counts: string;
         };
         /**
+         * SetCriteriaEdit
+         * @description Say what must come out of a run for it to pass; the whole list, in its order.
+         */
+        SetCriteriaEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_criteria";
+            /** Criteria */
+            criteria: string[];
+        };
+        /**
          * SetDriversEdit
          * @description Change fields of :class:`~odscen.scenario.document.scenario_document.Drivers`.
          */
@@ -5093,6 +6050,21 @@ export interface components {
             affects_driving?: boolean | null;
         };
         /**
+         * SetFormulaEdit
+         * @description Compute a number of the document from parameters, or let it be a number again.
+         */
+        SetFormulaEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_formula";
+            /** Place */
+            place: string;
+            /** Formula */
+            formula: string | null;
+        };
+        /**
          * SetGoalEdit
          * @description Set the goal of an actor; ``None`` leaves it to the seed.
          */
@@ -5106,6 +6078,30 @@ export interface components {
             actor: string;
             /** Goal */
             goal: string | null;
+        };
+        /**
+         * SetGreenEdit
+         * @description Give one stage of a light another green; intergreens stay.
+         */
+        SetGreenEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_green";
+            /** Junction */
+            junction: string;
+            /** Stage */
+            stage: string;
+            /** Green */
+            green: number;
+            /** Plan */
+            plan?: string | null;
+            /**
+             * Keep Cycle
+             * @default false
+             */
+            keep_cycle?: boolean;
         };
         /**
          * SetInputEdit
@@ -5236,6 +6232,69 @@ export interface components {
             kind: "set_measure";
             /** Measure */
             measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
+            /** Instead Of */
+            instead_of?: string | null;
+        };
+        /**
+         * SetOffsetEdit
+         * @description Let the program of a light begin so many seconds into the scenario.
+         */
+        SetOffsetEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_offset";
+            /** Junction */
+            junction: string;
+            /** Offset */
+            offset: number;
+            /** Plan */
+            plan?: string | null;
+        };
+        /**
+         * SetParameterEdit
+         * @description Add a parameter, or change one; every number that is computed from it follows.
+         */
+        SetParameterEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_parameter";
+            /** Value */
+            value?: number;
+            /** Unit */
+            unit?: string;
+            /** Min */
+            min?: number | null;
+            /** Max */
+            max?: number | null;
+            /** Description */
+            description?: string;
+            /** Parameter */
+            parameter: string;
+            /** Instead Of */
+            instead_of?: string | null;
+        };
+        /**
+         * SetParkingEdit
+         * @description Change which trips of the demand begin and end in parking places.
+         */
+        SetParkingEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_parking";
+            /** Begin */
+            begin?: number;
+            /** End */
+            end?: number;
+            /** Stay */
+            stay?: components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"];
+            /** Within */
+            within?: number;
         };
         /**
          * SetProfileEdit
@@ -5273,6 +6332,8 @@ export interface components {
             gap?: number;
             /** Interval */
             interval?: number;
+            /** Spread */
+            spread?: number;
             /** Informed */
             informed?: number;
             /** Period */
@@ -5291,6 +6352,8 @@ export interface components {
              */
             kind: "set_rule";
             rule: components["schemas"]["StoryRule-Input"];
+            /** Instead Of */
+            instead_of?: string | null;
         };
         /**
          * SetSeedEdit
@@ -5348,6 +6411,35 @@ export interface components {
             pedestrians?: "striping" | "nonInteracting";
         };
         /**
+         * SetStageEdit
+         * @description Change fields of a stage of a program of the scenario's own, such as ``on_call``.
+         */
+        SetStageEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_stage";
+            /** Id */
+            id?: string;
+            /** Protected */
+            protected?: string[];
+            /** Permissive */
+            permissive?: string[];
+            /** Green */
+            green?: number;
+            /** Min Green */
+            min_green?: number | null;
+            /** Max Green */
+            max_green?: number | null;
+            /** On Call */
+            on_call?: boolean;
+            /** Junction */
+            junction: string;
+            /** Stage */
+            stage: string;
+        };
+        /**
          * SetStopEdit
          * @description Add a stop, or change that of this name.
          */
@@ -5369,6 +6461,27 @@ export interface components {
             bay?: boolean;
             /** Stop */
             stop: string;
+        };
+        /**
+         * SetStudyEdit
+         * @description Change the warm-up, the analysis interval, or the stations.
+         */
+        SetStudyEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_study";
+            /** Warm Up */
+            warm_up?: number;
+            /** Interval */
+            interval?: number | null;
+            /** Detectors */
+            detectors?: components["schemas"]["Detector"][];
+            /** Sections */
+            sections?: components["schemas"]["TravelTimeSection"][];
+            /** Cordons */
+            cordons?: components["schemas"]["Cordon"][];
         };
         /**
          * SetTimingEdit
@@ -5408,6 +6521,32 @@ export interface components {
             plans?: components["schemas"]["DayPlan-Input"][];
             /** Bus Priority */
             bus_priority?: boolean | null;
+        };
+        /**
+         * SetTurnEdit
+         * @description Let a turn across oncoming traffic go through its gaps, with an arrow of its own, or both.
+         */
+        SetTurnEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_turn";
+            /** Junction */
+            junction: string;
+            /** Approach */
+            approach: string;
+            /**
+             * Treatment
+             * @enum {string}
+             */
+            treatment: "permissive" | "protected" | "both";
+            /**
+             * Turn
+             * @default left
+             * @enum {string}
+             */
+            turn?: "left" | "right";
         };
         /**
          * SetZoneEdit
@@ -6068,6 +7207,160 @@ export interface components {
          */
         SummaryPart: "" | "actors" | "figures";
         /**
+         * SweepCase
+         * @description One case: values of the parameters and of the columns, in their order.
+         *
+         *     ``safe`` is null where it has not been run, and ``detail`` says why. ``collision`` is a column
+         *     as well, 1 or 0.
+         */
+        SweepCase: {
+            /** Case */
+            case: string;
+            /**
+             * Status
+             * @enum {string}
+             */
+            status: "completed" | "failed" | "refused" | "waiting";
+            /** Safe */
+            safe: boolean | null;
+            /** Detail */
+            detail: string | null;
+            /** Values */
+            values: number[];
+            /** Measures */
+            measures: (number | null)[];
+        };
+        /**
+         * SweepCases
+         * @description The table of a sweep, and ends of the stretches of the boundary between safe and not.
+         */
+        SweepCases: {
+            /** Sweep */
+            sweep: string;
+            /** Limits */
+            limits: string[];
+            /** Parameters */
+            parameters: components["schemas"]["SweepParameter"][];
+            /** Columns */
+            columns: components["schemas"]["SweepColumn"][];
+            /** Cases */
+            cases: components["schemas"]["SweepCase"][];
+            /** Boundary */
+            boundary: [
+                [
+                    number,
+                    number
+                ],
+                [
+                    number,
+                    number
+                ]
+            ][];
+        };
+        /**
+         * SweepColumn
+         * @description A measure of cases.
+         */
+        SweepColumn: {
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * SweepInfo
+         * @description A sweep: what is varied, and how far it is.
+         *
+         *     ``seconds_left`` is null while nothing is known of it. ``safe`` and ``unsafe`` count cases once
+         *     all have ended.
+         */
+        SweepInfo: {
+            /** Sweep */
+            sweep: string;
+            /** Scenario */
+            scenario: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "running" | "done" | "stopped" | "failed";
+            /** Parameters */
+            parameters: string[];
+            /**
+             * Method
+             * @enum {string}
+             */
+            method: "grid" | "latin" | "sobol" | "random";
+            /** Cases */
+            cases: number;
+            /** Ended */
+            ended: number;
+            /** Seconds Left */
+            seconds_left: number | null;
+            /** Safe */
+            safe: number | null;
+            /** Unsafe */
+            unsafe: number | null;
+            /** Error */
+            error: string | null;
+            /** Changed */
+            changed: number;
+        };
+        /**
+         * SweepParameter
+         * @description What is varied.
+         */
+        SweepParameter: {
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * SweepWish
+         * @description A sweep of a scenario as it is now; parameters that are not varied keep their values.
+         *
+         *     ``samples`` is how many cases, of all methods but the grid, and ``sample_seed`` is of them.
+         *     ``safe`` are limits that a safe case keeps besides no collision, ``figures`` more columns.
+         *     ``seed`` stands in for the scenario's, ``processes`` is how many cases run at a time.
+         */
+        SweepWish: {
+            /** Scenario */
+            scenario: string;
+            /** Vary */
+            vary: components["schemas"]["VaryWish"][];
+            /**
+             * Method
+             * @default grid
+             * @enum {string}
+             */
+            method?: "grid" | "latin" | "sobol" | "random";
+            /** Samples */
+            samples?: number | null;
+            /**
+             * Sample Seed
+             * @default 0
+             */
+            sample_seed?: number;
+            /**
+             * Safe
+             * @default []
+             */
+            safe?: string[];
+            /**
+             * Figures
+             * @default []
+             */
+            figures?: string[];
+            /** Seed */
+            seed?: number | null;
+            /**
+             * Processes
+             * @default 1
+             */
+            processes?: number;
+        };
+        /**
          * TemplateInfo
          * @description A scene that can be placed on maps.
          */
@@ -6102,6 +7395,19 @@ export interface components {
             unit: string;
             /** Meaning */
             meaning: string;
+        };
+        /**
+         * TimedSignalsState
+         * @description A scenario whose lights have been timed, and in words what came of it.
+         *
+         *     ``picture`` is the time-space diagram of a corridor as SVG, else empty.
+         */
+        TimedSignalsState: {
+            state: components["schemas"]["ScenarioState"];
+            /** Notes */
+            notes: string[];
+            /** Picture */
+            picture: string;
         };
         /**
          * Touching
@@ -6221,6 +7527,62 @@ export interface components {
             end: string[];
         };
         /**
+         * TripParking
+         * @description Shares of the cars of matrices, inputs and background that park.
+         *
+         *     ``begin`` is the share that begin in a parking place (inputs begin at the boundary), ``end``
+         *     the share that end in one. ``stay`` is how long a place is taken, seconds: before a trip that
+         *     begins there, and after one that has ended there. Between zones, places are at most ``within``
+         *     metres from where the trip would begin or end; elsewhere anywhere in the region.
+         */
+        TripParking: {
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /**
+             * End
+             * @default 0
+             */
+            end: number;
+            /**
+             * Stay
+             * @default 3600
+             */
+            stay: number | {
+                [key: string]: string | number | number[];
+            };
+            /**
+             * Within
+             * @default 300
+             */
+            within: number;
+        };
+        /**
+         * TurnInfo
+         * @description A turn across oncoming traffic, and how it is treated in the first plan.
+         *
+         *     ``both`` is protected in one stage and permissive in another. ``alone`` if no other movement
+         *     uses its lanes, so that it can have an arrow.
+         */
+        TurnInfo: {
+            /** Approach */
+            approach: string;
+            /**
+             * Turn
+             * @enum {string}
+             */
+            turn: "left" | "right";
+            /**
+             * Treatment
+             * @enum {string}
+             */
+            treatment: "permissive" | "protected" | "both";
+            /** Alone */
+            alone: boolean;
+        };
+        /**
          * Uniform
          * @description Any number from ``low`` to ``high``.
          */
@@ -6330,6 +7692,24 @@ export interface components {
             edits: {
                 [key: string]: null | boolean | number | string | unknown[] | Record<string, never>;
             }[];
+        };
+        /**
+         * VaryWish
+         * @description A parameter that takes values from ``low`` to ``high``, or those of a set.
+         *
+         *     ``steps`` is how many of the range a grid has, both ends included.
+         */
+        VaryWish: {
+            /** Parameter */
+            parameter: string;
+            /** Low */
+            low?: number | null;
+            /** High */
+            high?: number | null;
+            /** Steps */
+            steps?: number | null;
+            /** Values */
+            values?: number[] | null;
         };
         /**
          * VehicleInput
@@ -6522,8 +7902,23 @@ export interface components {
             };
         };
         /**
+         * WebsterWish
+         * @description Lights to be timed after the demand: all, or these junctions.
+         */
+        WebsterWish: {
+            /** Version */
+            version: number;
+            /**
+             * Junctions
+             * @default []
+             */
+            junctions?: string[];
+        };
+        /**
          * WholeDay
          * @description Give a scenario a day of traffic on its whole map.
+         *
+         *     With a ``trial``, its busiest hour is run, and there are as many trips as it carries.
          */
         WholeDay: {
             /** Version */
@@ -6539,6 +7934,11 @@ export interface components {
              * @default 51000
              */
             trips?: number;
+            /**
+             * Trial
+             * @default true
+             */
+            trial?: boolean;
         };
         /**
          * Zone
@@ -6724,6 +8124,8 @@ export interface components {
             ignore?: components["schemas"]["Ignoring-File"] | null;
             /** @default null */
             release?: components["schemas"]["Releasing-File"] | null;
+            /** @default null */
+            own?: components["schemas"]["OwnAction-File"] | null;
             /**
              * Together
              * @default null
@@ -6739,7 +8141,8 @@ export interface components {
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
          *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
          *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
-         *     ``None`` is from rest.
+         *     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
+         *     their order; an open goal is one that can be reached from the last of them.
          */
         "Actor-File": {
             /** Id */
@@ -6757,6 +8160,11 @@ export interface components {
              * @default null
              */
             goal?: string | null;
+            /**
+             * Via
+             * @default []
+             */
+            via?: string[];
             /**
              * Speed
              * @default null
@@ -7024,6 +8432,8 @@ export interface components {
             touched?: components["schemas"]["Touching-File"] | null;
             /** @default null */
             off_road?: components["schemas"]["OneActor-File"] | null;
+            /** @default null */
+            own?: components["schemas"]["OwnCondition-File"] | null;
             /**
              * All
              * @default null
@@ -7175,7 +8585,7 @@ export interface components {
          * Demand
          * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
          *
-         *     ``routes`` says how its trips choose their routes.
+         *     ``routes`` says how its trips choose their routes, ``parking`` which of them park.
          */
         "Demand-File": {
             /**
@@ -7219,12 +8629,22 @@ export interface components {
              *       "iterations": 20,
              *       "gap": 0.01,
              *       "interval": 900,
+             *       "spread": 0.03,
              *       "informed": 0,
              *       "period": 60,
              *       "shares": []
              *     }
              */
             routes?: components["schemas"]["RouteChoice-File"];
+            /**
+             * @default {
+             *       "begin": 0,
+             *       "end": 0,
+             *       "stay": 3600,
+             *       "within": 300
+             *     }
+             */
+            parking?: components["schemas"]["TripParking-File"];
         };
         /**
          * Detector
@@ -7378,7 +8798,8 @@ export interface components {
          *
          *     Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
          *     actor of the flow draws its own goal from the candidates. With a ``profile``, ``per_hour`` is
-         *     the mean of a day, and the profile says when there are more and when fewer.
+         *     the mean of a day, and the profile says when there are more and when fewer. ``initial_speed``
+         *     is that of its vehicles at departure, m/s; ``None`` is from rest.
          */
         "Flow-File": {
             /** Id */
@@ -7417,6 +8838,11 @@ export interface components {
              */
             speed?: number | null;
             /**
+             * Initial Speed
+             * @default null
+             */
+            initial_speed?: number | null;
+            /**
              * Profile
              * @default null
              */
@@ -7425,6 +8851,8 @@ export interface components {
         /**
          * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+         *
+         *     ``ahead``: drive in front of it at that gap, seconds at its speed.
          */
         "GapKeeping-File": {
             /** To */
@@ -7439,6 +8867,11 @@ export interface components {
              * @default null
              */
             seconds?: number | null;
+            /**
+             * Ahead
+             * @default false
+             */
+            ahead?: boolean;
             /**
              * Lasting
              * @default null
@@ -7720,6 +9153,31 @@ export interface components {
             of?: string | null;
         };
         /**
+         * OwnAction
+         * @description An action of an installed package.
+         */
+        "OwnAction-File": {
+            /** Kind */
+            kind: string;
+            /**
+             * To
+             * @default null
+             */
+            to?: string | null;
+            /**
+             * Place
+             * @default null
+             */
+            place?: string | [
+                number,
+                number
+            ] | null;
+            /** Values */
+            values?: {
+                [key: string]: number | string;
+            };
+        };
+        /**
          * OwnBounded
          * @description A value of one actor: ``of``, or the rule's own.
          */
@@ -7734,6 +9192,38 @@ export interface components {
              * @default null
              */
             above?: number | null;
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+        };
+        /**
+         * OwnCondition
+         * @description A condition of an installed package; ``of`` is whose value it is, the rule's actor's if not.
+         *
+         *     See :mod:`odscen.scenario.story.own_kinds`.
+         */
+        "OwnCondition-File": {
+            /** Kind */
+            kind: string;
+            /**
+             * To
+             * @default null
+             */
+            to?: string | null;
+            /**
+             * Place
+             * @default null
+             */
+            place?: string | [
+                number,
+                number
+            ] | null;
+            /** Values */
+            values?: {
+                [key: string]: number | string;
+            };
             /**
              * Of
              * @default null
@@ -8016,7 +9506,8 @@ export interface components {
          *     By ``length`` each takes the shortest. By ``travel_time`` the run is repeated, at most
          *     ``iterations`` times, and each time some trips change to the route that was quickest, until
          *     ``gap``, the share of travel time that could be saved, is small enough. Travel times are means
-         *     of ``interval`` seconds.
+         *     of ``interval`` seconds. With a ``spread`` drivers tell routes apart only roughly: of two routes
+         *     one of which takes longer by that share of the time, it is taken ``e`` times as rarely.
          *
          *     ``informed`` is the share of drivers who look for a quicker route on the way, every ``period``
          *     seconds, whichever route they began with. ``shares`` deal out trips to routes beforehand.
@@ -8043,6 +9534,11 @@ export interface components {
              * @default 900
              */
             interval?: number;
+            /**
+             * Spread
+             * @default 0.03
+             */
+            spread?: number;
             /**
              * Informed
              * @default 0
@@ -8535,6 +10031,40 @@ export interface components {
             end: string[];
         };
         /**
+         * TripParking
+         * @description Shares of the cars of matrices, inputs and background that park.
+         *
+         *     ``begin`` is the share that begin in a parking place (inputs begin at the boundary), ``end``
+         *     the share that end in one. ``stay`` is how long a place is taken, seconds: before a trip that
+         *     begins there, and after one that has ended there. Between zones, places are at most ``within``
+         *     metres from where the trip would begin or end; elsewhere anywhere in the region.
+         */
+        "TripParking-File": {
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default 0
+             */
+            end?: number;
+            /**
+             * Stay
+             * @default {
+             *       "kind": "constant",
+             *       "value": 3600
+             *     }
+             */
+            stay?: components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"];
+            /**
+             * Within
+             * @default 300
+             */
+            within?: number;
+        };
+        /**
          * Uniform
          * @description Any number from ``low`` to ``high``.
          */
@@ -8796,7 +10326,14 @@ export interface components {
              *         "interval": 900,
              *         "iterations": 20,
              *         "period": 60,
-             *         "shares": []
+             *         "shares": [],
+             *         "spread": 0.03
+             *       },
+             *       "parking": {
+             *         "begin": 0,
+             *         "end": 0,
+             *         "stay": 3600,
+             *         "within": 300
              *       }
              *     }
              */
@@ -8847,6 +10384,11 @@ export interface components {
              * @default []
              */
             rules?: components["schemas"]["StoryRule-File"][];
+            /**
+             * Criteria
+             * @default []
+             */
+            criteria?: string[];
             /** Parameters */
             parameters?: {
                 [key: string]: components["schemas"]["Parameter-File"];
@@ -11810,6 +13352,125 @@ export interface operations {
             };
         };
     };
+    plan_api_scenarios__name__plan_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PlannedColumns"];
+                };
+            };
+            /** @description What the client has is right. */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
     roi_api_scenarios__name__roi_get: {
         parameters: {
             query?: never;
@@ -13625,6 +15286,118 @@ export interface operations {
             };
         };
     };
+    egos_api_runs__run__egos_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RunEgos"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
     curves_api_runs__run__curves_get: {
         parameters: {
             query?: never;
@@ -13860,6 +15633,1138 @@ export interface operations {
             };
         };
     };
+    list_sweeps_api_sweeps_get: {
+        parameters: {
+            query?: {
+                scenario?: string | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SweepInfo"][];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    start_api_sweeps_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SweepWish"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SweepInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    plan_api_sweeps_plan_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SweepWish"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PlannedSweep"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    show_api_sweeps__sweep__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sweep: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SweepInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    remove_api_sweeps__sweep__delete: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sweep: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    stop_api_sweeps__sweep__stop_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sweep: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SweepInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    resume_api_sweeps__sweep__resume_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sweep: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ResumeSweep"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SweepInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    cases_api_sweeps__sweep__cases_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sweep: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SweepCases"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    open_case_api_sweeps__sweep__cases__case__scenario_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sweep: string;
+                case: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CaseName"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScenarioState"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    file_api_sweeps__sweep__files__name__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sweep: string;
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "*/*": string;
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
     of_scenario_api_scenarios__name__signals__junction__get: {
         parameters: {
             query?: never;
@@ -13879,6 +16784,700 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LightProgramInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    set_cycle_api_scenarios__name__signals__junction__cycle_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+                junction: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CycleWish"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScenarioState"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    take_over_api_scenarios__name__signals__junction__own_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+                junction: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["OfVersion"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScenarioState"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    webster_api_scenarios__name__signal_times_webster_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WebsterWish"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TimedSignalsState"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    corridor_api_scenarios__name__signal_times_corridor_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CorridorWish"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TimedSignalsState"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    import_programs_api_scenarios__name__signal_times_import_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": components["schemas"]["Body_import_programs_api_scenarios__name__signal_times_import_post"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TimedSignalsState"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    export_programs_api_scenarios__name__signals_add_xml_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/xml": string;
                 };
             };
             /** @description The request cannot be read. */
@@ -14448,6 +18047,116 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RunFit"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    actor_measures_api_figures_actors_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ActorMeasureInfo"][];
                 };
             };
             /** @description The request cannot be read. */
@@ -15672,6 +19381,574 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["TemplateInfo"][];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    import_openscenario_api_imports_openscenario_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": components["schemas"]["Body_import_openscenario_api_imports_openscenario_post"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobStarted"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    import_report_api_scenarios__name__import_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    import_plan_api_scenarios__name__import_plan_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    export_notes_api_scenarios__name__export_notes_get: {
+        parameters: {
+            query: {
+                to: string;
+                version?: string | null;
+            };
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExportInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    export_scenario_api_scenarios__name__export_get: {
+        parameters: {
+            query: {
+                to: string;
+                version?: string | null;
+            };
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/zip": string;
                 };
             };
             /** @description The request cannot be read. */

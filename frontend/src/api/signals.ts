@@ -1,4 +1,4 @@
-import { call } from "./client";
+import { address, call, form } from "./client";
 import type { components } from "./schema";
 
 type Schemas = components["schemas"];
@@ -6,9 +6,15 @@ type Schemas = components["schemas"];
 /** What a light is to show. */
 export type LightProgram = Schemas["LightProgramInfo"];
 export type DayPlan = Schemas["DayPlanInfo"];
+export type Stage = Schemas["StageInfo"];
 export type Detector = Schemas["DetectorInfo"];
+/** A turn across oncoming traffic. */
+export type CrossingTurn = Schemas["TurnInfo"];
 /** What a light showed in a run: from `times[i]` on `states[shown[i]]`. */
 export type ShownStates = Schemas["ShownStates"];
+/** A scenario whose lights have been timed, and what came of it. */
+export type TimedSignals = Schemas["TimedSignalsState"];
+export type CorridorWish = Omit<Schemas["CorridorWish"], "version">;
 
 export const signals = {
   ofScenario: (name: string, junction: string) =>
@@ -17,4 +23,32 @@ export const signals = {
     call("get", "/api/runs/{run}/signals/{junction}", { path: { run, junction } }),
   /** What all lights showed in a finished run. */
   shown: (run: string) => call("get", "/api/runs/{run}/signals", { path: { run } }),
+  /** Another cycle: greens in proportion to what they are. */
+  setCycle: (name: string, version: number, junction: string, cycle: number, plan: string | null) =>
+    call("post", "/api/scenarios/{name}/signals/{junction}/cycle", {
+      path: { name, junction },
+      body: { version, cycle, plan },
+    }),
+  /** Makes the map's program one of the scenario. */
+  takeOver: (name: string, version: number, junction: string) =>
+    call("post", "/api/scenarios/{name}/signals/{junction}/own", {
+      path: { name, junction },
+      body: { version },
+    }),
+  webster: (name: string, version: number, junctions: readonly string[]) =>
+    call("post", "/api/scenarios/{name}/signal-times/webster", {
+      path: { name },
+      body: { version, junctions: [...junctions] },
+    }),
+  corridor: (name: string, version: number, wish: CorridorWish) =>
+    call("post", "/api/scenarios/{name}/signal-times/corridor", {
+      path: { name },
+      body: { version, ...wish },
+    }),
+  import: (name: string, version: number, file: File, junction: string | null) =>
+    call("post", "/api/scenarios/{name}/signal-times/import", {
+      path: { name },
+      body: form({ version: String(version), file, junction }),
+    }),
+  exportUrl: (name: string) => address("/api/scenarios/{name}/signals.add.xml", { path: { name } }),
 };

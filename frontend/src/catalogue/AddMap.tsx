@@ -4,6 +4,7 @@ import { type DragEvent, useRef, useState } from "react";
 import { api } from "../api/client";
 import { addShipped, followJob } from "../api/maps";
 import type { Converter, Job } from "../api/types";
+import { isXosc } from "../exchange/useImport";
 import { tell } from "../ui/notices";
 import { reasonOf } from "../ui/reason";
 import { stepWords } from "./steps";
@@ -24,13 +25,16 @@ interface Refusal {
   reason: string;
 }
 
+/** Scrolls to what has just been shown. */
+const intoSight = (shown: HTMLElement | null): void => shown?.scrollIntoView({ block: "nearest" });
+
 /** Takes map files, one after another, by drop or by choice, and shows the progress of their import. */
 export function AddMap({
   empty,
   onAdded,
   onReport,
 }: {
-  /** Whether there is no map yet; the example maps are offered then. */
+  /** Whether there is no map yet. */
   empty: boolean;
   onAdded: () => void;
   onReport: (map: string) => void;
@@ -113,6 +117,9 @@ export function AddMap({
   const onDrop = (event: DragEvent): void => {
     event.preventDefault();
     setOver(false);
+    // A scenario, perhaps with its map: the catalogue around this takes it.
+    if ([...event.dataTransfer.files].some(isXosc)) return;
+    event.stopPropagation();
     void add([...event.dataTransfer.files]);
   };
 
@@ -174,7 +181,9 @@ export function AddMap({
                 }
                 data={["odscen", "netconvert"]}
               />
-              {empty && <Button onClick={() => void addThose()}>Add the example maps</Button>}
+              <Button variant={empty ? "filled" : "default"} onClick={() => void addThose()}>
+                Add the example maps
+              </Button>
               <FileButton multiple accept=".xodr,.xml" onChange={(files) => void add(files)}>
                 {(props) => (
                   <Button variant="default" {...props}>
@@ -196,6 +205,7 @@ export function AddMap({
       {refusals.map(({ file, reason }, n) => (
         <Alert
           key={n}
+          ref={intoSight}
           color="red"
           mt="sm"
           title={`${file} could not be added`}
@@ -204,7 +214,14 @@ export function AddMap({
           onClose={() => setRefusals((old) => old.filter((_, k) => k !== n))}
           style={{ overflowWrap: "anywhere" }}
         >
-          {reason}
+          <span>
+            Nothing was changed. If it is an OpenDRIVE map (.xodr), it is damaged or says something that
+            odscen does not know: export it again, or pass the message below to who made it.
+          </span>
+          <details className="words">
+            <summary>What is wrong with it</summary>
+            <pre tabIndex={0}>{reason}</pre>
+          </details>
         </Alert>
       ))}
     </section>

@@ -1,12 +1,13 @@
 import { Alert, Button, Chip, Group, Loader, Select, Text, TextInput, Title } from "@mantine/core";
-import { useState } from "react";
+import { type DragEvent, useState } from "react";
 
 import { api } from "../api/client";
 import { removal } from "../api/removal";
 import type { MapInfo } from "../api/types";
+import { isXosc, useImport } from "../exchange/useImport";
 import { forgetMaps } from "../map/loaded";
 import { IconSearch, IconTrash } from "../ui/icons";
-import { tellError } from "../ui/notices";
+import { tell, tellError } from "../ui/notices";
 import { RemovalDialog, type ToRemove } from "../ui/RemovalDialog";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
@@ -32,6 +33,8 @@ export function CatalogueView() {
   const [basket, setBasket] = useState(false);
   const [reported, setReported] = useState<string | null>(null);
   const [starting, setStarting] = useState<string | null>(null);
+  const [over, setOver] = useState(false);
+  const importing = useImport();
 
   const start = (map: MapInfo): void => {
     setStarting(map.name);
@@ -49,11 +52,29 @@ export function CatalogueView() {
     broken.reload();
     scenarios.reload();
   };
+  const dropped = (event: DragEvent): void => {
+    event.preventDefault();
+    setOver(false);
+    const files = [...event.dataTransfer.files];
+    if (files.some(isXosc)) importing.begin(files);
+    else if (files.length > 0) tell("Maps (.xodr) go onto “Add a map of your own”, below the maps.");
+  };
   const all = maps.value ?? [];
   const found = arranged(all, search, order, wishes);
 
   return (
-    <div className="catalogue">
+    <div
+      className="catalogue"
+      data-over={over}
+      onDragOver={(event) => {
+        event.preventDefault();
+        setOver(true);
+      }}
+      onDragLeave={(event) => {
+        if (!event.currentTarget.contains(event.relatedTarget as Node | null)) setOver(false);
+      }}
+      onDrop={dropped}
+    >
       <Title order={1} size="h2">
         Choose a map
       </Title>
@@ -145,7 +166,11 @@ export function CatalogueView() {
         </div>
       )}
       <Templates maps={all} />
-      <Scenarios list={scenarios.value ?? []} onRemove={(name) => setRemoving({ kind: "scenario", name })} />
+      <Scenarios
+        list={scenarios.value ?? []}
+        importing={importing}
+        onRemove={(name) => setRemoving({ kind: "scenario", name })}
+      />
       <Button
         mt="xl"
         variant="subtle"

@@ -14,13 +14,23 @@ import { useState } from "react";
 
 import { api } from "../api/client";
 import type { ScenarioEntry } from "../api/types";
+import { ImportWork, XOSC_FILES } from "../exchange/ImportWork";
+import type { Import } from "../exchange/useImport";
 import { IconTrash } from "../ui/icons";
 import { tellError } from "../ui/notices";
 import { go, hashOf } from "../ui/address";
 import { when } from "../run/figures";
 
 /** The scenarios there are; one can be opened from a file. */
-export function Scenarios({ list, onRemove }: { list: ScenarioEntry[]; onRemove: (name: string) => void }) {
+export function Scenarios({
+  list,
+  importing,
+  onRemove,
+}: {
+  list: ScenarioEntry[];
+  importing: Import;
+  onRemove: (name: string) => void;
+}) {
   const [busy, setBusy] = useState(false);
   const bring = (file: File | null): void => {
     if (!file) return;
@@ -39,14 +49,24 @@ export function Scenarios({ list, onRemove }: { list: ScenarioEntry[]; onRemove:
         <Title order={2} size="h3" id="scenarios">
           Your scenarios
         </Title>
-        <FileButton accept=".json,.graphml" onChange={bring}>
-          {(props) => (
-            <Button variant="default" size="sm" loading={busy} {...props}>
-              Open a scenario file
-            </Button>
-          )}
-        </FileButton>
+        <Group gap="sm">
+          <FileButton multiple accept={XOSC_FILES} onChange={importing.begin}>
+            {(props) => (
+              <Button variant="default" size="sm" disabled={importing.state?.refusal === null} {...props}>
+                Import OpenSCENARIO
+              </Button>
+            )}
+          </FileButton>
+          <FileButton accept=".json,.graphml" onChange={bring}>
+            {(props) => (
+              <Button variant="default" size="sm" loading={busy} {...props}>
+                Open a scenario file
+              </Button>
+            )}
+          </FileButton>
+        </Group>
       </Group>
+      <ImportWork work={importing} />
       {list.length === 0 ? (
         <Text c="dimmed">None yet. Choose a map above, or open a scenario file.</Text>
       ) : (

@@ -92,10 +92,10 @@ export function ActorForm({
           }
         />
       )}
-      {/* No run acts on it yet: shown only where a document has it. */}
-      {walks && actor.crosses_anywhere && (
+      {walks && (
         <Checkbox
           label="Crosses the road anywhere"
+          description="Where it is shortest, not at crosswalks only"
           checked={actor.crosses_anywhere}
           onChange={(event) => change({ crosses_anywhere: event.currentTarget.checked })}
         />

@@ -12,6 +12,7 @@ import { FlowForm } from "./FlowForm";
 import { copyTool } from "./handlers/copy";
 import { flowTool } from "./handlers/flow";
 import type { Tool } from "./handlers/handler";
+import { goalTool } from "./handlers/goal";
 import { moveTool } from "./handlers/move";
 import { placeTool } from "./handlers/place";
 import { isFlow, type Starts } from "./placing";
@@ -112,9 +113,13 @@ export function ActorStep(props: Props) {
               graph={graph}
               starts={starts}
               goals={goals}
-              onShowGoals={props.onShowGoals}
+              onPickGoal={() => {
+                props.onShowGoals();
+                onTool(goalTool(one.id));
+              }}
               onStart={(spawn) => props.onStart(one, spawn)}
               onGoal={(goal) => props.onGoal(one, goal)}
+              onVia={(via) => onEdit({ kind: "change_actor", actor: one.id, via })}
             />
           )}
           {one &&
@@ -187,7 +192,7 @@ function ToolHint({ tool, onPlaceSomewhere }: { tool: Tool | null; onPlaceSomewh
       </Text>
       {tool && (
         <Button size="compact-sm" variant="default" onClick={onPlaceSomewhere}>
-          Use the next free point
+          {tool.elsewhere}
         </Button>
       )}
     </>

@@ -1,15 +1,19 @@
-import { useCallback, useState } from "react";
+import { useCallback, useMemo, useRef, useState } from "react";
 
 import { type Assets, CATEGORIES, type MapDetails } from "../api/types";
 import { signals } from "../api/signals";
 import type { PackedDrawing } from "../map/drawing";
+import type { Place } from "../map/graph";
 import type { LoadedGraph } from "../map/loaded";
+import { signalEditing } from "../signals/editing";
 import { SignalPanel } from "../signals/SignalPanel";
 import { EditorSteps } from "./EditorSteps";
 import { copyTool } from "./handlers/copy";
 import { flowTool } from "./handlers/flow";
+import { goalTool } from "./handlers/goal";
 import { moveTool } from "./handlers/move";
 import { placeTool } from "./handlers/place";
+import { FindDialog } from "./FindDialog";
 import { HeadTools } from "./HeadTools";
 import { HelpSheet } from "./HelpSheet";
 import { useKeys } from "./keys";
@@ -19,6 +23,7 @@ import { RefusalAlert } from "./RefusalAlert";
 import { Stage } from "./Stage";
 import type { EditorStore } from "./store";
 import { firstVisit, Tour, tourSeen } from "./Tour";
+import { useFinishedOnLeaving } from "../ui/leaving";
 import { useEditing } from "./useEditing";
 
 /** The editor of one scenario: its steps, its map and its table, and the keys that hold in all of them. */
@@ -36,24 +41,37 @@ export function Editor({
   map: MapDetails | null;
 }) {
   const now = useEditing(store, loaded, assets, map);
-  const { undo, redo } = store();
+  const { undo, redo, saving } = store();
   const { scenario } = now;
   // Anew with each version of the scenario: any edit may have changed the program.
   const loadProgram = useCallback(
     (junction: string) => signals.ofScenario(scenario.name, junction),
     [scenario],
   );
+  const { light } = now;
+  const lightEditing = useMemo(() => {
+    if (!light) return null;
+    const names = map?.lights.find((one) => one.names.includes(light))?.names ?? [light];
+    return signalEditing(store, scenario, light, names);
+  }, [store, scenario, light, map]);
+  useFinishedOnLeaving();
   const [help, setHelp] = useState(false);
+  const [finding, setFinding] = useState(false);
   const [tour, setTour] = useState(firstVisit);
   const closeTour = (): void => {
     tourSeen();
     setTour(false);
   };
   const { ones, selection, select, arm, tool } = now;
+  const copied = useRef<readonly string[]>([]);
+  const moveTo = (place: Place | null): void => {
+    if (now.one && place) now.changes.setStart(now.one, place.id);
+  };
   useKeys({
     undo: () => void undo(),
     redo: () => void redo(),
     sheet: () => setHelp(true),
+    find: () => setFinding(true),
     remove: () => now.changes.remove(selection),
     escape: () => {
       if (now.pick.now) now.pick.stop();
@@ -63,7 +81,24 @@ export function Editor({
     },
     copy: () => {
       const ids = ones.filter((one) => !isFlow(one) && selection.includes(one.id)).map(({ id }) => id);
+      if (ids.length === 0) return;
+      copied.current = ids;
+      arm(copyTool(ids));
+    },
+    paste: () => {
+      const ids = copied.current.filter((id) => ones.some((one) => one.id === id));
       if (ids.length > 0) arm(copyTool(ids));
+    },
+    goal: () => {
+      if (now.one) arm(goalTool(now.one.id));
+    },
+    along: (by) => {
+      const start = now.one && now.graph.place(now.one.spawn);
+      moveTo(start ? now.starts.along(start, by) : null);
+    },
+    lane: () => {
+      const start = now.one && now.graph.place(now.one.spawn);
+      moveTo(start ? now.starts.otherLane(start) : null);
     },
     move: () => {
       if (selection.length > 0) arm(moveTool(selection));
@@ -79,24 +114,39 @@ export function Editor({
   });
   return (
     <div className="editor">
-      <HeadTools store={store} onHelp={() => setHelp(true)} onTour={() => setTour(true)} />
+      <HeadTools
+        store={store}
+        onFind={() => setFinding(true)}
+        onHelp={() => setHelp(true)}
+        onTour={() => setTour(true)}
+      />
       <div className="side">
         <EditorSteps store={store} now={now} drawing={drawing} assets={assets} />
-        <Problems problems={now.problems} onShow={now.showProblem} />
+        <Problems problems={now.problems} graph={now.graph} onShow={now.showProblem} />
       </div>
-      <Stage now={now} drawing={drawing}>
+      <Stage now={now} saving={saving === "saving"} drawing={drawing}>
         {now.light && now.lights && (
           <SignalPanel
             junctions={now.lights.junctions}
             junction={now.light}
             onJunction={now.showLight}
             load={loadProgram}
+            editing={lightEditing}
+            onShown={now.setProgram}
             onClose={now.closeLight}
           />
         )}
-        {tour && <Tour onClose={closeTour} />}
+        {tour && <Tour step={now.step} onClose={closeTour} />}
       </Stage>
       <RefusalAlert store={store} />
+      {finding && (
+        <FindDialog
+          graph={now.graph}
+          ones={ones}
+          onGo={({ is, id }) => now.show(is, id)}
+          onClose={() => setFinding(false)}
+        />
+      )}
       <HelpSheet open={help} onClose={() => setHelp(false)} />
     </div>
   );

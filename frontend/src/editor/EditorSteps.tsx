@@ -6,6 +6,8 @@ import type { PackedDrawing } from "../map/drawing";
 import { count } from "../ui/words";
 import { ActorStep } from "./ActorStep";
 import { useStarter } from "./asked";
+import { criteriaNote } from "./criteria";
+import { CriteriaStep } from "./CriteriaStep";
 import { profilesOf } from "./DayProfiles";
 import { bringsTraffic, trafficNote } from "./demand";
 import { EnvironmentStep } from "./EnvironmentStep";
@@ -13,10 +15,15 @@ import { measureNote } from "./measures";
 import { MeasuresStep } from "./MeasuresStep";
 import { MapStep, RegionStep } from "./MapSteps";
 import { actorNote, weatherNote } from "./notes";
-import { ruleNote, RulesStep } from "./RulesStep";
+import { parameterNote } from "./parameters";
+import { ParametersStep } from "./ParametersStep";
+import { ruleNote, RulesStep } from "./rules/RulesStep";
+import { rowsWithin } from "./regions";
 import { RunStep } from "./RunStep";
 import { Steps } from "./Steps";
 import type { EditorStore } from "./store";
+import { studyNote, WHOLE_RUN } from "./study";
+import { StudyStep } from "./StudyStep";
 import { TrafficStep } from "./TrafficStep";
 import { transitNote } from "./transit";
 import { TransitStep } from "./TransitStep";
@@ -47,7 +54,7 @@ export function EditorSteps({
     sights,
     openStep,
   } = now;
-  const { roi, demand, environment, map, measures, transit } = document;
+  const { roi, demand, environment, map, measures, study, transit } = document;
   const run = useStarter(name);
   const [filling, setFilling] = useState(false);
   const profiles = useMemo(() => profilesOf(demand, assets?.day_profiles ?? {}), [demand, assets]);
@@ -93,6 +100,11 @@ export function EditorSteps({
               onNext={() => openStep("environment")}
               onAll={addNeighbours}
               onShow={() => sights.segments(roi)}
+              onWhole={() => changes.extendRegion(graph.columns.segments.map((_, row) => row))}
+              onSeen={() => {
+                const seen = sights.seen();
+                if (seen) changes.extendRegion(rowsWithin(graph, seen));
+              }}
               onBegin={sights.pickMiddle}
             />
           ),
@@ -203,7 +215,53 @@ export function EditorSteps({
           title: "Rules",
           done: document.rules.length > 0,
           note: ruleNote(document.rules),
-          body: <RulesStep document={document} pick={now.pick} onEdit={changes.change} />,
+          body: (
+            <RulesStep
+              document={document}
+              pick={now.pick}
+              onDraft={now.setDrafted}
+              onEdit={changes.change}
+              onShow={(rule) => sights.rule(rule, document.actors)}
+            />
+          ),
+        },
+        parameters: {
+          title: "Parameters",
+          done: Object.keys(document.parameters).length > 0,
+          note: parameterNote(document.parameters),
+          body: (
+            <ParametersStep
+              name={name}
+              document={document}
+              onEdit={changes.change}
+              onShow={({ root, id }) => {
+                const user = ones.find((each) => each.id === id);
+                const rule = document.rules.find((each) => each.id === id);
+                if (root === "rules" && rule) sights.rule(rule, document.actors);
+                else if (user) sights.start(user);
+              }}
+            />
+          ),
+        },
+        study: {
+          title: "Study",
+          done: studyNote(study) !== WHOLE_RUN,
+          note: studyNote(study),
+          body: (
+            <StudyStep
+              study={study}
+              graph={graph}
+              pick={now.pick}
+              onEdit={changes.change}
+              onShow={sights.nodes}
+            />
+          ),
+        },
+        criteria: {
+          title: "Criteria",
+          done: document.criteria.length > 0,
+          note: criteriaNote(document.criteria),
+          body: <CriteriaStep document={document} onEdit={changes.change} />,
         },
         run: {
           title: "Run",

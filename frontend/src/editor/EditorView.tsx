@@ -7,6 +7,7 @@ import type { PackedDrawing } from "../map/drawing";
 import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
 import { go } from "../ui/address";
 import { reasonOf } from "../ui/reason";
+import { useLearnedTitle, useTitle } from "../ui/titles";
 import { useLoaded } from "../ui/useLoaded";
 import { Editor } from "./Editor";
 import { createEditorStore } from "./store";
@@ -15,11 +16,16 @@ import { createEditorStore } from "./store";
 export function EditorView({ scenario: name }: { scenario: string }) {
   const [store] = useState(() => createEditorStore(name));
   const map = store((state) => state.scenario?.document.map.name);
+  useLearnedTitle(
+    name,
+    store((state) => state.scenario?.document.name),
+  );
   const [details, setDetails] = useState<MapDetails | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   const [drawing, setDrawing] = useState<PackedDrawing | null>(null);
   const [loaded, setLoaded] = useState<LoadedGraph | null>(null);
   const assets = useLoaded(api.assets);
+  const title = useTitle(name);
 
   useEffect(() => {
     store
@@ -39,7 +45,7 @@ export function EditorView({ scenario: name }: { scenario: string }) {
     return (
       <div className="catalogue">
         <Title order={1} size="h3" mb="md">
-          “{name}” cannot be opened
+          “{title}” cannot be opened
         </Title>
         <Alert color="red">{failure}</Alert>
         <Button mt="md" onClick={() => go({ view: "catalogue" })}>
@@ -52,7 +58,7 @@ export function EditorView({ scenario: name }: { scenario: string }) {
     return (
       <div className="empty">
         <Loader aria-label="Opening the scenario" />
-        <Text mt="sm">Opening {name} …</Text>
+        <Text mt="sm">Opening {title} …</Text>
       </div>
     );
   }

@@ -3,9 +3,12 @@ import { useEffect, useRef, useState } from "react";
 import { createPortal } from "react-dom";
 
 import { api } from "../api/client";
-import { IconDown, IconHelp, IconMenu, IconRedo, IconTour, IconUndo } from "../ui/icons";
+import { exchange } from "../api/exchange";
+import { isXosc } from "../exchange/useImport";
+import { IconHelp, IconMenu, IconRedo, IconSearch, IconTour, IconUndo } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
 import { go } from "../ui/address";
+import { ExportMenu } from "./ExportMenu";
 import { NameDialog, OpenDialog } from "./fileDialogs";
 import type { EditorStore } from "./store";
 
@@ -17,16 +20,19 @@ type Dialog = "rename" | "copy" | "open" | null;
 /** Undo, redo, autosave and files, in the head of the page. */
 export function HeadTools({
   store,
+  onFind,
   onHelp,
   onTour,
 }: {
   store: EditorStore;
+  onFind: () => void;
   onHelp: () => void;
   onTour: () => void;
 }) {
   const { scenario, saving, undo, redo, name, edit } = store();
   const [slot, setSlot] = useState<HTMLElement | null>(null);
   const [dialog, setDialog] = useState<Dialog>(null);
+  const [imported, setImported] = useState(false);
   const file = useRef<HTMLInputElement>(null);
   useEffect(() => setSlot(document.getElementById("head-slot")), []);
   if (!slot || !scenario) return null;
@@ -36,8 +42,22 @@ export function HeadTools({
     { word: "Redo", keys: "Ctrl+Y", label: scenario.redo, act: redo, icon: <IconRedo /> },
   ];
   const upload = (chosen: File | undefined): void => {
-    if (chosen)
+    if (!chosen) return;
+    if (!isXosc(chosen)) {
       api.uploadScenario(chosen).then((made) => go({ view: "editor", scenario: made.name }), tellError);
+      return;
+    }
+    tell(`Importing ${chosen.name} …`);
+    exchange
+      .bring([chosen], () => undefined)
+      .then((made) => made !== null && go({ view: "imported", scenario: made }), tellError);
+  };
+  /** Whether there is a report is asked for when it could be chosen. */
+  const askForReport = (): void => {
+    exchange.report(name).then(
+      () => setImported(true),
+      () => setImported(false),
+    );
   };
   return createPortal(
     <>
@@ -57,7 +77,22 @@ export function HeadTools({
           </ActionIcon>
         </Tooltip>
       ))}
-      <Menu position="bottom-end" withinPortal={false} withInitialFocusPlaceholder={false}>
+      <Tooltip label="Find a road, a junction or a road user (Ctrl+K)">
+        <ActionIcon
+          variant="default"
+          size="lg"
+          aria-label="Find a road, a junction or a road user"
+          onClick={onFind}
+        >
+          <IconSearch />
+        </ActionIcon>
+      </Tooltip>
+      <Menu
+        position="bottom-end"
+        withinPortal={false}
+        withInitialFocusPlaceholder={false}
+        onOpen={askForReport}
+      >
         <Menu.Target>
           <Button variant="default" leftSection={<IconMenu />}>
             Scenario
@@ -69,29 +104,18 @@ export function HeadTools({
           <Menu.Item onClick={() => setDialog("open")}>Open another …</Menu.Item>
           <Menu.Item onClick={() => file.current?.click()}>Upload a file …</Menu.Item>
           <Menu.Item onClick={() => go({ view: "runs", scenario: name })}>Earlier runs</Menu.Item>
-          <Menu.Divider />
-          <Menu.Item
-            leftSection={<IconDown size={15} />}
-            component="a"
-            href={api.downloadUrl(name, "json")}
-            download
-          >
-            Download as a document (JSON)
-          </Menu.Item>
-          <Menu.Item
-            leftSection={<IconDown size={15} />}
-            component="a"
-            href={api.downloadUrl(name, "graphml")}
-            download
-          >
-            Download as a graph (GraphML)
-          </Menu.Item>
+          {imported && (
+            <Menu.Item onClick={() => go({ view: "imported", scenario: name })}>
+              Report of the import
+            </Menu.Item>
+          )}
         </Menu.Dropdown>
       </Menu>
+      <ExportMenu name={name} />
       <input
         ref={file}
         type="file"
-        accept=".json,.graphml,.xml"
+        accept=".json,.graphml,.xml,.xosc"
         hidden
         aria-label="Scenario file to upload"
         onChange={(event) => {

@@ -2,6 +2,7 @@ import {
   ELIGIBLE,
   FLOW,
   GOAL,
+  MARK_COLOR,
   MEASURE,
   PEDESTRIAN_NODE,
   ROI_BASE,
@@ -11,19 +12,24 @@ import {
 } from "../map/colors";
 import type { Step } from "./scene";
 
-const ROWS: Partial<Record<Step, [color: string, word: string][]>> = {
+/** What is a point on the map has its shape here, too; everything else is a patch of its colour. */
+type Shape = "round" | "diamond";
+
+const ROWS: Partial<Record<Step, [color: string, word: string, shape?: Shape][]>> = {
   region: [
     [ROI_BASE, "First segment"],
     [ROI_MEMBER, "Region"],
     [ELIGIBLE, "Can be added"],
   ],
   transit: [[TRANSIT, "Stop, begin or end of a line"]],
+  study: [[TRANSIT, "D detector, S section, C cordon"]],
   measures: [[MEASURE, "Measure"]],
+  rules: [[MARK_COLOR.rule, "Where rules act"]],
   actors: [
-    [VEHICLE_NODE, "Vehicle start"],
-    [PEDESTRIAN_NODE, "Pedestrian start"],
-    ["#8b949d", "No start possible"],
-    [GOAL, "Possible goal"],
+    [VEHICLE_NODE, "Vehicle start", "round"],
+    [PEDESTRIAN_NODE, "Pedestrian start", "round"],
+    ["#8b949d", "No start possible", "round"],
+    [GOAL, "Suggested goal", "diamond"],
     [FLOW, "Vehicle flow"],
   ],
 };
@@ -33,9 +39,9 @@ export function Legend({ step }: { step: Step }) {
   if (!rows) return null;
   return (
     <div className="map-legend" aria-hidden="true">
-      {rows.map(([color, word]) => (
+      {rows.map(([color, word, shape]) => (
         <span key={word}>
-          <i style={{ background: color }} />
+          <i data-shape={shape} style={{ background: color }} />
           {word}
         </span>
       ))}

@@ -1,14 +1,13 @@
-import { ActionIcon, Button, Group, Select, Text, Tooltip } from "@mantine/core";
+import { Group, Select, Text } from "@mantine/core";
 
 import { type FieldsOf, CATEGORIES } from "../api/types";
 import { isKey, nth } from "../lists";
-import { IconTrash } from "../ui/icons";
 import { CATEGORY_WORD, clock, count } from "../ui/words";
 import { Committed } from "./Committed";
 import { PartCard, WindowFields } from "./DemandParts";
-import { useTaking } from "./pick";
+import { ListButtons, OpenAndShow, PickButton } from "./FormParts";
 import { placeWord } from "./placeWords";
-import { type CardProps, OpenAndShow } from "./StopForm";
+import type { CardProps } from "./StopForm";
 import { type Line, servedOf, type Stop, stopWord, timetableWord } from "./transit";
 
 /** A line: how often it runs, where it begins and ends, and its stops. */
@@ -117,11 +116,6 @@ interface EndProps extends Pick<CardProps, "graph" | "pick"> {
 }
 
 function End({ end, line, graph, pick, onChange }: EndProps) {
-  const key = `${end} of ${line.id}`;
-  const active = useTaking(pick, key, ({ name }) => {
-    onChange({ [end]: name });
-    pick.stop();
-  });
   const node = line[end];
   const word = end === "start" ? "Begins" : "Ends";
   return (
@@ -129,16 +123,16 @@ function End({ end, line, graph, pick, onChange }: EndProps) {
       <Text size="sm">
         {word}: {node === null ? "at an end of the region" : placeWord(graph, node)}
       </Text>
-      <Button
-        size="compact-sm"
+      <PickButton
+        pick={pick}
+        pickKey={`${end} of ${line.id}`}
+        by="node"
         style={{ flexShrink: 0 }}
-        variant={active ? "filled" : "default"}
-        aria-pressed={active}
-        aria-label={active ? "Stop choosing" : `Choose where it ${word.toLowerCase()}`}
-        onClick={() => (active ? pick.stop() : pick.start(key, "node"))}
+        name={`Choose where it ${word.toLowerCase()}`}
+        onTake={({ name }) => onChange({ [end]: name })}
       >
-        {active ? "Stop choosing" : "Choose"}
-      </Button>
+        Choose
+      </PickButton>
     </Group>
   );
 }
@@ -173,27 +167,14 @@ function Served({ line, stops, onChange }: { line: Line; stops: readonly Stop[];
                 onCommit={(value) => put(n, { after: value })}
               />
             </div>
-            <Tooltip label="Earlier in the order">
-              <ActionIcon
-                variant="default"
-                size="lg"
-                disabled={n === 0}
-                aria-label={`Serve ${stop} earlier`}
-                onClick={() => swap(n)}
-              >
-                <span aria-hidden="true">↑</span>
-              </ActionIcon>
-            </Tooltip>
-            <ActionIcon
-              variant="subtle"
-              color="gray"
-              size="lg"
-              disabled={line.stops.length === 1}
-              aria-label={`Leave out ${stop}`}
-              onClick={() => onServed(line.stops.filter((_, k) => k !== n))}
-            >
-              <IconTrash />
-            </ActionIcon>
+            <ListButtons
+              earlier={`Serve ${stop} earlier`}
+              removal={`Leave out ${stop}`}
+              first={n === 0}
+              only={line.stops.length === 1}
+              onEarlier={() => swap(n)}
+              onRemove={() => onServed(line.stops.filter((_, k) => k !== n))}
+            />
           </Group>
         );
       })}

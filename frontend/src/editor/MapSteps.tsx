@@ -30,6 +30,8 @@ export function RegionStep({
   region,
   onNext,
   onAll,
+  onWhole,
+  onSeen,
   onBegin,
   onShow,
 }: {
@@ -37,20 +39,35 @@ export function RegionStep({
   region: Region;
   onNext: () => void;
   onAll: () => void;
+  /** Adds every segment of the map. */
+  onWhole: () => void;
+  /** Adds what is in sight. */
+  onSeen: () => void;
   onBegin: () => void;
   onShow: () => void;
 }) {
+  const many = (
+    <>
+      <Button size="compact-sm" variant="default" onClick={onWhole}>
+        Take the whole map
+      </Button>
+      <Button size="compact-sm" variant="default" onClick={onSeen}>
+        Take all that I see
+      </Button>
+    </>
+  );
   if (segments === 0) {
     return (
       <>
         <Text size="sm">
           Click the road or junction where your scenario begins. It turns dark blue; then let the region grow
-          around it.
+          around it. Or drag a rectangle with Shift held down.
         </Text>
         <Group>
           <Button size="compact-sm" variant="default" onClick={onBegin}>
             Begin in the middle of what I see
           </Button>
+          {many}
         </Group>
       </>
     );
@@ -58,7 +75,8 @@ export function RegionStep({
   return (
     <>
       <Text size="sm">
-        Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again.
+        Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again. A
+        rectangle, dragged with Shift held down, adds all in it.
       </Text>
       <Group>
         {(!region.current || region.candidates.length > 0) && (
@@ -68,6 +86,7 @@ export function RegionStep({
               : "Add all neighbours"}
           </Button>
         )}
+        {many}
         <Button size="compact-sm" variant="subtle" onClick={onShow}>
           Show the region
         </Button>

@@ -1,12 +1,13 @@
-import { Button, Group, MultiSelect, SegmentedControl, TagsInput, TextInput } from "@mantine/core";
+import { Group, MultiSelect, SegmentedControl, TagsInput } from "@mantine/core";
 
 import { CATEGORIES, type Category, type Edit } from "../api/types";
 import { CATEGORY_WORD } from "../ui/words";
 import { Committed } from "./Committed";
 import { PartCard, WindowFields } from "./DemandParts";
+import { CommittedText, OpenAndShow, PickButton } from "./FormParts";
 import { inWords, KIND, type Measure, picksOf, withPlace } from "./measures";
 import { PICK_WORD } from "./MeasuresStep";
-import { type PlacePick, useTaking } from "./pick";
+import type { Picked, PlacePick } from "./pick";
 
 type Change = (measure: Measure, label?: string) => void;
 
@@ -32,16 +33,9 @@ export function MeasureCard({
   const { id } = measure;
   const { detail, when } = inWords(measure);
   const change: Change = (next, label) => onEdit({ kind: "set_measure", measure: next }, label);
-  const rename = (text: string): void => {
-    const next = text.trim();
-    if (!next || next === id || taken.includes(next)) return;
-    onEdit(
-      [
-        { kind: "remove_measure", measure: id },
-        { kind: "set_measure", measure: { ...measure, id: next } },
-      ],
-      `Rename ${id}`,
-    );
+  const rename = (next: string): void => {
+    if (!next || taken.includes(next)) return;
+    onEdit({ kind: "set_measure", measure: { ...measure, id: next }, instead_of: id }, `Rename ${id}`);
     onOpen(next);
   };
   return (
@@ -54,35 +48,18 @@ export function MeasureCard({
         onEdit({ kind: "remove_measure", measure: id });
       }}
     >
-      <Group gap={6}>
-        <Button
-          size="compact-sm"
-          variant="default"
-          aria-expanded={open}
-          aria-label={`${open ? "Close" : "Change"} ${id}`}
-          onClick={() => {
-            pick.stop();
-            onOpen(open ? null : id);
-          }}
-        >
-          {open ? "Close" : "Change"}
-        </Button>
-        <Button size="compact-sm" variant="default" aria-label={`Show where ${id} is`} onClick={onShow}>
-          Show where
-        </Button>
-      </Group>
+      <OpenAndShow
+        part={id}
+        open={open}
+        onShow={onShow}
+        onOpen={() => {
+          pick.stop();
+          onOpen(open ? null : id);
+        }}
+      />
       {open && (
         <>
-          <TextInput
-            label="Name"
-            key={id}
-            defaultValue={id}
-            maxLength={60}
-            onBlur={(event) => rename(event.currentTarget.value)}
-            onKeyDown={(event) => {
-              if (event.key === "Enter") rename(event.currentTarget.value);
-            }}
-          />
+          <CommittedText label="Name" value={id} maxLength={60} onCommit={rename} />
           <WindowFields
             begin={measure.begin}
             end={measure.end}
@@ -99,10 +76,10 @@ export function MeasureCard({
 /** Places by name, and more of them from the map; a click on one that is there takes it out. */
 function PlaceFields({ measure, pick, onChange }: { measure: Measure; pick: PlacePick; onChange: Change }) {
   const key = `measure ${measure.id}`;
-  const active = useTaking(pick, key, (picked) => {
+  const take = (picked: Picked): void => {
     const next = withPlace(measure, picked);
     if (next) onChange(next);
-  });
+  };
   const kinds = picksOf(measure.kind);
   return (
     <>
@@ -119,20 +96,11 @@ function PlaceFields({ measure, pick, onChange }: { measure: Measure; pick: Plac
         />
       )}
       <Group gap={6} role="group" aria-label={`Choose places of ${measure.id} on the map`}>
-        {kinds.map((kind) => {
-          const on = active && pick.now?.by === kind;
-          return (
-            <Button
-              key={kind}
-              size="compact-sm"
-              variant={on ? "filled" : "default"}
-              aria-pressed={on}
-              onClick={() => (on ? pick.stop() : pick.start(key, kind))}
-            >
-              {on ? "Stop choosing" : `${PICK_WORD[kind]} on the map`}
-            </Button>
-          );
-        })}
+        {kinds.map((kind) => (
+          <PickButton key={kind} pick={pick} pickKey={key} by={kind} many onTake={take}>
+            {`${PICK_WORD[kind]} on the map`}
+          </PickButton>
+        ))}
       </Group>
     </>
   );

@@ -5,7 +5,7 @@ import type { Edit } from "../api/types";
 import { isKey } from "../lists";
 import { MeasureCard } from "./MeasureForm";
 import { KIND, type Measure, newMeasure, picksOf } from "./measures";
-import { type PlacePick, type PickBy, type Picked, useTaking } from "./pick";
+import { namedPlace, type PlacePick, type PickBy, type Picked, useTaking } from "./pick";
 
 const NEW = "new measure";
 
@@ -16,6 +16,9 @@ export const PICK_WORD: Record<PickBy, string> = {
   point: "Point of a lane",
   light: "Traffic light",
   node: "Point of a lane",
+  goal: "Goal",
+  place: "Place",
+  ground: "Point",
 };
 
 /** Closures, roadworks and the like: a list with a form for each, and the places on the map. */
@@ -89,7 +92,7 @@ function NewMeasure({
     if (active) pick.start(NEW, choice);
   };
   const type = (): void => {
-    if (typed.trim()) add({ name: typed.trim(), s: 0 });
+    if (typed.trim()) add(namedPlace(typed.trim()));
   };
   return (
     <section className="fold" aria-label="New measure">
@@ -129,7 +132,7 @@ function NewMeasure({
             value={null}
             searchable
             onChange={(name) => {
-              if (name) add({ name, s: 0 });
+              if (name) add(namedPlace(name));
             }}
           />
         ) : (

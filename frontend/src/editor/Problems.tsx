@@ -1,52 +1,88 @@
 import { Text } from "@mantine/core";
+import { useState } from "react";
 
 import type { Problem } from "../api/types";
+import type { Graph } from "../map/graph";
 import { IconWarn } from "../ui/icons";
 import { count } from "../ui/words";
+import { grouped, inWords, type ProblemGroup } from "./problemGroups";
 
 /** Length of the list; solving some shows the rest. */
 const SHOWN = 50;
 
-/** What the server finds wrong, each leading to its place. */
+/** What the server finds wrong, each leading to its place; what is wrong of many is said once. */
 export function Problems({
   problems,
+  graph,
   onShow,
 }: {
   problems: readonly Problem[];
+  graph: Graph;
   onShow: (problem: Problem) => void;
 }) {
   if (problems.length === 0) return null;
-  const sorted = [...problems].sort(
-    (a, b) => Number(b.severity === "error") - Number(a.severity === "error"),
-  );
   return (
     <section className="problems" aria-label="Problems">
       <Text size="sm" fw={700} px={8} pb={2} role="status">
         {count(problems.length, "problem")} found
       </Text>
-      {sorted.slice(0, SHOWN).map((problem) => (
-        <button
-          type="button"
-          className="problem"
-          key={`${problem.where} ${problem.code} ${problem.message}`}
-          onClick={() => onShow(problem)}
-        >
-          <span
-            className="problem-sign"
-            data-severity={problem.severity}
-            role="img"
-            aria-label={problem.severity === "error" ? "Must be solved" : "Warning"}
-          >
-            <IconWarn />
-          </span>
-          <span className="problem-text">{problem.message}</span>
-        </button>
+      {grouped(problems, graph).map((group) => (
+        <Group key={group.key} group={group} graph={graph} onShow={onShow} />
       ))}
-      {sorted.length > SHOWN && (
-        <Text size="sm" px={8}>
-          and {sorted.length - SHOWN} more
-        </Text>
-      )}
     </section>
   );
 }
+
+function Group({
+  group: { title, problems },
+  graph,
+  onShow,
+}: {
+  group: ProblemGroup;
+  graph: Graph;
+  onShow: (problem: Problem) => void;
+}) {
+  const [open, setOpen] = useState(false);
+  const rows = problems.slice(0, SHOWN).map((problem, n) => (
+    <button
+      type="button"
+      className="problem"
+      key={`${n} ${problem.where} ${problem.code}`}
+      onClick={() => onShow(problem)}
+    >
+      <Sign problem={problem} />
+      <span className="problem-text">{inWords(problem, graph)}</span>
+    </button>
+  ));
+  const [first] = problems;
+  if (title === null || !first) return rows;
+  return (
+    <>
+      <button type="button" className="problem" aria-expanded={open} onClick={() => setOpen(!open)}>
+        <Sign problem={first} />
+        <span className="problem-text">{title}</span>
+      </button>
+      {open && (
+        <div className="problem-many">
+          {rows}
+          {problems.length > SHOWN && (
+            <Text size="sm" px={8}>
+              and {problems.length - SHOWN} more
+            </Text>
+          )}
+        </div>
+      )}
+    </>
+  );
+}
+
+const Sign = ({ problem: { severity } }: { problem: Problem }) => (
+  <span
+    className="problem-sign"
+    data-severity={severity}
+    role="img"
+    aria-label={severity === "error" ? "Must be solved" : "Warning"}
+  >
+    <IconWarn />
+  </span>
+);

@@ -1,5 +1,5 @@
 import { ActionIcon, Button, TextInput, Tooltip } from "@mantine/core";
-import { type KeyboardEvent, memo, useEffect, useMemo, useRef, useState } from "react";
+import { type KeyboardEvent, memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 
 import { type Actor, CATEGORIES, type Flow } from "../api/types";
 import type { Graph } from "../map/graph";
@@ -19,6 +19,10 @@ export function RoadUserTable({
   ones,
   graph,
   selection,
+  place,
+  head,
+  open,
+  onOpen,
   onSelect,
   onSelectAll,
   onRemove,
@@ -26,12 +30,21 @@ export function RoadUserTable({
   ones: readonly (Actor | Flow)[];
   graph: Graph;
   selection: readonly string[];
+  /** Where in the page one is; the search ends when that changes. */
+  place: string;
+  /** The first thing in its bar. */
+  head: ReactNode;
+  open: boolean;
+  onOpen: (open: boolean) => void;
   onSelect: (id: string, more: boolean) => void;
   onSelectAll: (ids: string[]) => void;
   onRemove: (ids: readonly string[]) => void;
 }) {
   const [filter, setFilter] = useState("");
   const [scroll, setScroll] = useState({ top: 0, height: 300 });
+  const searching = ones.length > MANY;
+  // Rows that a search hides which is not seen any more would seem lost.
+  useEffect(() => setFilter(""), [place, searching]);
   const box = useRef<HTMLDivElement>(null);
   const chosen = useMemo(() => new Set(selection), [selection]);
   const rows = useMemo(() => {
@@ -79,16 +92,22 @@ export function RoadUserTable({
     next?.focus();
   };
   return (
-    <>
+    <div className="table-dock" data-open={open}>
       <div className="table-bar">
+        {head}
         <span role="status">
           {count(ones.length, "entry", "entries")}
           {selection.length > 0 && `, ${selection.length} selected`}
         </span>
-        <Button size="compact-xs" variant="default" onClick={() => onSelectAll(rows.map((row) => row.id))}>
+        <Button
+          size="compact-xs"
+          variant="default"
+          disabled={rows.length === 0}
+          onClick={() => onSelectAll(rows.map((row) => row.id))}
+        >
           Select all
         </Button>
-        {ones.length > MANY && (
+        {searching && open && (
           <TextInput
             size="xs"
             placeholder="Search"
@@ -97,9 +116,19 @@ export function RoadUserTable({
             onChange={(event) => setFilter(event.currentTarget.value)}
           />
         )}
+        <Button
+          size="compact-xs"
+          variant="subtle"
+          ml="auto"
+          aria-expanded={open}
+          onClick={() => onOpen(!open)}
+        >
+          {open ? "Hide the table" : "Show the table"}
+        </Button>
       </div>
       <div
         className="table"
+        hidden={!open}
         role="region"
         aria-label="Table of road users"
         tabIndex={0}
@@ -135,9 +164,13 @@ export function RoadUserTable({
             {end < rows.length && <tr aria-hidden="true" style={{ height: (rows.length - end) * ROW }} />}
           </tbody>
         </table>
-        {rows.length === 0 && <p className="table-empty">No road user matches “{filter}”.</p>}
+        {rows.length === 0 && (
+          <p className="table-empty">
+            {ones.length === 0 ? "No road users yet." : `No road user matches “${filter}”.`}
+          </p>
+        )}
       </div>
-    </>
+    </div>
   );
 }
 

@@ -1,4 +1,5 @@
-import { type ReactNode, useRef } from "react";
+import { Loader, SegmentedControl } from "@mantine/core";
+import { type ReactNode, useMemo, useState } from "react";
 
 import type { PackedDrawing } from "../map/drawing";
 import { MapCanvas } from "../map/MapCanvas";
@@ -6,23 +7,59 @@ import { choose } from "./handlers/select";
 import type { Carrier } from "./handlers/handler";
 import { Legend } from "./Legend";
 import { RoadUserTable } from "./RoadUserTable";
+import { TimeDock } from "../time/TimeDock";
+import { usePlannedView, withoutStarts } from "../time/usePlannedView";
+import { useSlow } from "../ui/useSlow";
 import type { EditorNow } from "./useEditing";
 import { useScene } from "./useScene";
 
-/** The map, and below it the table of all road users; choosing in one is choosing in the other. */
+/** What is below the map. */
+type Dock = "table" | "time";
+
+/**
+ * The map, and below it, always as high, the table of all road users or the time bar; choosing in one is
+ * choosing in the others.
+ */
 export function Stage({
   now,
+  saving,
   drawing,
   children,
 }: {
   now: EditorNow;
+  /** Whether the server is at a change. */
+  saving: boolean;
   drawing: PackedDrawing;
   children: ReactNode;
 }) {
   const { graph, picker, document, step, handler, hover, setHover, ones, selection, changes, sights } = now;
-  const carried = useRef<Carrier | null>(null);
-  const scene = useScene(now);
-  const hint = handler.hint(hover);
+  const [carried, setCarried] = useState<Carrier | null>(null);
+  const [dock, setDock] = useState<Dock>("table");
+  const [open, setOpen] = useState(true);
+  const view = usePlannedView(now, dock === "time" && open);
+  const starts = useScene(now);
+  const scene = useMemo(() => (view.shown ? withoutStarts(starts) : starts), [starts, view.shown]);
+  const hint = view.shown
+    ? view.hint
+    : now.unreachable
+      ? "No route leads from the start to this point inside the region"
+      : (carried?.hint ?? handler.hint(hover));
+  const head = (
+    <SegmentedControl
+      size="xs"
+      aria-label="Below the map"
+      data={[
+        { value: "table", label: "Road users" },
+        { value: "time", label: "Time" },
+      ]}
+      value={dock}
+      onChange={(next) => {
+        setDock(next as Dock);
+        setOpen(true);
+      }}
+    />
+  );
+  const slow = useSlow(saving);
   return (
     <div className="stage">
       <div className="stage-map">
@@ -34,30 +71,58 @@ export function Stage({
           handle={now.handle}
           label={`Map ${document.map.name}`}
           aim={handler.aim}
-          onPick={handler.pick}
-          onPoint={(at) => setHover(at && (carried.current ?? handler).under(at))}
+          onPick={view.shown ? view.pick : handler.pick}
+          onPoint={(at) => {
+            if (!view.shown) setHover(at && (carried ?? handler).under(at));
+          }}
           onGrab={(at) => {
-            carried.current = handler.grab(at);
-            return carried.current !== null;
+            // Bodies are not where they start now.
+            if (view.shown) return false;
+            const taken = handler.grab(at);
+            setCarried(taken);
+            return taken !== null;
           }}
           onDrop={(at) => {
-            carried.current?.drop(at);
-            carried.current = null;
+            if (at) carried?.drop(at);
+            setCarried(null);
             setHover(null);
           }}
           onFrame={handler.frame}
         >
-          {hint && (
+          {slow ? (
             <div className="map-hint" role="status">
-              {hint}
+              <span className="waiting">
+                <Loader size={16} aria-hidden="true" />
+                Applying the change …
+              </span>
             </div>
+          ) : (
+            hint && (
+              <div className="map-hint" role="status">
+                {hint}
+              </div>
+            )
           )}
           <Legend step={step} />
         </MapCanvas>
         {children}
       </div>
-      {ones.length > 0 && (step === "actors" || step === "run") && (
+      {dock === "time" ? (
+        <TimeDock
+          now={now}
+          plan={view.plan}
+          moment={view.moment}
+          open={open}
+          head={head}
+          onMoment={view.setMoment}
+          onOpen={setOpen}
+        />
+      ) : (
         <RoadUserTable
+          place={step}
+          head={head}
+          open={open}
+          onOpen={setOpen}
           ones={ones}
           graph={graph}
           selection={selection}

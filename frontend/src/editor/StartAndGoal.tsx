@@ -1,9 +1,10 @@
-import { Button, Group, Select, Text, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, Group, Select, Text, Tooltip } from "@mantine/core";
 
 import type { Actor, Flow } from "../api/types";
 import type { Graph, Place } from "../map/graph";
+import { IconTrash } from "../ui/icons";
 import { placeWord } from "./placeWords";
-import type { Starts } from "./placing";
+import { type Starts, viasOf } from "./placing";
 
 /** Start and goal: all that a click on the map does, without the map. */
 export function StartAndGoal({
@@ -13,7 +14,8 @@ export function StartAndGoal({
   goals,
   onStart,
   onGoal,
-  onShowGoals,
+  onPickGoal,
+  onVia,
 }: {
   one: Actor | Flow;
   graph: Graph;
@@ -21,7 +23,10 @@ export function StartAndGoal({
   goals: readonly Place[] | null;
   onStart: (spawn: string) => void;
   onGoal: (goal: string | null) => void;
-  onShowGoals: () => void;
+  /** Shows the goals that are suggested and lets one be chosen, or any other point. */
+  onPickGoal: () => void;
+  /** Changes the places that the route leads through; flows have none. */
+  onVia: (via: string[]) => void;
 }) {
   const start = graph.place(one.spawn);
   const moves: [string, () => Place | null][] = start
@@ -58,6 +63,7 @@ export function StartAndGoal({
           ))}
         </Group>
       </div>
+      <Passed via={viasOf(one)} graph={graph} onVia={onVia} />
       {goals?.length === 0 && !one.goal ? (
         <Text size="sm" c="red">
           No goal can be reached from here. Move the start or extend the region.
@@ -80,8 +86,8 @@ export function StartAndGoal({
               if ((goal || null) !== one.goal) onGoal(goal || null);
             }}
           />
-          <Button variant="default" px="sm" disabled={!goals?.length} onClick={onShowGoals}>
-            Show goals
+          <Button variant="default" px="sm" disabled={!goals?.length} onClick={onPickGoal}>
+            Choose on the map
           </Button>
           {one.goal && (
             <Button variant="default" px="sm" onClick={() => onGoal(null)}>
@@ -91,5 +97,42 @@ export function StartAndGoal({
         </Group>
       )}
     </>
+  );
+}
+
+/** The places that a route leads through, in their order, each of which can be taken out. */
+function Passed({
+  via,
+  graph,
+  onVia,
+}: {
+  via: readonly string[];
+  graph: Graph;
+  onVia: (via: string[]) => void;
+}) {
+  if (via.length === 0) return null;
+  return (
+    <div role="group" aria-label="Passes">
+      <Text size="sm" fw={500}>
+        Passes
+      </Text>
+      {via.map((id, index) => (
+        // The same place may be passed twice.
+        <Group key={`${index} ${id}`} gap={6} justify="space-between" wrap="nowrap">
+          <Tooltip label={id} position="top-start">
+            <Text size="sm">{placeWord(graph, id)}</Text>
+          </Tooltip>
+          <ActionIcon
+            size="sm"
+            variant="subtle"
+            color="red"
+            aria-label={`Do not pass ${placeWord(graph, id)}`}
+            onClick={() => onVia(via.filter((_, other) => other !== index))}
+          >
+            <IconTrash size={14} />
+          </ActionIcon>
+        </Group>
+      ))}
+    </div>
   );
 }

@@ -1,10 +1,11 @@
-import { Button, Group, Switch, TextInput } from "@mantine/core";
+import { Switch } from "@mantine/core";
 
 import type { Edit, FieldsOf } from "../api/types";
 import type { Graph } from "../map/graph";
 import { Committed } from "./Committed";
 import { PartCard } from "./DemandParts";
-import { type PlacePick, useTaking } from "./pick";
+import { CommittedText, OpenAndShow, PickButton } from "./FormParts";
+import type { PlacePick } from "./pick";
 import { placeWord } from "./placeWords";
 import type { Stop } from "./transit";
 
@@ -32,13 +33,6 @@ export function StopCard({
   const key = `stop ${id}`;
   const change = (fields: FieldsOf<"set_stop", "stop">): void =>
     onEdit({ kind: "set_stop", stop: id, ...fields });
-  const active = useTaking(pick, key, ({ name }) => {
-    change({ node: name });
-    pick.stop();
-  });
-  const rename = (name: string): void => {
-    if (name.trim() !== stop.name) change({ name: name.trim() });
-  };
   const where = placeWord(graph, stop.node);
   return (
     <PartCard
@@ -50,15 +44,11 @@ export function StopCard({
       <OpenAndShow part={id} open={open} onShow={onShow} onOpen={() => onOpen(open ? null : key)} />
       {open && (
         <>
-          <TextInput
+          <CommittedText
             label="Name for people"
-            key={stop.name}
-            defaultValue={stop.name}
+            value={stop.name}
             maxLength={200}
-            onBlur={(event) => rename(event.currentTarget.value)}
-            onKeyDown={(event) => {
-              if (event.key === "Enter") rename(event.currentTarget.value);
-            }}
+            onCommit={(name) => change({ name })}
           />
           <Committed
             label="Length"
@@ -76,46 +66,11 @@ export function StopCard({
             checked={stop.bay}
             onChange={(event) => change({ bay: event.currentTarget.checked })}
           />
-          <Button
-            size="compact-sm"
-            variant="default"
-            aria-pressed={active}
-            onClick={() => (active ? pick.stop() : pick.start(key, "node"))}
-          >
-            {active ? "Stop choosing" : "Move it on the map"}
-          </Button>
+          <PickButton pick={pick} pickKey={key} by="node" onTake={({ name }) => change({ node: name })}>
+            Move it on the map
+          </PickButton>
         </>
       )}
     </PartCard>
-  );
-}
-
-/** Opens the form of a part, and shows on the map where it is. */
-export function OpenAndShow({
-  part,
-  open,
-  onOpen,
-  onShow,
-}: {
-  part: string;
-  open: boolean;
-  onOpen: () => void;
-  onShow: () => void;
-}) {
-  return (
-    <Group gap={6}>
-      <Button
-        size="compact-sm"
-        variant="default"
-        aria-expanded={open}
-        aria-label={`${open ? "Close" : "Change"} ${part}`}
-        onClick={onOpen}
-      >
-        {open ? "Close" : "Change"}
-      </Button>
-      <Button size="compact-sm" variant="default" aria-label={`Show where ${part} is`} onClick={onShow}>
-        Show where
-      </Button>
-    </Group>
   );
 }

@@ -1,7 +1,8 @@
 import { Button, CloseButton, Group, Text } from "@mantine/core";
-import { useState } from "react";
+import { useEffect, useRef, useState } from "react";
 
 import { nth } from "../lists";
+import type { Step } from "./scene";
 
 const KEY = "odscen.tour";
 const STEPS: readonly [title: string, text: string][] = [
@@ -37,9 +38,19 @@ export function tourSeen(): void {
   }
 }
 
-/** Three cards beside the map; the page can be used while they are there. */
-export function Tour({ onClose }: { onClose: () => void }) {
+/** The card of each step of the editor; others keep the card that is shown. */
+const CARD: Partial<Record<Step, number>> = { region: 0, actors: 1, run: 2 };
+
+/** Three cards beside the map that follow the user; the page can be used while they are there. */
+export function Tour({ step, onClose }: { step: Step; onClose: () => void }) {
   const [at, setAt] = useState(0);
+  const before = useRef(step);
+  // It begins with its first card, wherever one is, and follows from then on.
+  useEffect(() => {
+    if (step === before.current) return;
+    before.current = step;
+    setAt((old) => CARD[step] ?? old);
+  }, [step]);
   const [title, text] = nth(STEPS, at);
   const last = at === STEPS.length - 1;
   return (

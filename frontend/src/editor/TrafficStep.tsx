@@ -7,6 +7,7 @@ import { InputForm, NewInput } from "./InputForm";
 import { bringsTraffic, freeName, secondsOfDay, timeOfDay } from "./demand";
 import { CountsList, MatrixForm, ProfileList, ZoneList } from "./DemandParts";
 import type { Profiles } from "./DayProfiles";
+import { ParkingForm } from "./ParkingForm";
 import { RoutesForm } from "./RoutesForm";
 import type { EditorStore } from "./store";
 import { TableForm } from "./TableForm";
@@ -33,9 +34,11 @@ export function TrafficStep({
 }) {
   const { demand } = document;
   const [adding, setAdding] = useState<Adding>(null);
+  const [wrongClock, setWrongClock] = useState(false);
   const remove = (part: string): void => onEdit({ kind: "remove_demand", part });
   const setClock = (text: string): void => {
-    const clock = secondsOfDay(text);
+    const clock = text.trim() ? secondsOfDay(text.trim()) : 0;
+    setWrongClock(clock === null);
     if (clock !== null && Math.floor(clock / 60) !== Math.floor(demand.clock / 60))
       onEdit({ kind: "set_clock", clock });
   };
@@ -43,10 +46,11 @@ export function TrafficStep({
   return (
     <>
       <TextInput
-        type="time"
         label="Time of day at the start"
+        placeholder="Not set: times count from the start"
+        error={wrongClock && "Hours and minutes, such as 07:30 or 17:15"}
         key={demand.clock}
-        defaultValue={timeOfDay(demand.clock)}
+        defaultValue={demand.clock ? timeOfDay(demand.clock) : ""}
         onBlur={(event) => setClock(event.currentTarget.value)}
         onKeyDown={(event) => {
           if (event.key === "Enter") setClock(event.currentTarget.value);
@@ -91,6 +95,7 @@ export function TrafficStep({
       ))}
       {demand.zones.length > 0 && <ZoneList zones={demand.zones} onShow={onShow} onRemove={remove} />}
       {bringsTraffic(demand) && <RoutesForm routes={demand.routes} onEdit={onEdit} />}
+      {bringsTraffic(demand) && <ParkingForm parking={demand.parking} onEdit={onEdit} />}
       <Stack gap={6}>
         <Button
           variant="default"

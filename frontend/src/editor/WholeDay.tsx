@@ -1,4 +1,4 @@
-import { Alert, Button, NumberInput, SegmentedControl, Text } from "@mantine/core";
+import { Alert, Button, Checkbox, NumberInput, SegmentedControl, Text } from "@mantine/core";
 import { useState } from "react";
 
 import { demand } from "../api/demand";
@@ -15,19 +15,21 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
   const { name, take } = store();
   const [day, setDay] = useState<keyof typeof DAYS>("weekday");
   const [trips, setTrips] = useState(51_000);
+  const [trial, setTrial] = useState(true);
   const [busy, setBusy] = useState(false);
   const [failure, setFailure] = useState<string | null>(null);
   const make = (): void => {
     setBusy(true);
     setFailure(null);
     take(async (version) => {
-      const made = await demand.day(name, version, day, trips);
+      const made = await demand.day(name, version, { day, trips, trial });
       const load = Math.round((100 * made.volume) / made.capacity);
       const peak = Math.round(made.peak_trips).toLocaleString("en");
       tell(
         `${count(Math.round(made.trips), "trip")}, ${peak} in the peak hour. ` +
           `The busiest approach of a junction then reaches ${load} % of its capacity.` +
-          (made.trips < trips ? " More trips would have exceeded the capacity of the junctions." : ""),
+          (made.trips < trips ? " More trips would have exceeded the capacity of the junctions." : "") +
+          (made.found === null ? "" : ` ${made.found}.`),
       );
       return made.scenario;
     })
@@ -58,6 +60,12 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
         allowDecimal={false}
         value={trips}
         onChange={(value) => setTrips(Number(value) || 1)}
+      />
+      <Checkbox
+        label="Try the busiest hour by runs"
+        description="Takes a minute or two; there are then as many trips as the network carries."
+        checked={trial}
+        onChange={(event) => setTrial(event.currentTarget.checked)}
       />
       {failure && (
         <Alert color="red" title="The day could not be generated">

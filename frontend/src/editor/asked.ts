@@ -1,11 +1,14 @@
-import { useEffect, useMemo, useState } from "react";
+import { useEffect, useMemo, useRef, useState } from "react";
 
 import { api } from "../api/client";
 import { runs, type RunWish } from "../api/runs";
 import type { Actor, Flow, Roi } from "../api/types";
+import { nth } from "../lists";
 import type { Graph, Place } from "../map/graph";
 import { tellError } from "../ui/notices";
 import { go } from "../ui/address";
+import type { Trial } from "./handlers/handler";
+import { viasOf } from "./placing";
 
 const NO_ROI: Roi = { inside: [], candidates: [], removable: [] };
 
@@ -40,13 +43,16 @@ export interface Goals {
 export function useGoals(name: string, one: Actor | Flow | null, roiKey: string, graph: Graph): Goals {
   const [goals, setGoals] = useState<Place[] | null>(null);
   const [route, setRoute] = useState<[number, number][]>([]);
-  const spawn = one?.spawn ?? null;
   const goal = one?.goal ?? null;
+  const legs = one ? [one.spawn, ...viasOf(one)] : [];
+  // A text, as the same places are another array with every edit.
+  const stations = JSON.stringify(legs);
+  const last = legs.at(-1) ?? null;
   useEffect(() => {
     setGoals(null);
-    if (spawn === null) return;
+    if (last === null) return;
     let current = true;
-    api.goals(name, spawn).then(
+    api.goals(name, last).then(
       (found) => {
         if (current) setGoals(found.goals.flatMap((id) => graph.place(id) ?? []));
       },
@@ -57,22 +63,69 @@ export function useGoals(name: string, one: Actor | Flow | null, roiKey: string,
     return () => {
       current = false;
     };
-  }, [name, spawn, roiKey, graph]);
+  }, [name, last, roiKey, graph]);
   useEffect(() => {
     setRoute([]);
-    if (spawn === null || goal === null) return;
+    const passed = JSON.parse(stations) as string[];
+    const places = goal === null ? passed : [...passed, goal];
+    if (places.length < 2) return;
     let current = true;
-    api.path(name, spawn, goal).then(
+    const parts = places.slice(1).map((place, index) => api.path(name, nth(places, index), place));
+    Promise.all(parts).then(
       (found) => {
-        if (current) setRoute(found.points);
+        if (current) setRoute(found.flatMap(({ points }) => points));
       },
       () => undefined,
     );
     return () => {
       current = false;
     };
-  }, [name, spawn, goal, roiKey]);
+  }, [name, stations, goal, roiKey]);
   return { goals, route };
+}
+
+/** The route of a {@link Trial}, as far as the server has answered. */
+export interface TrialRoute {
+  /** Points of the newest route that is known; it may lag behind the pointer. */
+  points: [number, number][];
+  /** Whether there is a route for what is pointed at; null until that is known. */
+  possible: boolean | null;
+}
+
+const NO_ROUTE: TrialRoute = { points: [], possible: null };
+
+/** Asks for the route of what is pointed at: one question at a time, the newest next. */
+export function useTrial(name: string, trial: Trial | null): TrialRoute {
+  const [found, setFound] = useState<TrialRoute & { key: string }>({ ...NO_ROUTE, key: "" });
+  const wanted = useRef<Trial | null>(null);
+  const busy = useRef(false);
+  const key = trial ? `${trial.spawn} ${trial.goal}` : "";
+  useEffect(() => {
+    wanted.current = trial;
+    const ask = (): void => {
+      const now = wanted.current;
+      if (!now || busy.current) return;
+      busy.current = true;
+      const asked = `${now.spawn} ${now.goal}`;
+      const learn = (route: TrialRoute): void => {
+        busy.current = false;
+        setFound({ ...route, key: asked });
+        if (wanted.current && wanted.current !== now) ask();
+      };
+      api.path(name, now.spawn, now.goal).then(
+        // Without a route the answer has no points.
+        ({ points }) => learn({ points, possible: points.length > 0 }),
+        () => learn({ points: [], possible: false }),
+      );
+    };
+    ask();
+    // By its key: the same trial is another object with every move of the pointer.
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [name, key]);
+  return useMemo(() => {
+    if (!key) return NO_ROUTE;
+    return found.key === key ? found : { points: found.points, possible: null };
+  }, [found, key]);
 }
 
 /** Starts a run and leads to it. */

@@ -1,6 +1,7 @@
 import type { Actor, Category, Edit, Flow, ScenarioState } from "../api/types";
-import type { Place } from "../map/graph";
+import type { Graph, Place } from "../map/graph";
 import { count } from "../ui/words";
+import { extension } from "./regions";
 import { isFlow, type Moves, type Starts } from "./placing";
 
 /** Volume of a new flow. */
@@ -8,6 +9,8 @@ const PER_HOUR = 300;
 
 export interface Changes {
   change: (edit: Edit | readonly Edit[], label?: string) => void;
+  /** Gives something other times; whether that was possible. */
+  retime: (edit: Edit, label: string) => Promise<boolean>;
   place: (category: Category, to: Place) => void;
   placeFlow: (walks: boolean, to: Place) => void;
   /** Copies road users so that the first starts at `to`; the others keep their distances. */
@@ -16,17 +19,23 @@ export interface Changes {
   remove: (ids: readonly string[]) => void;
   setStart: (one: Actor | Flow, spawn: string) => void;
   setGoal: (one: Actor | Flow, goal: string | null) => void;
+  /** Adds segments to the region: those that hang together with it. */
+  extendRegion: (rows: readonly number[]) => void;
   /** Random road users in the place of all; whether they were placed. */
   fill: (share: number, seed: number) => Promise<boolean>;
 }
 
 /** What can be done to road users and flows, as edits that the server is asked for. */
 export function changesOf({
+  graph,
+  roi,
   ones,
   starts,
   edit,
   say,
 }: {
+  graph: Graph;
+  roi: readonly string[];
   ones: readonly (Actor | Flow)[];
   starts: Starts;
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
@@ -51,6 +60,7 @@ export function changesOf({
   };
   return {
     change,
+    retime: async (asked, label) => (await edit(asked, label)) !== null,
     place: (category, to) => change({ kind: "add_actor", category, spawn: to.id }),
     placeFlow: (walks, to) =>
       change({
@@ -89,6 +99,22 @@ export function changesOf({
       change(
         isFlow(one) ? { kind: "change_flow", flow: one.id, goal } : { kind: "set_goal", actor: one.id, goal },
       ),
+    extendRegion: (rows) => {
+      const { segments, left } = extension(graph, roi, rows);
+      if (segments.length === 0) {
+        say(
+          left > 0
+            ? "These segments do not hang together with the region. Add those between first."
+            : "There is nothing to add here: no segment lies in it, or all are in the region.",
+        );
+        return;
+      }
+      change({ kind: "extend_roi", segments }, `Add ${count(segments.length, "segment")}`);
+      if (left > 0)
+        say(
+          `${count(left, "segment")} did not hang together with the rest and ${left === 1 ? "was" : "were"} left out.`,
+        );
+    },
     fill: async (share, seed) => {
       const done = await edit({ kind: "fill_roi", share, seed });
       if (done)

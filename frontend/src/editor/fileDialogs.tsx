@@ -81,7 +81,7 @@ export function OpenDialog({ current, onClose }: { current: string; onClose: () 
               </Text>
             }
           >
-            {one.name}
+            {one.title ?? one.name}
           </Button>
         ))}
       </Stack>

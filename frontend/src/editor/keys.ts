@@ -6,8 +6,15 @@ export interface KeyActions {
   remove: () => void;
   escape: () => void;
   sheet: () => void;
+  find: () => void;
   copy: () => void;
   move: () => void;
+  paste: () => void;
+  goal: () => void;
+  /** The next free point along the lane, or the one before. */
+  along: (step: 1 | -1) => void;
+  /** A free point of the next lane. */
+  lane: () => void;
   selectAll: () => void;
   /** 1 to 7 a kind of road user, 8 and 9 a flow. */
   tool: (n: number) => void;
@@ -45,6 +52,8 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
       z: event.shiftKey ? actions.redo : actions.undo,
       y: actions.redo,
       a: actions.selectAll,
+      k: actions.find,
+      v: actions.paste,
       ...(marked ? {} : { c: actions.copy }),
     };
     return named[key] ?? null;
@@ -56,6 +65,10 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
     escape: actions.escape,
     "?": actions.sheet,
     m: actions.move,
+    g: actions.goal,
+    l: actions.lane,
+    ".": () => actions.along(1),
+    ",": () => actions.along(-1),
   };
   if (/^[1-9]$/.test(key)) return () => actions.tool(Number(key) - 1);
   return plain[key] ?? null;
@@ -63,10 +76,16 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
 
 export const SHORTCUTS: readonly (readonly [keys: string, what: string])[] = [
   ["Ctrl+Z / Ctrl+Y", "Undo / redo"],
+  ["Ctrl+K", "Find a road, a junction or a road user"],
   ["1 – 7", "Place a car, van, truck, bus, motorcycle, bicycle, pedestrian"],
   ["8 / 9", "Place a vehicle flow / pedestrian flow"],
   ["Ctrl+C", "Copy what is selected: then choose where"],
+  ["Ctrl+V", "Place what was copied once more"],
   ["M", "Move what is selected: then choose where"],
+  [", / .", "Move the start of what is selected back or on along its lane"],
+  ["L", "Move the start of what is selected to another lane"],
+  ["G", "Choose the goal of what is selected on the map"],
+  ["Drag", "Move road users, or the flag of a goal"],
   ["Ctrl+A", "Select all"],
   ["Shift + click", "Select several"],
   ["Shift + drag", "Select all in a rectangle"],
@@ -77,5 +96,6 @@ export const SHORTCUTS: readonly (readonly [keys: string, what: string])[] = [
   ["0", "On the map: show everything"],
   ["Enter", "On the map: choose what is in the middle"],
   ["↑ / ↓", "In the table: the row before or after"],
+  ["← / →", "In the time bar: move a block by 1 s (with Shift 10 s, with Alt 0.1 s)"],
   ["?", "This help"],
 ];

@@ -1,13 +1,25 @@
 import { type RefObject, useEffect, useMemo, useRef, useState } from "react";
 
-/** What a click on the map names while a place is picked. */
-export type PickBy = "segment" | "lane" | "turn" | "point" | "light" | "node";
+/**
+ * What a click on the map names while a place is picked: `node` a node of a lane of the region,
+ * `goal` any node of a lane or walkway, `place` that or where there is none the ground, `ground` x and y.
+ */
+export type PickBy = "segment" | "lane" | "turn" | "point" | "light" | "node" | "goal" | "place" | "ground";
 
-/** A place that was pointed at: its name, and of a point of a lane how far along the road it is. */
+/** A place that was pointed at. */
 export interface Picked {
+  /** Empty of the ground. */
   name: string;
+  /** Of a point of a lane how far along the road it is, metres. */
   s: number;
+  /** Metres, and radians counter-clockwise; of places that are points. */
+  x: number;
+  y: number;
+  hdg: number;
 }
+
+/** A place that has only a name. */
+export const namedPlace = (name: string, s = 0): Picked => ({ name, s, x: 0, y: 0, hdg: 0 });
 
 interface Picking {
   /** For whom: the same key is the same form. */

@@ -7,6 +7,8 @@ import type { Picker } from "../map/picking";
 export type Moves = readonly (readonly [id: string, spawn: string])[];
 
 export const isFlow = (one: Actor | Flow): one is Flow => "per_hour" in one;
+/** The places that a route leads through before its goal; those of flows lead through none. */
+export const viasOf = (one: Actor | Flow): readonly string[] => (isFlow(one) ? [] : one.via);
 export const everyone = (document: ScenarioDocument): (Actor | Flow)[] => [
   ...document.actors,
   ...document.flows,
@@ -41,6 +43,16 @@ export class Starts {
       walks: walk,
       inside: this.inside,
       allowed: (i, onFoot) => this.free(i, onFoot, besides),
+    });
+  }
+
+  /** The point of the region nearest to one on the map, whether free or not, but for one of them. */
+  anyNear(x: number, y: number, reach: number, walk: boolean, besides: string): Place | null {
+    return this.picker.place(x, y, Math.max(3 * reach, SNAP), {
+      vehicles: !walk,
+      walks: walk,
+      inside: this.inside,
+      allowed: (i, onFoot) => this.at(i, onFoot).id !== besides,
     });
   }
 

@@ -12,6 +12,9 @@ export const STEPS = [
   "transit",
   "measures",
   "rules",
+  "parameters",
+  "study",
+  "criteria",
   "run",
 ] as const;
 export type Step = (typeof STEPS)[number];

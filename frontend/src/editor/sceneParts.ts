@@ -7,6 +7,7 @@ import type { Heads } from "../signals/heads";
 import type { Measure } from "./measures";
 import { placesOf } from "./measures";
 import { join, segmentsBounds } from "./scene";
+import { type StationKind, stationsOf, type Study } from "./study";
 
 /** What measures look like on the map. */
 export interface MeasureShapes {
@@ -76,6 +77,21 @@ export function boundsOfMeasure(graph: Graph, measure: Measure, lights: Heads | 
     }
   return boxes.length > 0 ? boxes.reduce(join) : null;
 }
+
+/** A letter at each lane that a station crosses: of detectors, sections and cordons. */
+export function stationPins(graph: Graph, study: Study): ScenePin[] {
+  return stationsOf(study).flatMap(({ id, kind, lines }) =>
+    lines.flatMap(({ nodes, word }) =>
+      nodes.flatMap((node): ScenePin[] => {
+        const place = graph.place(node);
+        const text = kind === "detectors" ? id : `${id}: ${word.toLowerCase()}`;
+        return place ? [{ x: place.x, y: place.y, sign: SIGN[kind], text }] : [];
+      }),
+    ),
+  );
+}
+
+const SIGN: Record<StationKind, string> = { detectors: "D", sections: "S", cordons: "C" };
 
 /** Stops, and where lines set off and end. */
 export function transitPins(graph: Graph, { stops, lines }: ScenarioDocument["transit"]): ScenePin[] {

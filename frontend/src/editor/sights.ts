@@ -5,6 +5,8 @@ import type { Graph, Place } from "../map/graph";
 import type { MapHandle } from "../map/MapCanvas";
 import type { Heads } from "../signals/heads";
 import type { Measure } from "./measures";
+import type { Rule } from "./rules/draft";
+import { boundsOfRule } from "./rules/ruleShapes";
 import { boundsOfPlaces, boundsOfProblem, segmentsBounds } from "./scene";
 import { boundsOfMeasure } from "./sceneParts";
 
@@ -19,7 +21,11 @@ export interface Sights {
   nodes: (nodes: readonly string[]) => void;
   /** All places of a measure. */
   measure: (measure: Measure) => void;
+  /** All places of a rule, and the start of who acts. */
+  rule: (rule: Rule, actors: readonly Actor[]) => void;
   problem: (problem: Problem, document: ScenarioDocument) => void;
+  /** The rectangle that is in sight. */
+  seen: () => Bounds | null;
   /** Acts on what is in the middle, as a click there does. */
   pickMiddle: () => void;
 }
@@ -56,7 +62,12 @@ export function sightsOf(
       const bounds = boundsOfMeasure(graph, measure, lights());
       if (bounds) show(around(bounds));
     },
+    rule: (rule, actors) => {
+      const bounds = boundsOfRule(graph, rule, [...actors]);
+      if (bounds) show(around(bounds));
+    },
     problem: (problem, document) => show(boundsOfProblem(problem, graph, document)),
+    seen: () => handle.current?.seen() ?? null,
     pickMiddle: () => handle.current?.pickMiddle(),
   };
 }

@@ -23,6 +23,8 @@ export interface EditorState {
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
   /** Asks for a change that is no edit; a refusal is thrown, for the caller to show. */
   take: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState>;
+  /** Asks for a change that is no edit; the answer is null if it was refused, which is shown. */
+  ask: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState | null>;
   undo: () => Promise<ScenarioState | null>;
   redo: () => Promise<ScenarioState | null>;
   select: (ids: readonly string[]) => void;
@@ -147,6 +149,7 @@ export function createEditorStore(name: string): EditorStore {
         return ask((version) => api.edit(name, version, edits, label));
       },
       take,
+      ask,
       undo: () => ask((version) => api.undo(name, version)),
       redo: () => ask((version) => api.redo(name, version)),
       select: (ids) => set({ selection: ids }),

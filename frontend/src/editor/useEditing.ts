@@ -3,13 +3,15 @@ import { type RefObject, useMemo, useRef, useState } from "react";
 import type { Assets, MapDetails, Problem, ScenarioDocument, ScenarioState } from "../api/types";
 import type { LoadedGraph } from "../map/loaded";
 import type { MapHandle } from "../map/MapCanvas";
+import type { LightProgram } from "../api/signals";
 import { Heads } from "../signals/heads";
 import { tell } from "../ui/notices";
-import { useGoals, useRegion } from "./asked";
+import { useGoals, useRegion, useTrial } from "./asked";
 import { changesOf } from "./changes";
 import { handlerFor } from "./handlers";
 import type { Editing, Handler, Hover, Tool } from "./handlers/handler";
 import { usePick } from "./pick";
+import type { Draft } from "./rules/draft";
 import { everyone } from "./placing";
 import { firstStep, ofProblem, type Step } from "./scene";
 import { type Sights, sightsOf } from "./sights";
@@ -23,6 +25,12 @@ export interface EditorNow extends Editing {
   problems: readonly Problem[];
   /** The junction whose traffic light is shown. */
   light: string | null;
+  /** Its program, once it is there. */
+  program: LightProgram | null;
+  setProgram: (program: LightProgram | null) => void;
+  /** The rule whose form is open, as it is there. */
+  drafted: Draft | null;
+  setDrafted: (draft: Draft | null) => void;
   closeLight: () => void;
   step: Step;
   tool: Tool | null;
@@ -36,7 +44,11 @@ export interface EditorNow extends Editing {
   /** Rows of the segments of the region. */
   inside: ReadonlySet<number>;
   route: readonly (readonly [number, number])[];
+  /** Whether no route leads between start and goal as they are being chosen. */
+  unreachable: boolean;
   showProblem: (problem: Problem) => void;
+  /** Brings a segment, or a road user that is selected then, into sight. */
+  show: (is: "segment" | "one", id: string) => void;
   sights: Sights;
   handle: RefObject<MapHandle | null>;
 }
@@ -59,7 +71,9 @@ export function useEditing(
   const [hover, setHover] = useState<Hover | null>(null);
   const handle = useRef<MapHandle | null>(null);
   const lights = useMemo(() => map && new Heads(map.lights), [map]);
+  const [drafted, setDrafted] = useState<Draft | null>(null);
   const [light, setLight] = useState<string | null>(null);
+  const [program, setProgram] = useState<LightProgram | null>(null);
 
   const roiKey = document.roi.join("\n");
   const region = useRegion(name, roiKey);
@@ -68,10 +82,16 @@ export function useEditing(
     () => (selection.length === 1 ? (ones.find(({ id }) => id === selection[0]) ?? null) : null),
     [ones, selection],
   );
-  const { goals, route } = useGoals(name, one, roiKey, graph);
+  const { goals, route: planned } = useGoals(name, one, roiKey, graph);
+  const trial = (hover?.is === "place" && hover.trial) || null;
+  const tried = useTrial(name, trial);
   const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
   const sights = useMemo(() => sightsOf(handle, graph, () => lights), [graph, lights]);
-  const changes = useMemo(() => changesOf({ ones, starts, edit, say: tell }), [ones, starts, edit]);
+  const { roi } = document;
+  const changes = useMemo(
+    () => changesOf({ graph, roi, ones, starts, edit, say: tell }),
+    [graph, roi, ones, starts, edit],
+  );
 
   const pick = usePick();
   const goTo = (next: Step): void => {
@@ -123,6 +143,10 @@ export function useEditing(
     document,
     problems,
     light,
+    program,
+    setProgram,
+    drafted,
+    setDrafted,
     closeLight: () => setLight(null),
     step,
     tool,
@@ -130,11 +154,20 @@ export function useEditing(
     hover,
     setHover,
     inside,
-    route,
+    route: trial ? tried.points : planned,
+    unreachable: trial !== null && tried.possible === false,
     sights,
     handle,
     handler: handlerFor(step, tool, editing),
     placeSomewhere: () => tool?.handler(editing).somewhere(),
+    show: (is, id) => {
+      const found = is === "one" ? ones.find((each) => each.id === id) : undefined;
+      if (is === "segment") sights.segments([id]);
+      if (!found) return;
+      goTo("actors");
+      select([id]);
+      sights.start(found);
+    },
     showProblem: (problem) => {
       const about = ofProblem(problem, document);
       if (about) select([about.id]);
@@ -149,6 +182,8 @@ function stepOf({ where }: Problem): Step | null {
   if (where.startsWith("roi")) return "region";
   if (where.startsWith("measures")) return "measures";
   if (where.startsWith("rules")) return "rules";
+  if (where.startsWith("study")) return "study";
+  if (where.startsWith("criteria")) return "criteria";
   if (where.startsWith("transit")) return "transit";
   return where.startsWith("demand") ? "traffic" : null;
 }

@@ -1,22 +1,28 @@
 import { useMemo } from "react";
 
 import type { Scene } from "../map/scene";
+import { sceneDetectors } from "../signals/sceneDetectors";
+import { ruleShapes } from "./rules/ruleShapes";
 import { laneFacts } from "./placeWords";
 import { segmentStyles, type Step } from "./scene";
-import { measureShapes, transitPins } from "./sceneParts";
+import { measureShapes, stationPins, transitPins } from "./sceneParts";
 import type { EditorNow } from "./useEditing";
 
 /** Steps in which measures are drawn, and stops and lines. */
 const MEASURED: ReadonlySet<Step> = new Set<Step>(["traffic", "measures", "run"]);
+/** In which rules are drawn. */
+const RULED: ReadonlySet<Step> = new Set<Step>(["rules", "run"]);
 const SERVED: ReadonlySet<Step> = new Set<Step>(["traffic", "transit", "run"]);
 
 /** What the map shows of the editor as it is now. */
 export function useScene(now: EditorNow): Scene {
   const {
     graph,
-    document: { roi, measures, transit },
+    document: { roi, measures, study, transit, rules, actors: placed },
+    drafted,
     region: { candidates },
     step,
+    tool,
     handler: { walks, badge },
     hover,
     inside,
@@ -26,20 +32,35 @@ export function useScene(now: EditorNow): Scene {
     one,
     route,
     lights,
+    program,
     pick,
   } = now;
   const shapes = useMemo(() => measureShapes(graph, measures, lights), [graph, measures, lights]);
   const stops = useMemo(() => transitPins(graph, transit), [graph, transit]);
+  const ruled = useMemo(
+    () => ruleShapes(graph, { rules, actors: placed }, drafted),
+    [graph, rules, placed, drafted],
+  );
+  const stations = useMemo(() => stationPins(graph, study), [graph, study]);
+  const detectors = useMemo(() => sceneDetectors(program), [program]);
   return useMemo<Scene>(() => {
     const placing = step === "actors";
     const pointing = placing || pick.now !== null;
     const measured = MEASURED.has(step);
     const served = SERVED.has(step);
+    const studied = step === "study" || step === "run";
     const place = hover?.is === "place" ? hover.place : null;
     return {
       segments: measured ? shapes.segments : segmentStyles(graph, roi, candidates, step === "region"),
       lanes: measured ? shapes.rings : [],
-      pins: [...(measured ? shapes.pins : []), ...(served ? stops : [])],
+      pins: [
+        ...(measured ? shapes.pins : []),
+        ...(served ? stops : []),
+        ...(studied ? stations : []),
+        ...(RULED.has(step) ? ruled.pins : []),
+      ],
+      lines: RULED.has(step) ? ruled.lines : [],
+      detectors,
       hoverSegment: hover?.is === "segment" ? hover.row : null,
       nodes: {
         vehicles: step !== "region" && (!placing || walks !== true),
@@ -48,7 +69,8 @@ export function useScene(now: EditorNow): Scene {
       },
       actors,
       flows,
-      goals: placing ? (goals ?? []) : [],
+      // With something else in the hand they would hide the starts.
+      goals: placing && (tool?.goals ?? true) ? (goals ?? []) : [],
       chosenGoal: placing && one?.goal ? (graph.place(one.goal) ?? null) : null,
       route: placing ? route : [],
       hover: pointing ? place : null,
@@ -60,8 +82,12 @@ export function useScene(now: EditorNow): Scene {
     roi,
     shapes,
     stops,
+    ruled,
+    stations,
+    detectors,
     candidates,
     step,
+    tool,
     hover,
     walks,
     badge,

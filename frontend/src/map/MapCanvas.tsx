@@ -19,7 +19,7 @@ import { Minimap } from "./Minimap";
 import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
 import type { Mark, Moving, Scene } from "./scene";
-import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, zoomAt } from "./view";
+import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 
 /** Where the pointer is, in metres, and how far a touch reaches. */
@@ -37,6 +37,8 @@ export interface MapHandle {
   show(bounds: Bounds): void;
   /** Brings a place to the middle, or so many pixels to the left of it. */
   centre(x: number, y: number, aside?: number): void;
+  /** The rectangle that is in sight. */
+  seen(): Bounds;
   /** Acts on the middle, as Enter does. */
   pickMiddle(): void;
 }
@@ -54,7 +56,8 @@ interface Props {
   onPoint?: (at: Pointed | null) => void;
   /** Whether the drag that begins here takes something along instead of moving the map. */
   onGrab?: (at: Pointed) => boolean;
-  onDrop?: (at: Pointed) => void;
+  /** What was taken along is put down; null if it was not moved. */
+  onDrop?: (at: Pointed | null) => void;
   /** A drag with Shift held down has drawn a rectangle. */
   onFrame?: (bounds: Bounds) => void;
   children?: ReactNode;
@@ -163,6 +166,7 @@ export function MapCanvas({
         const scale = Math.max(view.current.scale, 8);
         apply({ x: x + aside / scale, y, scale });
       },
+      seen: () => visible(view.current, size.current),
       pickMiddle: () =>
         onPick?.({
           x: view.current.x,
@@ -278,7 +282,9 @@ export function MapCanvas({
         const held = drag.current;
         drag.current = null;
         setFrame(null);
-        if (!held || event.button !== 0) return;
+        if (!held) return;
+        if (held.does === "carry" && (!held.moved || event.button !== 0)) onDrop?.(null);
+        if (event.button !== 0) return;
         if (!held.moved) onPick?.(pointed(...held.from, event.shiftKey));
         else if (held.does === "carry") onDrop?.(pointed(...local(event), false));
         else if (held.does === "frame") {
@@ -290,6 +296,7 @@ export function MapCanvas({
         }
       }}
       onPointerCancel={() => {
+        if (drag.current?.does === "carry") onDrop?.(null);
         drag.current = null;
         setFrame(null);
       }}

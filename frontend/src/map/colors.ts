@@ -90,10 +90,14 @@ export const CATEGORY_COLOR: Record<Category, string> = {
   pedestrian: "#f2b600",
 };
 export const EGO = "#e03131";
+/** Detectors of the traffic light that is looked at. */
+export const DETECTOR = "#2f6fb5";
 export const MARK_COLOR: Record<MarkKind, string> = {
   collision: "#c92a2a",
   braking: "#b8500b",
   teleported: "#5f3dc4",
+  jam: "#a61e4d",
+  measure: MEASURE,
   rule: "#1864ab",
   met: "#0b7285",
   unmet: "#d9480f",

@@ -2,6 +2,7 @@ import { nth } from "../lists";
 import {
   FLOW,
   GOAL,
+  MARK_COLOR,
   MEASURE,
   type Palette,
   PEDESTRIAN_NODE,
@@ -65,6 +66,39 @@ export function drawRoute(context: CanvasRenderingContext2D, view: View, scene: 
   context.strokeStyle = "#1f9bf0";
   context.lineWidth = Math.max(0.8, 4 / view.scale);
   context.stroke();
+}
+
+/** Lines of rules: with a dot at each point and an arrow head where they end. */
+export function drawLines(context: CanvasRenderingContext2D, view: View, { lines }: Scene): void {
+  context.lineCap = context.lineJoin = "round";
+  for (const { points, strong, arrow } of lines) {
+    if (points.length < 2) continue;
+    context.globalAlpha = strong ? 1 : 0.55;
+    const path = new Path2D();
+    points.forEach(([x, y], n) => (n ? path.lineTo(x, y) : path.moveTo(x, y)));
+    if (arrow) addHead(path, points, 11 / view.scale);
+    context.setLineDash(arrow ? [] : [6 / view.scale, 5 / view.scale]);
+    for (const [color, width] of [
+      ["#ffffff", strong ? 6 : 4],
+      [MARK_COLOR.rule, strong ? 3.5 : 2],
+    ] as const) {
+      context.strokeStyle = color;
+      context.lineWidth = width / view.scale;
+      context.stroke(path);
+    }
+  }
+  context.setLineDash([]);
+  context.globalAlpha = 1;
+}
+
+function addHead(path: Path2D, points: readonly (readonly [number, number])[], size: number): void {
+  const [x, y] = nth(points, points.length - 1);
+  const [x0, y0] = nth(points, points.length - 2);
+  const hdg = Math.atan2(y - y0, x - x0);
+  for (const side of [2.6, -2.6]) {
+    path.moveTo(x, y);
+    path.lineTo(x + size * Math.cos(hdg + side), y + size * Math.sin(hdg + side));
+  }
 }
 
 /** The lane under the pointer, through its places. */
@@ -136,12 +170,50 @@ export function drawFlow(
     context.stroke();
   }
   context.restore();
+  if (flow.selected) brackets(context, [x, y], 20, palette.ink);
   tag(context, `${Math.round(flow.perHour)} per hour`, x, y - 22);
 }
 
+/** Corners around what is selected, so that not only its colour says so. */
+export function brackets(
+  context: CanvasRenderingContext2D,
+  [x, y]: [number, number],
+  half: number,
+  color: string,
+): void {
+  const arm = half * 0.55;
+  for (const [width, stroke] of [
+    [5, "#ffffff"],
+    [2.5, color],
+  ] as const) {
+    context.beginPath();
+    for (const [sx, sy] of [
+      [-1, -1],
+      [1, -1],
+      [1, 1],
+      [-1, 1],
+    ] as const) {
+      context.moveTo(x + sx * half, y + sy * (half - arm));
+      context.lineTo(x + sx * half, y + sy * half);
+      context.lineTo(x + sx * (half - arm), y + sy * half);
+    }
+    context.lineWidth = width;
+    context.strokeStyle = stroke;
+    context.stroke();
+  }
+}
+
+/** Goals that can be had are diamonds, for starts are round; the one that is chosen has a flag. */
 export function drawGoal(context: CanvasRenderingContext2D, [x, y]: [number, number], chosen: boolean): void {
   context.beginPath();
-  context.arc(x, y, chosen ? 13 : 7, 0, 2 * Math.PI);
+  if (chosen) context.arc(x, y, 13, 0, 2 * Math.PI);
+  else {
+    context.moveTo(x, y - 9);
+    context.lineTo(x + 9, y);
+    context.lineTo(x, y + 9);
+    context.lineTo(x - 9, y);
+    context.closePath();
+  }
   context.fillStyle = chosen ? ROI_BASE : GOAL;
   context.fill();
   context.lineWidth = 2.5;
@@ -214,7 +286,7 @@ export function badge(
   context.restore();
 }
 
-/** A round sign with a name below it: orange for measures, dark blue for public transport. */
+/** A round sign with a name below it: orange for measures, dark blue for public transport, blue for rules. */
 export function drawPin(
   context: CanvasRenderingContext2D,
   [x, y]: [number, number],
@@ -224,7 +296,8 @@ export function drawPin(
   const measure = pin.sign === "!" || pin.sign === "off";
   context.beginPath();
   context.arc(x, y, 10, 0, 2 * Math.PI);
-  context.fillStyle = measure ? MEASURE : TRANSIT;
+  context.globalAlpha = pin.rule === "weak" ? 0.7 : 1;
+  context.fillStyle = pin.rule ? MARK_COLOR.rule : measure ? MEASURE : TRANSIT;
   context.fill();
   context.lineWidth = 2;
   context.strokeStyle = "#ffffff";
@@ -234,6 +307,7 @@ export function drawPin(
   context.textBaseline = "middle";
   context.fillStyle = "#ffffff";
   context.fillText(pin.sign, x, y + 0.5);
+  context.globalAlpha = 1;
   if (named) tag(context, pin.text, x, y + 21);
 }
 

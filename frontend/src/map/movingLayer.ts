@@ -180,6 +180,14 @@ const SIGN: Record<MarkKind, (context: CanvasRenderingContext2D) => void> = {
     line(context, -3.5, -1, 0, -5);
     line(context, 3.5, -1, 0, -5);
   },
+  jam: (context) => {
+    line(context, -4, -4, 4, -4);
+    line(context, -4, 0, 4, 0);
+    line(context, -4, 4, 4, 4);
+  },
+  measure: (context) => {
+    line(context, -4.5, 0, 4.5, 0);
+  },
   rule: (context) => {
     line(context, -3, -4, 4, 0);
     line(context, 4, 0, -3, 4);

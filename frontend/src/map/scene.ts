@@ -38,6 +38,26 @@ export interface ScenePin {
   sign: string;
   /** What is written below it. */
   text: string;
+  /** Of a rule: whether it is one that is looked at. */
+  rule?: "strong" | "weak";
+}
+
+/** A line that a rule moves a road user along, or the edge of where one is triggered. */
+export interface SceneLine {
+  points: readonly (readonly [number, number])[];
+  /** Whether it is one that is looked at. */
+  strong: boolean;
+  arrow: boolean;
+}
+
+/** A detector of the traffic light that is looked at. */
+export interface SceneDetector {
+  /** Points along it in driving direction, or where people wait. */
+  place: readonly (readonly [number, number])[];
+  label: string;
+  /** Whether it sees buses only. */
+  bus: boolean;
+  occupied: boolean;
 }
 
 /** Everything of a scenario that is drawn on the map, ready to draw. */
@@ -46,6 +66,8 @@ export interface Scene {
   /** Lanes that measures act on, as rings: x and y in turn. */
   lanes: readonly Float64Array[];
   pins: readonly ScenePin[];
+  lines: readonly SceneLine[];
+  detectors: readonly SceneDetector[];
   hoverSegment: number | null;
   /** Which places are shown when near. */
   nodes: { vehicles: boolean; walks: boolean; inside: ReadonlySet<number> | null };
@@ -65,6 +87,8 @@ export const EMPTY_SCENE: Scene = {
   segments: new Map(),
   lanes: [],
   pins: [],
+  lines: [],
+  detectors: [],
   hoverSegment: null,
   nodes: { vehicles: true, walks: true, inside: null },
   actors: [],
@@ -97,4 +121,4 @@ export interface Mark {
   fresh: boolean;
 }
 
-export type MarkKind = "collision" | "braking" | "teleported" | "rule" | "met" | "unmet";
+export type MarkKind = "collision" | "braking" | "teleported" | "jam" | "measure" | "rule" | "met" | "unmet";

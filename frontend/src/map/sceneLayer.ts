@@ -11,16 +11,19 @@ import {
   ROI_MEMBER,
   VEHICLE_NODE,
 } from "./colors";
+import { detectorNames, drawDetectors } from "./detectorMarks";
 import { nth } from "../lists";
 import { GLYPHS } from "./glyphs";
 import { type Graph, type Place, segmentBounds, strips } from "./graph";
 import {
   badge,
   body,
+  brackets,
   dots,
   drawFlow,
   drawGoal,
   drawLane,
+  drawLines,
   drawOffset,
   drawPin,
   drawRoute,
@@ -46,6 +49,8 @@ const FEW_PINS = 12;
 const ARROW = 26;
 /** No body reaches further from its middle, metres. */
 const ROOM = 12;
+/** Pixels from a detector down to its name. */
+const DETECTOR_NAME = 18;
 const UNUSABLE = "#8b949d";
 
 const SEGMENT: Record<SegmentStyle, { fill: string; alpha: number }> = {
@@ -91,6 +96,8 @@ export class SceneLayer {
       this.drawGraph(context, view, size, scene, palette);
     }
     drawRoute(context, view, scene);
+    drawLines(context, view, scene);
+    drawDetectors(context, view, scene.detectors);
     if (scene.hover && this.graph) drawLane(context, this.graph, scene.hover);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const at = (x: number, y: number): [number, number] => [
@@ -112,6 +119,11 @@ export class SceneLayer {
     }
     const namedPins = view.scale >= NAMED_FROM || scene.pins.length <= FEW_PINS;
     for (const pin of scene.pins) drawPin(context, at(pin.x, pin.y), pin, namedPins);
+    if (view.scale >= NODES_FROM)
+      for (const { x, y, label } of detectorNames(scene.detectors)) {
+        const [px, py] = at(x, y);
+        tag(context, label, px, py + DETECTOR_NAME);
+      }
     for (const flow of scene.flows) drawFlow(context, at(flow.x, flow.y), flow, palette);
     if (scene.hover && scene.hoverText) {
       const [x, y] = at(scene.hover.x, scene.hover.y);
@@ -283,9 +295,11 @@ export class SceneLayer {
       context.fillStyle = actor.problem ? PROBLEM : actor.ego ? EGO : palette.ink;
       context.fill();
     }
+    if (actor.selected) brackets(context, [x, y - lift], radius + 7, palette.ink);
     badge(context, this.glyphs[actor.category], x, y - lift, radius, color, actor.category);
-    if (actor.ego) tag(context, "EGO", x, y - lift - radius - 11);
-    else if (actor.selected && named) tag(context, actor.id, x, y - lift - radius - 11);
+    const top = y - lift - radius - (actor.selected ? 18 : 11);
+    if (actor.ego) tag(context, "EGO", x, top);
+    else if (actor.selected && named) tag(context, actor.id, x, top);
   }
 }
 

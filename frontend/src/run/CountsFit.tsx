@@ -34,7 +34,7 @@ export function CountsFit({
       </Alert>
     );
   if (!value) return <Loader aria-label="Counting" />;
-  const { rows, met, rmse, contradictions } = value;
+  const { rows, met, hours, hours_met, rmse, contradictions } = value;
   const shown = worstFirst(all ? rows : rows.filter((row) => !row.met));
   return (
     <>
@@ -44,7 +44,13 @@ export function CountsFit({
       </Title>
       <Text size="sm" mt={4} mb="sm">
         A count is met if its GEH, the usual measure of how far two numbers of vehicles are apart, is 5 or
-        less. {rmse !== null && <>The mean error is {rmse.toFixed(1)} vehicles (root mean square).</>}
+        less.{" "}
+        {hours > 0 && (
+          <>
+            Of the whole hours that the counts make up, {hours_met} of {hours} are met.{" "}
+          </>
+        )}
+        {rmse !== null && <>The mean error is {rmse.toFixed(1)} vehicles (root mean square).</>}
       </Text>
       <Scatter rows={rows} />
       {contradictions.length > 0 && (

@@ -1,5 +1,5 @@
 import { ActionIcon, Alert, Anchor, Group, Loader, Table, Text, VisuallyHidden } from "@mantine/core";
-import { useCallback, useState } from "react";
+import { useCallback, useEffect, useState } from "react";
 
 import { type RunInfo, runs } from "../api/runs";
 import { IconTrash } from "../ui/icons";
@@ -7,6 +7,9 @@ import { RemovalDialog, type ToRemove } from "../ui/RemovalDialog";
 import { hashOf } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { hasEnded, STATE_WORD, when } from "./figures";
+
+/** How often the list is asked for while a run in it is live, milliseconds. */
+const POLL = 2000;
 
 /** All runs of a scenario, the newest first: watch, read, remove. */
 export function EarlierRuns({
@@ -19,6 +22,12 @@ export function EarlierRuns({
   onRemoved?: (run: string) => void;
 }) {
   const { value, error, reload } = useLoaded(useCallback(() => runs.list(scenario), [scenario]));
+  const live = value?.some((one) => !hasEnded(one.state)) ?? false;
+  useEffect(() => {
+    if (!live) return;
+    const timer = setInterval(reload, POLL);
+    return () => clearInterval(timer);
+  }, [live, reload]);
   const [removing, setRemoving] = useState<ToRemove | null>(null);
   if (error)
     return (

@@ -8,6 +8,8 @@ import { tellError } from "../ui/notices";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { Comparison } from "./Comparison";
+import { Criteria } from "./Criteria";
+import { Egos } from "./Egos";
 import { keyFigures } from "./figures";
 import { Files } from "./Files";
 import { Interrupted, SliceTable } from "./LongRun";
@@ -22,11 +24,14 @@ export function Result({
   scenario,
   onBack,
   onResume,
+  onShow,
 }: {
   info: RunInfo;
   scenario: string;
   onBack: () => void;
   onResume: () => void;
+  /** Shows a second of the run in its recording; null without one. */
+  onShow: ((time: number) => void) | null;
 }) {
   const [busy, setBusy] = useState(false);
   const known = useLoaded(allFigures);
@@ -51,6 +56,8 @@ export function Result({
       </Title>
       {verdict && <Reservations verdict={verdict} />}
       {failed && <Failure info={info} />}
+      {info.summary && <Criteria criteria={info.summary.criteria} onShow={failed ? null : onShow} />}
+      {info.summary && !failed && <Egos run={info.run} />}
       {info.summary && !failed && (
         <dl className="run-figures">
           {keyFigures(info.summary, known.value ?? []).map(({ name, label, definition, value }) => (

@@ -5,11 +5,16 @@ import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { FitRow } from "../api/runs";
 import type { Category } from "../api/types";
-import { signals } from "../api/signals";
+import { type LightProgram, signals } from "../api/signals";
 import { CameraPanel } from "../carla/CameraPanel";
 import { MapCanvas, type MapHandle, type Pointed } from "../map/MapCanvas";
+import { seenInLog } from "../signals/occupancy";
+import { sceneDetectors } from "../signals/sceneDetectors";
 import { SignalPanel } from "../signals/SignalPanel";
+import { useQueues } from "../signals/useQueues";
 import { useRunLights } from "../signals/useSignals";
+import { RunBar } from "../time/RunBar";
+import { useNearest } from "../time/useNearest";
 import { go } from "../ui/address";
 import { CountsFit } from "./CountsFit";
 import { EarlierRuns } from "./EarlierRuns";
@@ -63,13 +68,20 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const { learn: learnLights, learnDetectors, drawn } = lights;
   const [junction, setJunction] = useState<string | null>(null);
   const shownJunction = junction ?? lights.heads?.junctions[0] ?? null;
+  const queues = useQueues({ map, graph: loaded?.graph ?? null, junction: shownJunction, picture });
+  const [program, setProgram] = useState<LightProgram | null>(null);
   // Anew at the end, when there are the calls of detectors.
   const source = useMemo(() => ({ run, complete }), [run, complete]);
   const loadProgram = useCallback((of: string) => signals.ofRun(source.run, of), [source]);
+  const ttc = useNearest(player.replay, crowd);
+  const { learn: learnTtc } = ttc;
   useEffect(() => {
     if (mode !== "live") return;
     const live = new Live(run, {
-      onFrame: show,
+      onFrame: (frame, of) => {
+        show(frame, of);
+        learnTtc(frame, of);
+      },
       onIntroduced: setCrowd,
       onIncidents: add,
       onLights: (changed) => learnLights(changed, latest()?.frame.time ?? 0),
@@ -77,7 +89,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
       onState: learn,
     });
     return () => live.close();
-  }, [run, mode, show, add, learn, learnLights, learnDetectors, latest]);
+  }, [run, mode, show, add, learn, learnTtc, learnLights, learnDetectors, latest]);
   // What has come before the map is drawn with it, so that nothing is missing or flickers.
   useEffect(() => redraw(), [redraw, drawing, loaded]);
   const { turn } = lights;
@@ -104,6 +116,13 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   useEffect(() => {
     handle.current?.setHeads(drawn(time));
   }, [drawn, time, turn, drawing, loaded]);
+  const { occupied } = lights;
+  const second = mode === "replay" ? Math.floor(time) : 0;
+  const scene = useMemo(() => {
+    if (!program) return ground.scene;
+    const on = mode === "live" ? occupied : seenInLog(program.detectors, second)?.on;
+    return { ...ground.scene, detectors: sceneDetectors(program, on) };
+  }, [ground.scene, program, mode, occupied, second]);
   const pick = (at: Pointed): void => {
     const user = picture.near(at);
     const light = user === null ? lights.heads?.junctionAt(at) : null;
@@ -116,6 +135,10 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     handle.current?.setMarks(fit ? countMarks(fit) : marksAt(incidents, time));
   }, [incidents, fit, time, drawing, loaded]);
 
+  const jump = (at: number): void => {
+    player.pause();
+    player.seek(at);
+  };
   const back = (): void => go({ view: "editor", scenario });
   const wrong = failure ?? ground.failure;
   if (wrong) {
@@ -146,7 +169,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               drawing={drawing}
               graph={loaded?.graph ?? null}
               picker={loaded?.picker ?? null}
-              scene={ground.scene}
+              scene={scene}
               handle={handle}
               label={mode === "replay" ? "Recording of the run" : "Live view of the run"}
               onPick={pick}
@@ -157,7 +180,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                     <Loader size={16} aria-hidden="true" />
                     {crowd
                       ? "Preparing, step 2 of 2: starting the simulation …"
-                      : "Preparing, step 1 of 2: planning the routes …"}
+                      : `Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
                   </span>
                 </div>
               ) : (
@@ -198,7 +221,20 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               <Tabs.Tab value="runs">Runs</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="result" className="run-panel">
-              <Result info={info} scenario={scenario} onBack={back} onResume={onResume} />
+              <Result
+                info={info}
+                scenario={scenario}
+                onBack={back}
+                onResume={onResume}
+                onShow={
+                  mode === "replay"
+                    ? (at) => {
+                        player.pause();
+                        player.seek(at);
+                      }
+                    : null
+                }
+              />
             </Tabs.Panel>
             <Tabs.Panel value="charts" className="run-panel">
               <Plots run={run} />
@@ -246,6 +282,8 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                   load={loadProgram}
                   now={lights.now(shownJunction, mode === "replay" ? player.time : now.time)}
                   occupied={mode === "live" && !complete ? lights.occupied : null}
+                  queues={queues}
+                  onShown={setProgram}
                 />
               </Tabs.Panel>
             )}
@@ -261,6 +299,22 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
           </Tabs>
         </aside>
       </div>
+      <RunBar
+        end={Math.max(player.replay?.end ?? 0, info.progress?.until ?? 0) || 60}
+        reached={player.replay?.end ?? now.time}
+        time={mode === "replay" ? player.time : now.time}
+        incidents={incidents}
+        categories={categories}
+        junction={shownJunction}
+        history={shownJunction === null ? null : lights.history(shownJunction)}
+        ttc={ttc}
+        spacing={player.replay?.spacing ?? 0.2}
+        onSeek={player.replay ? jump : null}
+        onShow={({ x, y }) => {
+          follow(null);
+          if (x !== undefined && y !== undefined) handle.current?.centre(x, y);
+        }}
+      />
       {ended && mode !== null ? (
         <ReplayStrip
           player={player}

@@ -1,7 +1,7 @@
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import type { Mark, MarkKind } from "../map/scene";
-import { CATEGORY_WORD } from "../ui/words";
+import { CATEGORY_WORD, count, hoursMinutes } from "../ui/words";
 
 /** Simulated seconds for which something counts as having just happened. */
 const FRESH = 4;
@@ -13,6 +13,10 @@ const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
   emergency_stop: "braking",
   teleport_start: "teleported",
   teleport_end: "teleported",
+  jam_begin: "jam",
+  jam_end: "jam",
+  measure_begin: "measure",
+  measure_end: "measure",
   rule_started: "rule",
   rule_acted: "rule",
   rule_ended: "rule",
@@ -24,6 +28,8 @@ export const MARK_WORD: Record<MarkKind, string> = {
   collision: "Collision",
   braking: "Emergency braking",
   teleported: "Teleported",
+  jam: "Jam",
+  measure: "Measure",
   rule: "Rule",
   met: "Count met",
   unmet: "Count not met",
@@ -45,6 +51,12 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
       return `${who} was gridlocked and teleported`;
     case "teleport_end":
       return `${who} was put back on the road after its teleport`;
+    case "jam_begin":
+      return `A jam${queued(incident)} began at ${who}`;
+    case "jam_end":
+      return `A jam ended${lasted(incident)}`;
+    case "lost":
+      return `${who} did not come back with the saved state`;
     case "stranded":
       return `${who} was stranded: every route to its goal was closed`;
     case "measure_begin":
@@ -62,9 +74,13 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
     case "rule_overridden":
       return `${who} stopped rule ${incident.rule}: ${incident.detail ?? ""}`;
     default:
-      return `${who}: ${incident.kind.replaceAll("_", " ")}`;
+      return [who, incident.kind.replaceAll("_", " ")].filter(Boolean).join(": ");
   }
 }
+
+const queued = ({ queue }: Incident): string => (queue ? ` of ${count(queue, "vehicle")}` : "");
+const lasted = ({ waited }: Incident): string =>
+  waited ? ` after ${waited < 60 ? `${Math.round(waited)} s` : hoursMinutes(waited)}` : "";
 
 function values(incident: Incident): string {
   const known = Object.entries(incident.values ?? {});

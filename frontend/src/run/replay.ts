@@ -24,6 +24,11 @@ export class Replay {
     this.crowd.introduce(columns.actors.map((actor, index) => ({ ...actor, index })));
   }
 
+  /** The recorded moments. */
+  get times(): readonly number[] {
+    return this.columns.times;
+  }
+
   /** All on the road at a time, as a live frame has them; `arrived` is not known. */
   at(time: number): Frame {
     const { times, first, actor, x, y, hdg, speed } = this.columns;

@@ -7,6 +7,7 @@ import { insideRows, segmentsBounds } from "../editor/scene";
 import type { PackedDrawing } from "../map/drawing";
 import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
 import { EMPTY_SCENE, type Scene } from "../map/scene";
+import { learnTitle } from "../ui/titles";
 import { reasonOf } from "../ui/reason";
 import { hasEnded } from "./figures";
 
@@ -85,7 +86,10 @@ export function useGround(name: string | null, scenario: string): Ground {
   }, [name]);
   useEffect(() => {
     api.scenario(scenario).then(
-      ({ document }) => setRoi(document.roi),
+      ({ document }) => {
+        setRoi(document.roi);
+        learnTitle(scenario, document.name);
+      },
       () => setRoi([]),
     );
   }, [scenario]);

@@ -1,14 +1,19 @@
 import "../../../src/odscen/results/report/assets/signals.css";
 import "./signals.css";
 
-import { Alert, CloseButton, Loader, Select, Text } from "@mantine/core";
+import { Alert, CloseButton, Loader, Select, Switch, Text } from "@mantine/core";
 import { type ReactNode, useCallback, useEffect, useRef, useState } from "react";
 
 import type { DayPlan, Detector, LightProgram } from "../api/signals";
 import { timeOfDay } from "../editor/demand";
 import { useLoaded } from "../ui/useLoaded";
 import { cursorAt, type Cursor, type SignalNow } from "./cursor";
+import type { SignalEditing } from "./editing";
 import { seenInLog, seenLive, type Sight } from "./occupancy";
+import { ProgramControl, StageBounds, StageCall, TimingTools, TurnChoices } from "./ProgramTools";
+import type { Queue } from "./queues";
+import { QueueTable } from "./QueueTable";
+import { RingBar } from "./RingBar";
 
 const ORIGIN: Record<LightProgram["origin"], string> = {
   scenario: "the engineer’s, in this scenario",
@@ -30,14 +35,22 @@ interface Props {
   now?: SignalNow | null;
   /** Ids of the detectors that are occupied now, if a run is watched live. */
   occupied?: ReadonlySet<string> | null;
+  /** Who waits before the light in a run. */
+  queues?: readonly Queue[] | null;
+  /** What can be changed; nothing in a run. */
+  editing?: SignalEditing | null;
+  /** Gets what is shown, and null when nothing is. */
+  onShown?: (light: LightProgram | null) => void;
   onClose?: () => void;
 }
 
 /** The program of one traffic light; in a run also what it shows now. */
 export function SignalPanel(props: Props) {
-  const { junctions, junction, onJunction, load, now = null, occupied = null, onClose } = props;
+  const { junctions, junction, onJunction, load, now = null, occupied = null, onShown, onClose } = props;
   const { value, error } = useLoaded(useCallback(() => load(junction), [load, junction]));
   const shown = value?.junctions.includes(junction) ? value : null;
+  useEffect(() => onShown?.(shown), [onShown, shown]);
+  useEffect(() => () => onShown?.(null), [onShown]);
   const region = useRef<HTMLElement>(null);
   // Only where it opens over the map; a tab leaves the focus where it is.
   const opens = onClose !== undefined;
@@ -73,7 +86,16 @@ export function SignalPanel(props: Props) {
       {error ? (
         <Alert color="red">{error}</Alert>
       ) : shown ? (
-        <Program key={junction} light={shown} now={now} occupied={occupied} />
+        <Program
+          key={junction}
+          light={shown}
+          junction={junction}
+          junctions={junctions}
+          now={now}
+          occupied={occupied}
+          queues={props.queues ?? null}
+          editing={props.editing ?? null}
+        />
       ) : (
         <Loader size="sm" aria-label="Loading the program" />
       )}
@@ -83,11 +105,15 @@ export function SignalPanel(props: Props) {
 
 interface ProgramProps {
   light: LightProgram;
+  junction: string;
+  junctions: readonly string[];
   now: SignalNow | null;
   occupied: ReadonlySet<string> | null;
+  queues: readonly Queue[] | null;
+  editing: SignalEditing | null;
 }
 
-function Program({ light, now, occupied }: ProgramProps) {
+function Program({ light, junction, junctions, now, occupied, queues, editing }: ProgramProps) {
   const [chosen, setChosen] = useState<string | null>(null);
   const running = light.plans.find(({ id }) => id === now?.plan);
   const plan = light.plans.find(({ id }) => id === chosen) ?? running ?? light.plans[0];
@@ -112,7 +138,9 @@ function Program({ light, now, occupied }: ProgramProps) {
         />
       )}
       {now && <Now light={light} plan={plan} cursor={cursor} now={now} />}
+      {queues && <QueueTable queues={queues} />}
       <Drawn className="signal-ground" svg={light.ground} />
+      {editing && <Splitting light={light} plan={plan} editing={editing} />}
       <h3>Signal timing plan</h3>
       <TimeBar plan={plan} cursor={cursor} />
       <h3>Stages</h3>
@@ -126,10 +154,20 @@ function Program({ light, now, occupied }: ProgramProps) {
               {stage.on_call && ", on call"}
             </span>
             {cursor?.stage === row && <em>now</em>}
+            {editing && <StageCall light={light} junction={junction} editing={editing} stage={stage.id} />}
           </li>
         ))}
       </ol>
       <Splits plan={plan} />
+      {editing && (
+        <>
+          <h3>Program</h3>
+          <ProgramControl light={light} junction={junction} editing={editing} />
+          <StageBounds junction={junction} editing={editing} />
+          <TurnChoices light={light} junction={junction} editing={editing} />
+          <TimingTools junction={junction} junctions={junctions} editing={editing} />
+        </>
+      )}
       <h3>Junction{light.detectors.length > 0 && " and detectors"}</h3>
       {light.site && <Site light={light} sight={sight} />}
       <Detectors light={light} sight={sight} />
@@ -142,6 +180,35 @@ function Program({ light, now, occupied }: ProgramProps) {
         ))}
       </ul>
       <Groups light={light} />
+    </>
+  );
+}
+
+/** The cycle as a bar that can be dragged. */
+function Splitting({ light, plan, editing }: { light: LightProgram; plan: DayPlan; editing: SignalEditing }) {
+  const [keepCycle, setKeepCycle] = useState(false);
+  const { retime } = editing;
+  // Of plans of the day that which is shown is changed.
+  const named = (editing.timing?.plans.length ?? 0) > 0 ? plan.id : null;
+  return (
+    <>
+      <h3>Greens, cycle and offset</h3>
+      <RingBar
+        plan={plan}
+        keepCycle={keepCycle}
+        onChange={(grip, seconds) => retime(grip, seconds, named, keepCycle)}
+      />
+      <Switch
+        size="xs"
+        label="Keep the cycle: the next stage gives and takes the seconds"
+        checked={keepCycle}
+        onChange={(event) => setKeepCycle(event.currentTarget.checked)}
+      />
+      {light.control === "actuated" && (
+        <Text size="xs" c="dimmed">
+          With actuated control these are the planned greens; detectors and calls change them.
+        </Text>
+      )}
     </>
   );
 }

@@ -56,7 +56,13 @@ function spansOf(plan: DayPlan): Span[] {
 
 /** What one light showed in a recorded run. */
 export class ShownSignal {
-  constructor(private readonly columns: ShownStates) {}
+  /** All that it showed, in order: from `times[i]` on `states[i]`. */
+  readonly history: { times: readonly number[]; states: readonly string[] };
+
+  constructor(private readonly columns: ShownStates) {
+    const { times, shown, states } = columns;
+    this.history = { times, states: shown.map((row) => nth(states, row)) };
+  }
 
   get light(): string {
     return this.columns.light;

@@ -28,6 +28,8 @@ const OF_LETTER: Record<string, Shown> = {
   r: "red",
   R: "red",
 };
+/** What a letter of SUMO's states shows. */
+export const shownOf = (letter: string): Shown => OF_LETTER[letter] ?? "off";
 /** Of several movements of one lane the one that may go most is shown. */
 const RANK: readonly Shown[] = ["green", "permissive", "yellow", "red", "off"];
 
@@ -79,7 +81,7 @@ export class Heads {
 }
 
 function most(letters: readonly number[], state: string): Shown {
-  const shown = letters.map((n) => OF_LETTER[state[n] ?? ""] ?? "off");
+  const shown = letters.map((n) => shownOf(state[n] ?? ""));
   return RANK.find((one) => shown.includes(one)) ?? "off";
 }
 

@@ -11,6 +11,8 @@ export interface RunLights {
   drawn: (time: number) => Head[];
   /** What the light of a junction shows. */
   now: (junction: string, time: number) => SignalNow | null;
+  /** All that the light of a junction has shown so far; of a live run since one began to look. */
+  history: (junction: string) => { times: readonly number[]; states: readonly string[] } | null;
   /** Takes in what has changed in a live run. */
   learn: (lights: Record<string, string>, time: number) => void;
   /** The same of detectors. */
@@ -27,6 +29,7 @@ export interface RunLights {
 export function useRunLights(run: string, map: MapDetails | null, recorded: boolean): RunLights {
   const heads = useMemo(() => map && new Heads(map.lights), [map]);
   const live = useRef(new Map<string, SignalNow>());
+  const seen = useRef(new Map<string, { times: number[]; states: string[] }>());
   const [logged, setLogged] = useState<ReadonlyMap<string, ShownSignal> | null>(null);
   const [turn, setTurn] = useState(0);
   const [occupied, setOccupied] = useState<ReadonlySet<string>>(new Set());
@@ -45,8 +48,13 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
     };
   }, [run, recorded]);
   const learn = useCallback((lights: Record<string, string>, time: number) => {
-    for (const [light, state] of Object.entries(lights))
+    for (const [light, state] of Object.entries(lights)) {
       live.current.set(light, changed(live.current.get(light), state, time));
+      const of = seen.current.get(light) ?? { times: [], states: [] };
+      of.times.push(time);
+      of.states.push(state);
+      seen.current.set(light, of);
+    }
     setTurn((n) => n + 1);
   }, []);
   const learnDetectors = useCallback((detectors: Record<string, boolean>) => {
@@ -78,9 +86,16 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
     },
     [map, nowOf],
   );
+  const history = useCallback(
+    (junction: string) => {
+      const light = map?.lights.find(({ names }) => names.includes(junction))?.id ?? "";
+      return (recorded ? logged?.get(light)?.history : seen.current.get(light)) ?? null;
+    },
+    [map, recorded, logged],
+  );
   const known = recorded ? (logged?.size ?? 0) > 0 : turn > 0;
   return useMemo(
-    () => ({ heads, drawn, now, learn, learnDetectors, occupied, turn, known }),
-    [heads, drawn, now, learn, learnDetectors, occupied, turn, known],
+    () => ({ heads, drawn, now, history, learn, learnDetectors, occupied, turn, known }),
+    [heads, drawn, now, history, learn, learnDetectors, occupied, turn, known],
   );
 }

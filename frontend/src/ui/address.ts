@@ -4,14 +4,20 @@ import { useSyncExternalStore } from "react";
 export type Address =
   | { view: "catalogue" }
   | { view: "editor"; scenario: string }
+  | { view: "imported"; scenario: string }
   | { view: "run"; scenario: string; run: string }
-  | { view: "runs"; scenario: string };
+  | { view: "runs"; scenario: string }
+  | { view: "sweeps"; scenario: string }
+  | { view: "sweep"; scenario: string; sweep: string };
 
 export function parseAddress(hash: string): Address {
   const [view, scenario, run] = hash.replace(/^#\/?/, "").split("/").map(decode);
   if (view === "edit" && scenario) return { view: "editor", scenario };
+  if (view === "imported" && scenario) return { view: "imported", scenario };
   if (view === "run" && scenario && run) return { view: "run", scenario, run };
   if (view === "runs" && scenario) return { view: "runs", scenario };
+  if (view === "sweeps" && scenario) return { view: "sweeps", scenario };
+  if (view === "sweep" && scenario && run) return { view: "sweep", scenario, sweep: run };
   return { view: "catalogue" };
 }
 
@@ -19,8 +25,11 @@ export function parseAddress(hash: string): Address {
 export function hashOf(address: Address): string {
   const enc = encodeURIComponent;
   if (address.view === "editor") return `#/edit/${enc(address.scenario)}`;
+  if (address.view === "imported") return `#/imported/${enc(address.scenario)}`;
   if (address.view === "run") return `#/run/${enc(address.scenario)}/${enc(address.run)}`;
   if (address.view === "runs") return `#/runs/${enc(address.scenario)}`;
+  if (address.view === "sweeps") return `#/sweeps/${enc(address.scenario)}`;
+  if (address.view === "sweep") return `#/sweep/${enc(address.scenario)}/${enc(address.sweep)}`;
   return "#/";
 }
 

@@ -59,6 +59,12 @@ export const IconBack = icon(<path d="m14 6-6 6 6 6" />);
 export const IconWarn = icon(<path d="M12 4 2.500 20h19zM12 10v4m0 3v.01" />);
 export const IconCheck = icon(<path d="m5 12.500 4.500 4.500L19 7.500" />);
 export const IconTour = icon(<path d="M6 21V4m0 1h12l-3 4 3 4H6" />);
+export const IconTarget = icon(
+  <>
+    <circle cx="12" cy="12" r="6" />
+    <path d="M12 2v5m0 10v5M2 12h5m10 0h5" />
+  </>,
+);
 export const IconDown = icon(<path d="M12 4v11m-5-5 5 5 5-5M5 20h14" />);
 export const IconFlow = icon(<path d="m3 6 5 6-5 6M10 6l5 6-5 6M17 6l5 6-5 6" strokeWidth={2.5} />);
 export const IconDice = icon(

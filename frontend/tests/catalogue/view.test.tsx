@@ -36,6 +36,19 @@ test("without maps the example maps are offered", async () => {
 
 const ITEM = { id: "map-1", kind: "map", name: "Town", removed: 1.8e9, until: 1.8e9 + 2_592_000 };
 
+test("the example maps can be added when there are maps already", async () => {
+  const asked = server({
+    "/maps/shipped": { job: "j1" },
+    "/jobs/j1": { job: "j1", state: "done", step: "done", share: 1, result: "a", error: null },
+    "/broken-maps": [],
+    "/scenarios": [],
+    "/maps": [mapInfo("Town", 9)],
+  });
+  const { user } = show(<CatalogueView />);
+  await user.click(await screen.findByRole("button", { name: "Add the example maps" }));
+  expect(asked.some(({ path }) => path === "/api/maps/shipped")).toBe(true);
+});
+
 test("a map is only removed after a question with facts, and the notice undoes it", async () => {
   const asked = server({
     "/removal": { kind: "map", name: "Town", scenarios: 2, runs: 3, live: 1 },

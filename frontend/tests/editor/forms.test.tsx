@@ -8,10 +8,12 @@ import { BackgroundForm } from "../../src/editor/BackgroundForm";
 import { Duration } from "../../src/editor/Duration";
 import { FillForm } from "../../src/editor/FillForm";
 import { FlowForm } from "../../src/editor/FlowForm";
+import { ParkingForm } from "../../src/editor/ParkingForm";
 import { MixForm } from "../../src/editor/MixForm";
 import { Starts } from "../../src/editor/placing";
 import { insideRows } from "../../src/editor/scene";
 import { StartAndGoal } from "../../src/editor/StartAndGoal";
+import { nth } from "../../src/lists";
 import { Picker } from "../../src/map/picking";
 import { actor, assets, flow, graph, place, scenario } from "../example";
 import { choose, fill, show } from "../page";
@@ -62,7 +64,7 @@ test("model and driving style are chosen from lists", async () => {
   ]);
 });
 
-test("a pedestrian has neither driving style nor ego, but may ignore red lights", async () => {
+test("a pedestrian has neither driving style nor ego, but may ignore red lights and cross anywhere", async () => {
   const onEdit = vi.fn();
   const { user } = show(<ActorForm actor={walker} driverSets={[]} assets={assets} onEdit={onEdit} />);
   expect(screen.queryByRole("textbox", { name: "Driving style" })).toBeNull();
@@ -70,6 +72,12 @@ test("a pedestrian has neither driving style nor ego, but may ignore red lights"
   expect(screen.getByRole("textbox", { name: "Walking speed" })).toHaveProperty("value", "5.4 km/h");
   await user.click(screen.getByRole("checkbox", { name: "Ignores red lights" }));
   expect(onEdit).toHaveBeenCalledWith({ kind: "change_actor", actor: "walker", ignores_red: true });
+  await user.click(screen.getByRole("checkbox", { name: "Crosses the road anywhere" }));
+  expect(onEdit).toHaveBeenLastCalledWith({
+    kind: "change_actor",
+    actor: "walker",
+    crosses_anywhere: true,
+  });
 });
 
 test("several road users show what they share and what differs, and change together", async () => {
@@ -167,8 +175,9 @@ test("a random fill says whom it replaces and passes on density and seed", async
 
 test("a new random seed is drawn with a button", async () => {
   const { user } = show(<FillForm actors={0} busy={false} onFill={vi.fn()} />);
-  vi.spyOn(Math, "random").mockReturnValue(0.5);
+  const drawn = vi.spyOn(Math, "random").mockReturnValue(0.5);
   await user.click(screen.getByRole("button", { name: "New random seed" }));
+  drawn.mockRestore();
   expect(screen.getByRole("textbox", { name: "Random seed" })).toHaveProperty("value", "50000");
 });
 
@@ -184,7 +193,7 @@ test("a duration is shown in the unit that fits and committed in seconds", async
 test("start and goal can be set without the map", async () => {
   const document = scenario([car], ["a", "b"]);
   const starts = new Starts(graph, new Picker(graph), insideRows(graph, document.roi), document);
-  const [onStart, onGoal, onShowGoals] = [vi.fn(), vi.fn(), vi.fn()];
+  const [onStart, onGoal, onPickGoal] = [vi.fn(), vi.fn(), vi.fn()];
   const part = (goal: string | null) => (
     <StartAndGoal
       one={{ ...car, goal }}
@@ -193,7 +202,8 @@ test("start and goal can be set without the map", async () => {
       goals={[place("1.0.-1.1")]}
       onStart={onStart}
       onGoal={onGoal}
-      onShowGoals={onShowGoals}
+      onPickGoal={onPickGoal}
+      onVia={vi.fn()}
     />
   );
   const { user, again } = show(part(null));
@@ -207,8 +217,53 @@ test("start and goal can be set without the map", async () => {
   again(part("1.0.-1.1"));
   await user.click(screen.getByRole("button", { name: "Random goal" }));
   expect(onGoal).toHaveBeenLastCalledWith(null);
-  await user.click(screen.getByRole("button", { name: "Show goals" }));
-  expect(onShowGoals).toHaveBeenCalledOnce();
+  await user.click(screen.getByRole("button", { name: "Choose on the map" }));
+  expect(onPickGoal).toHaveBeenCalledOnce();
+});
+
+test("places that a route leads through are named in their order, and each can be taken out", async () => {
+  const document = scenario([car], ["a", "b"]);
+  const starts = new Starts(graph, new Picker(graph), insideRows(graph, document.roi), document);
+  const onVia = vi.fn();
+  const { user } = show(
+    <StartAndGoal
+      one={{ ...car, via: ["1.0.-1.1", "1.0.-1.0", "1.0.-1.1"] }}
+      graph={graph}
+      starts={starts}
+      goals={[place("1.0.-1.1")]}
+      onStart={vi.fn()}
+      onGoal={vi.fn()}
+      onPickGoal={vi.fn()}
+      onVia={onVia}
+    />,
+  );
+  const passed = within(screen.getByRole("group", { name: "Passes" }));
+  const buttons = passed.getAllByRole("button");
+  expect(buttons.map((one) => one.getAttribute("aria-label"))).toEqual([
+    "Do not pass Road 1, right lane 1, 2 m",
+    "Do not pass Road 1, right lane 1, 0 m",
+    "Do not pass Road 1, right lane 1, 2 m",
+  ]);
+  await user.click(nth(buttons, 2));
+  expect(onVia).toHaveBeenCalledWith(["1.0.-1.1", "1.0.-1.0"]);
+});
+
+test("how long parking places are taken is asked in minutes once cars park", async () => {
+  const onEdit = vi.fn();
+  const parking = { begin: 0, end: 0, stay: 3600, within: 300 };
+  const { user, again } = show(<ParkingForm parking={parking} onEdit={onEdit} />);
+  expect(screen.queryByRole("textbox", { name: "A place is taken for" })).toBeNull();
+  again(<ParkingForm parking={{ ...parking, end: 0.3 }} onEdit={onEdit} />);
+  await fill(user, "A place is taken for", "20");
+  await fill(user, "At most away from start or destination, between zones", "150");
+  expect(onEdit.mock.calls.map(([edit]) => edit)).toEqual([
+    { kind: "set_parking", stay: { kind: "constant", value: 1200 } },
+    { kind: "set_parking", within: 150 },
+  ]);
+  const drawn = { kind: "uniform", low: 300, high: 1200 };
+  again(<ParkingForm parking={{ ...parking, end: 0.3, stay: drawn }} onEdit={onEdit} />);
+  const field = screen.getByRole("textbox", { name: "A place is taken for" });
+  expect(field).toHaveProperty("placeholder", "drawn for each trip");
 });
 
 test("a start from which no goal can be reached says so", () => {
@@ -222,7 +277,8 @@ test("a start from which no goal can be reached says so", () => {
       goals={[]}
       onStart={vi.fn()}
       onGoal={vi.fn()}
-      onShowGoals={vi.fn()}
+      onPickGoal={vi.fn()}
+      onVia={vi.fn()}
     />,
   );
   expect(screen.getByText(/No goal can be reached from here/)).toBeTruthy();

@@ -5,6 +5,7 @@ import { changesOf } from "../../src/editor/changes";
 import { handlerFor } from "../../src/editor/handlers";
 import { copyTool } from "../../src/editor/handlers/copy";
 import { flowTool } from "../../src/editor/handlers/flow";
+import { goalTool } from "../../src/editor/handlers/goal";
 import type { Editing, Tool } from "../../src/editor/handlers/handler";
 import { moveTool } from "../../src/editor/handlers/move";
 import { placeTool } from "../../src/editor/handlers/place";
@@ -55,6 +56,8 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
     lights: null,
     showLight: (junction) => log.lights.push(junction),
     changes: changesOf({
+      graph,
+      roi: document.roi,
       ones,
       starts,
       say: (text) => log.said.push(text),
@@ -116,9 +119,22 @@ test("a segment that holds the region together says so before it is clicked", ()
   expect(handler.hint(handler.under(at(4, 0)))).toBeNull();
 });
 
+test("a rectangle in the step of the region adds what lies in it and hangs together", () => {
+  const { log, handler } = using(null, scenario([], []), {}, "region");
+  handler.frame([-1, -1, 1, 1]);
+  handler.frame([50, 50, 60, 60]);
+  expect(log.edits).toEqual([{ kind: "extend_roi", segments: ["a"] }]);
+  expect(log.labels).toEqual(["Add 1 segment"]);
+  expect(log.said).toEqual([
+    "There is nothing to add here: no segment lies in it, or all are in the region.",
+  ]);
+});
+
 test("with no region yet the map says how to begin it", () => {
   const { handler } = using(null, scenario([], []), {}, "region");
-  expect(handler.hint(null)).toBe("Click a road or junction to begin the region");
+  expect(handler.hint(null)).toBe(
+    "Click a road or junction to begin the region, or drag a rectangle with Shift",
+  );
 });
 
 test("in the step of the traffic the map shows ids for tables and a click changes nothing", () => {
@@ -159,14 +175,14 @@ test("a click where nothing can start says why, and without a region leads to it
   expect(without.log.edits).toEqual([]);
 });
 
-test("with a tool in the hand road users can still be selected and goals be set", () => {
+test("with a tool in the hand a click on a goal of the one before places the next one there", () => {
   const one = car("a", FIRST);
   const more = { selection: ["a"], one, goals: [place(SECOND)] };
   const placing = using(placeTool("car"), scenario([one], ["a", "b"]), more);
   placing.handler.pick(at(0, 0));
   expect(placing.log.selected).toEqual([["a"]]);
   placing.handler.pick(at(2.1, 0));
-  expect(placing.log.edits).toEqual([{ kind: "set_goal", actor: "a", goal: SECOND }]);
+  expect(placing.log.edits).toEqual([{ kind: "add_actor", category: "car", spawn: SECOND }]);
 });
 
 test("a tool is used on the next free start by those who do not point", () => {
@@ -254,6 +270,63 @@ test("a goal of the selected one is set by a click on it", () => {
   expect(log.edits).toEqual([{ kind: "change_flow", flow: "f", goal: SECOND }]);
 });
 
+const THIRD = "1.0.-1.2";
+
+test("a goal is chosen among those that are suggested, or anywhere in the region", () => {
+  const one = car("a", FIRST);
+  const more = { selection: ["a"], one, goals: [place(THIRD)] };
+  const { log, handler } = using(goalTool("a"), scenario([one], ["a", "b", "c"]), more);
+  // Within reach of the suggestion it is meant, though another point is nearer.
+  expect(handler.under({ ...at(2.9, 0), reach: 1.5 })).toEqual({
+    is: "place",
+    place: place(THIRD),
+    trial: { spawn: FIRST, goal: THIRD },
+  });
+  const free = handler.under(at(2.1, 0));
+  expect(free).toMatchObject({ place: { id: SECOND }, trial: { spawn: FIRST, goal: SECOND } });
+  expect(handler.hint(free)).toBe("a goes to Road 1, right lane 1, 2 m");
+  handler.pick(at(2.1, 0));
+  expect(log.edits).toEqual([{ kind: "set_goal", actor: "a", goal: SECOND }]);
+  expect(log.done).toBe(1);
+});
+
+test("the start itself is no goal, nor is a point outside the region", () => {
+  const one = car("a", FIRST);
+  const { log, handler } = using(goalTool("a"), scenario([one], ["a"]), { selection: ["a"], one, goals: [] });
+  expect(handler.under(at(0, 0))).toBeNull();
+  handler.pick(at(2, 0));
+  expect(log.edits).toEqual([]);
+  expect(log.said).toEqual(["No goal can be here: it lies on a lane or walkway inside the region."]);
+  expect(log.done).toBe(0);
+});
+
+test("those who do not point take the first goal that is suggested", () => {
+  const log = new Log();
+  const one = car("a", FIRST);
+  const more = { selection: ["a"], one, goals: [place(SECOND), place(THIRD)] };
+  goalTool("a")
+    .handler(editing(scenario([one], ["a", "b"]), log, more))
+    .somewhere();
+  expect(log.edits).toEqual([{ kind: "set_goal", actor: "a", goal: SECOND }]);
+});
+
+test("the flag of the goal is taken along by a drag, with the route as it would be", () => {
+  const one: Actor = { ...car("a", FIRST), goal: THIRD };
+  const more = { selection: ["a"], one, goals: [place(THIRD)] };
+  const { log, handler } = using(null, scenario([one], ["a", "b", "c"]), more);
+  const carried = handler.grab(at(4, 0));
+  expect(carried?.hint).toContain("the goal of a");
+  expect(carried?.under(at(2.2, 0))).toMatchObject({ trial: { spawn: FIRST, goal: SECOND } });
+  carried?.drop(at(2.2, 0));
+  expect(log.edits).toEqual([{ kind: "set_goal", actor: "a", goal: SECOND }]);
+});
+
+test("a road user that is dragged shows the route from where it would start", () => {
+  const one: Actor = { ...car("a", FIRST), goal: THIRD };
+  const { handler } = using(null, scenario([one], ["a", "b", "c"]), { selection: ["a"], one });
+  expect(handler.grab(at(0, 0))?.under(at(2.2, 0))).toMatchObject({ trial: { spawn: SECOND, goal: THIRD } });
+});
+
 test("a rectangle selects all road users and flows in it", () => {
   const { log, handler } = using(null, scenario([car("a", FIRST)], ["a"], [flow("f", SECOND)]));
   handler.frame([-1, -1, 3, 1]);
@@ -300,9 +373,10 @@ test("the same tool is known again, and only one that makes something new clears
     flowTool(true),
     copyTool(["a"]),
     moveTool(["a"]),
+    goalTool("a"),
   ];
   expect(new Set(tools.map(({ key }) => key)).size).toBe(tools.length);
-  expect(tools.map(({ makes }) => makes)).toEqual([true, true, true, true, false, false]);
+  expect(tools.map(({ makes }) => makes)).toEqual([true, true, true, true, false, false, false]);
 });
 
 test("a click on a traffic light shows its program, unless something is placed or stands there", () => {
@@ -358,10 +432,10 @@ function picked(
 }
 
 test("a segment, a lane, a point of it and a node are picked by where the click is", () => {
-  expect(picked("segment", [[2, 0]]).found).toEqual([{ name: "b", s: 0 }]);
-  expect(picked("lane", [[2, 0]]).found).toEqual([{ name: "1.0.-1", s: 2 }]);
-  expect(picked("point", [[4, 0]]).found).toEqual([{ name: "1.0.-1", s: 4 }]);
-  expect(picked("node", [[0, 0]]).found).toEqual([{ name: "1.0.-1.0", s: 0 }]);
+  expect(picked("segment", [[2, 0]]).found).toMatchObject([{ name: "b", s: 0 }]);
+  expect(picked("lane", [[2, 0]]).found).toMatchObject([{ name: "1.0.-1", s: 2 }]);
+  expect(picked("point", [[4, 0]]).found).toMatchObject([{ name: "1.0.-1", s: 4 }]);
+  expect(picked("node", [[0, 0]]).found).toMatchObject([{ name: "1.0.-1.0", s: 0 }]);
 });
 
 test("a node outside the region is not picked, nor a lane where there is none", () => {
@@ -373,5 +447,12 @@ test("a node outside the region is not picked, nor a lane where there is none", 
 
 test("a turn is picked by two roads, one after the other", () => {
   expect(picked("turn", [[0, 0]])).toMatchObject({ begun: ["a"], found: [] });
-  expect(picked("turn", [[4, 0]], {}, "a").found).toEqual([{ name: "a>c", s: 0 }]);
+  expect(picked("turn", [[4, 0]], {}, "a").found).toMatchObject([{ name: "a>c", s: 0 }]);
+});
+
+test("a place may be on a walkway or the ground, and the ground has no name", () => {
+  expect(picked("place", [[4, 0]]).found).toMatchObject([{ name: graph.vehiclePlace(2).id }]);
+  expect(picked("place", [[40, 90.123]]).found).toMatchObject([{ name: "", x: 40, y: 90.12 }]);
+  expect(picked("goal", [[40, 90]]).found).toEqual([]);
+  expect(picked("ground", [[4, 0]]).found).toMatchObject([{ name: "", x: 4, y: 0 }]);
 });

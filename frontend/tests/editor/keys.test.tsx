@@ -16,8 +16,13 @@ function listening() {
     remove: vi.fn(),
     escape: vi.fn(),
     sheet: vi.fn(),
+    find: vi.fn(),
     copy: vi.fn(),
     move: vi.fn(),
+    paste: vi.fn(),
+    goal: vi.fn(),
+    along: vi.fn(),
+    lane: vi.fn(),
     selectAll: vi.fn(),
     tool: vi.fn(),
   } satisfies KeyActions;
@@ -27,11 +32,11 @@ function listening() {
 
 test("shortcuts do what the help says", async () => {
   const { actions, user, unmount } = listening();
-  await user.keyboard("{Control>}zyac{/Control}{Delete}{Escape}?m19");
-  for (const name of ["undo", "redo", "selectAll", "copy", "remove", "escape", "sheet", "move"] as const) {
-    expect(actions[name], name).toHaveBeenCalledOnce();
-  }
-  expect(actions.tool.mock.calls).toEqual([[0], [8]]);
+  await user.keyboard("{Control>}zyacvk{/Control}{Delete}{Escape}?mgl,.19");
+  const { tool, along, ...others } = actions;
+  for (const [name, act] of Object.entries(others)) expect(act, name).toHaveBeenCalledOnce();
+  expect(along.mock.calls).toEqual([[-1], [1]]);
+  expect(tool.mock.calls).toEqual([[0], [8]]);
   unmount();
 });
 

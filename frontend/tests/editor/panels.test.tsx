@@ -1,5 +1,6 @@
 // @vitest-environment happy-dom
 import { screen, within } from "@testing-library/react";
+import { type ComponentProps, useState } from "react";
 import { expect, test, vi } from "vitest";
 
 import type { Actor, Edit, ScenarioDocument } from "../../src/api/types";
@@ -22,9 +23,17 @@ import { choose, fill, rowsOf, server, show } from "../page";
 
 const table = () => screen.getByRole("table");
 
+function Table(props: Omit<ComponentProps<typeof RoadUserTable>, "head" | "open" | "onOpen">) {
+  const [open, setOpen] = useState(true);
+  return <RoadUserTable head={null} open={open} onOpen={setOpen} {...props} />;
+}
+
 function listed(ones: Parameters<typeof RoadUserTable>[0]["ones"], selection: string[] = []) {
   const calls = { onSelect: vi.fn(), onSelectAll: vi.fn(), onRemove: vi.fn() };
-  return { ...show(<RoadUserTable ones={ones} graph={graph} selection={selection} {...calls} />), ...calls };
+  return {
+    ...show(<Table ones={ones} graph={graph} selection={selection} place="actors" {...calls} />),
+    ...calls,
+  };
 }
 
 test("the table has a row for each road user and flow, in the words of the page", () => {
@@ -107,6 +116,34 @@ test("a long table can be searched, and only what is found is selected with all"
   expect(screen.getByText("No road user matches “bus?”.")).toBeTruthy();
 });
 
+test("the table is there without road users, is as high, and can be hidden", async () => {
+  const { user } = listed([]);
+  expect(screen.getByText("No road users yet.")).toBeTruthy();
+  const dock = document.querySelector(".table-dock");
+  expect(dock?.getAttribute("data-open")).toBe("true");
+  await user.click(screen.getByRole("button", { name: "Hide the table" }));
+  expect(screen.queryByRole("table")).toBeNull();
+  await user.click(screen.getByRole("button", { name: "Show the table" }));
+  expect(screen.getByRole("table")).toBeTruthy();
+});
+
+test("a search of the table ends with the step, and when there is nothing left to search", async () => {
+  const calls = { onSelect: vi.fn(), onSelectAll: vi.fn(), onRemove: vi.fn() };
+  const many = Array.from({ length: 9 }, (_, n) => actor(`car-${n}`));
+  const part = (ones: Actor[], place: string) => (
+    <Table ones={ones} graph={graph} selection={[]} place={place} {...calls} />
+  );
+  const { user, again } = show(part(many, "actors"));
+  const search = () => screen.getByRole("textbox", { name: "Search the table of road users" });
+  await user.type(search(), "car-3");
+  expect(rowsOf(table())).toHaveLength(1);
+  again(part(many, "run"));
+  expect(rowsOf(table())).toHaveLength(9);
+  await user.type(search(), "car-3");
+  again(part(many.slice(1), "run"));
+  expect(rowsOf(table())).toHaveLength(8);
+});
+
 test("only the open step shows its form; every step can be opened at any time", async () => {
   const text = (title: string, done: boolean): StepText => ({
     title,
@@ -128,6 +165,9 @@ test("only the open step shows its form; every step can be opened at any time", 
         transit: text("Public transport", false),
         measures: text("Measures", false),
         rules: text("Rules", false),
+        parameters: text("Parameters", false),
+        study: text("Study", false),
+        criteria: text("Criteria", false),
         run: text("Run", false),
       }}
     />,
@@ -142,7 +182,7 @@ test("problems are listed with errors first, and each leads to its place", async
   const warning = { ...problem("demand"), severity: "warning" as const, message: "too many trips" };
   const error = { ...problem("actors[0].goal"), message: "no route" };
   const onShow = vi.fn();
-  const { user } = show(<Problems problems={[warning, error]} onShow={onShow} />);
+  const { user } = show(<Problems graph={graph} problems={[warning, error]} onShow={onShow} />);
   expect(screen.getByRole("status").textContent).toBe("2 problems found");
   expect(screen.getAllByRole("button").map((one) => one.textContent)).toEqual(["no route", "too many trips"]);
   expect(screen.getByRole("img", { name: "Must be solved" })).toBeTruthy();
@@ -150,13 +190,34 @@ test("problems are listed with errors first, and each leads to its place", async
   expect(onShow).toHaveBeenCalledWith(error);
 });
 
-test("of very many problems the first are listed; without any there is no list", () => {
+test("of very many problems the first are listed; without any there is no list", async () => {
   const many = Array.from({ length: 60 }, (_, n) => ({ ...problem(`actors[${n}]`), message: `no ${n}` }));
-  const { again } = show(<Problems problems={many} onShow={vi.fn()} />);
-  expect(screen.getAllByRole("button")).toHaveLength(50);
+  const { user, again } = show(<Problems graph={graph} problems={many} onShow={vi.fn()} />);
+  await user.click(screen.getByRole("button", { expanded: false }));
+  expect(screen.getAllByRole("button")).toHaveLength(1 + 50);
   expect(screen.getByText("and 10 more")).toBeTruthy();
-  again(<Problems problems={[]} onShow={vi.fn()} />);
+  again(<Problems graph={graph} problems={[]} onShow={vi.fn()} />);
   expect(screen.queryByRole("region", { name: "Problems" })).toBeNull();
+});
+
+test("problems of many are one line that opens, and places are named as everywhere", async () => {
+  const spawn = "1.0.-1.1";
+  const many = Array.from({ length: 112 }, (_, n) => ({
+    ...problem(`actors[${n}].spawn`, [spawn]),
+    code: "tight_curve",
+    message: `car-${n} starts on '${spawn}'`,
+  }));
+  const other = { ...problem("demand"), code: "y", message: "no trips" };
+  const onShow = vi.fn();
+  const { user } = show(<Problems graph={graph} problems={[...many, other]} onShow={onShow} />);
+  expect(screen.getByRole("status").textContent).toBe("113 problems found");
+  expect(screen.getAllByRole("button").map((one) => one.textContent)).toEqual([
+    "112 times: a long vehicle starts in a tight curve",
+    "no trips",
+  ]);
+  await user.click(screen.getByRole("button", { name: /112 times/ }));
+  await user.click(screen.getByRole("button", { name: /car-7 starts on Road 1, right lane 1, 2 m/ }));
+  expect(onShow).toHaveBeenCalledWith(many[7]);
 });
 
 test("neighbours of the region are offered once they are known, and only if there are some", async () => {
@@ -167,6 +228,8 @@ test("neighbours of the region are offered once they are known, and only if ther
       region={{ inside: ["a"], removable: ["a"], candidates, current }}
       onNext={vi.fn()}
       onAll={onAll}
+      onWhole={vi.fn()}
+      onSeen={vi.fn()}
       onBegin={vi.fn()}
       onShow={vi.fn()}
     />
@@ -188,6 +251,8 @@ test("a region is begun by a click on the map, or with what is in its middle", a
       region={{ inside: [], removable: [], candidates: [], current: true }}
       onNext={vi.fn()}
       onAll={vi.fn()}
+      onWhole={vi.fn()}
+      onSeen={vi.fn()}
       onBegin={onBegin}
       onShow={vi.fn()}
     />,
@@ -428,13 +493,24 @@ test("a table that is refused lists every reason, and one that is imported says 
 
 test("the tour has three cards and ends with the last", async () => {
   const onClose = vi.fn();
-  const { user } = show(<Tour onClose={onClose} />);
+  const { user } = show(<Tour step="map" onClose={onClose} />);
   expect(screen.queryByRole("button", { name: "Back" })).toBeNull();
   await user.click(screen.getByRole("button", { name: "Next" }));
   await user.click(screen.getByRole("button", { name: "Next" }));
   expect(screen.getByText("3. Run it")).toBeTruthy();
   await user.click(screen.getByRole("button", { name: "Done" }));
   expect(onClose).toHaveBeenCalledOnce();
+});
+
+test("the tour follows the steps that are opened", () => {
+  const { again } = show(<Tour step="region" onClose={vi.fn()} />);
+  expect(screen.getByText("1. Choose where")).toBeTruthy();
+  again(<Tour step="actors" onClose={vi.fn()} />);
+  expect(screen.getByText("2. Choose who")).toBeTruthy();
+  again(<Tour step="traffic" onClose={vi.fn()} />);
+  expect(screen.getByText("2. Choose who")).toBeTruthy();
+  again(<Tour step="run" onClose={vi.fn()} />);
+  expect(screen.getByText("3. Run it")).toBeTruthy();
 });
 
 test("the help has the shortcuts and explains the terms of the page, each once", async () => {

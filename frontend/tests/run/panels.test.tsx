@@ -5,7 +5,9 @@ import { expect, test, vi } from "vitest";
 import type { FitRow, Incident, RunInfo, RunProgress, RunState } from "../../src/api/runs";
 import { CarlaChoice } from "../../src/carla/CarlaChoice";
 import { Chart } from "../../src/run/Chart";
+import { Criteria } from "../../src/run/Criteria";
 import { CountsFit } from "../../src/run/CountsFit";
+import { Egos } from "../../src/run/Egos";
 import { EarlierRuns } from "../../src/run/EarlierRuns";
 import { IncidentLog } from "../../src/run/IncidentLog";
 import { Legend } from "../../src/run/Legend";
@@ -24,6 +26,7 @@ const info = (state: RunState, more: Partial<RunInfo> = {}): RunInfo => ({
   speed: 1,
   progress: null,
   summary: null,
+  preparing: null,
   error: null,
   finished: null,
   carla: false,
@@ -115,6 +118,53 @@ test("what is saved of a long run is said while it runs", () => {
   expect(screen.queryByRole("status")).toBeNull();
 });
 
+test("the result says what became of the ego, and nothing where there is none", async () => {
+  const ego = {
+    travel_time: null,
+    delay: null,
+    mean_speed: null,
+    collisions: 0,
+    emergency_stops: 0,
+    teleports: 0,
+  };
+  server({
+    "/r1/egos": {
+      egos: [
+        { ...ego, id: "car-1", status: "arrived", travel_time: 41.24, delay: 6, mean_speed: 10 },
+        { ...ego, id: "car-2", status: "running", collisions: 1, emergency_stops: 2 },
+      ],
+    },
+    "/r2/egos": { egos: [] },
+  });
+  const { again } = show(<Egos run="r1" />);
+  const said = await screen.findByRole("region", { name: "Ego" });
+  expect([...said.querySelectorAll("p")].map((one) => one.textContent)).toEqual([
+    "car-1 reached its goal, in 41.2 s, 6.0 s of it delay, 36 km/h on average: no incident.",
+    "car-2 was still on its way at the end: 1 collision, 2 emergency brakings.",
+  ]);
+  again(<Egos key="r2" run="r2" />);
+  await Promise.resolve();
+  expect(screen.queryByRole("region", { name: "Ego" })).toBeNull();
+});
+
+test("a run that ends while the list is open does not stay live in it", async () => {
+  vi.useFakeTimers({ toFake: ["setInterval", "clearInterval"] });
+  try {
+    const answers: Record<string, unknown> = { "/runs?": [info("running")] };
+    const asked = server(answers);
+    show(<EarlierRuns scenario="s" />);
+    expect(await screen.findByText("Running")).toBeTruthy();
+    answers["/runs?"] = [info("completed", { finished: 1.8e9 })];
+    vi.advanceTimersByTime(2000);
+    expect(await screen.findByText("Finished")).toBeTruthy();
+    const before = asked.length;
+    vi.advanceTimersByTime(20_000);
+    expect(asked).toHaveLength(before);
+  } finally {
+    vi.useRealTimers();
+  }
+});
+
 test("earlier runs are listed newest first, and those that were interrupted can be resumed", async () => {
   const asked = server({
     "/removal": { kind: "run", name: "s-1", scenarios: 0, runs: 0, live: 0 },
@@ -140,10 +190,16 @@ test("the figures of a run have the labels, units and definitions of the server'
   const delay = FIGURES.map((one) =>
     one.name === "mean_delay" ? { ...one, definition: "Time lost per trip." } : one,
   );
-  server({ "/figures": delay, "/runs/r1/files": [], "/runs": [] });
+  server({ "/figures": delay, "/r1/egos": { egos: [] }, "/runs/r1/files": [], "/runs": [] });
   const known = summary({ figures: { mean_speed: 10, mean_delay: 75 } }, { planned: 4, arrived: 3 });
   show(
-    <Result info={info("completed", { summary: known })} scenario="s" onBack={vi.fn()} onResume={vi.fn()} />,
+    <Result
+      info={info("completed", { summary: known })}
+      scenario="s"
+      onBack={vi.fn()}
+      onResume={vi.fn()}
+      onShow={null}
+    />,
   );
   const term = await screen.findByText("Mean delay");
   expect(screen.getAllByRole("term").map((one) => one.textContent)).toEqual([
@@ -167,6 +223,7 @@ test("a failed run shows the messages of the simulator", () => {
       scenario="s"
       onBack={vi.fn()}
       onResume={vi.fn()}
+      onShow={null}
     />,
   );
   expect(screen.getByRole("heading", { name: "The run failed" })).toBeTruthy();
@@ -215,6 +272,8 @@ test("counts that are not met are listed worst first with their count station", 
     "/runs/r1/fit": {
       rows: [row("r1", 6), row("r2", 1), row("r3>j4", 9)],
       met: 1,
+      hours: 0,
+      hours_met: 0,
       rmse: 2,
       contradictions: [],
     },
@@ -230,6 +289,49 @@ test("counts that are not met are listed worst first with their count station", 
   expect(onShow).toHaveBeenCalledWith(1, 2);
   await user.click(screen.getByRole("button", { name: "Show all counts" }));
   expect(rowsOf(screen.getByRole("table", { name: "All counts" }))).toHaveLength(3);
+});
+
+test("criteria say whether they are met, their values, and lead to their moments", async () => {
+  const onShow = vi.fn();
+  const { user } = show(
+    <Criteria
+      criteria={[
+        {
+          criterion: "collided == 0",
+          words: "In collisions: exactly 0",
+          value: 0,
+          unit: "",
+          passed: true,
+          time: null,
+        },
+        {
+          criterion: "min_ttc(ego) >= 1.5 s",
+          words: "TTC of ego: at least 1.5 s",
+          value: 0.5249,
+          unit: "s",
+          passed: false,
+          time: 12,
+        },
+        {
+          criterion: "min_pet(ego) >= 1 s",
+          words: "PET of ego: at least 1 s",
+          value: null,
+          unit: "s",
+          passed: true,
+          time: null,
+        },
+      ]}
+      onShow={onShow}
+    />,
+  );
+  expect(screen.getByRole("heading", { name: "1 of 3 criteria not met" })).toBeTruthy();
+  expect(screen.getAllByRole("listitem").map((one) => one.textContent)).toEqual([
+    "Met: In collisions: exactly 0, is 0",
+    "Not met: TTC of ego: at least 1.5 s, is 0.52 s0:12.0",
+    "Met: PET of ego: at least 1 s (not measured)",
+  ]);
+  await user.click(screen.getByRole("button", { name: "Show TTC of ego: at least 1.5 s at 0:12.0" }));
+  expect(onShow).toHaveBeenCalledWith(12);
 });
 
 test("the legend has only what can be in the picture", () => {
@@ -276,13 +378,14 @@ test.each([
 });
 
 test("a gridlocked run is not simply finished: the result opens with why it is not usable", () => {
-  server({ "/figures": FIGURES, "/runs": [] });
+  server({ "/figures": FIGURES, "/r1/egos": { egos: [] }, "/runs": [] });
   show(
     <Result
       info={info("completed", { summary: GRIDLOCKED })}
       scenario="s"
       onBack={vi.fn()}
       onResume={vi.fn()}
+      onShow={null}
     />,
   );
   expect(screen.getByRole("heading", { level: 2 }).textContent).toBe("The run is finished: not usable");

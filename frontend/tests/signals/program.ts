@@ -59,6 +59,7 @@ export const detector = (id: string, more: Partial<Detector> = {}): Detector => 
   length: 2,
   gap: 3,
   calls: [],
+  place: [],
   ...more,
 });
 
@@ -73,6 +74,7 @@ export const program = (more: Partial<LightProgram> = {}): LightProgram => ({
   ],
   plans: [plan],
   detectors: [],
+  turns: [],
   site: picture,
   ground: "",
   legend: [{ picture, words: "green" }],

@@ -18,7 +18,7 @@ from odscen.app.resumed_runs import resume
 from odscen.app.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import SUFFIX, read_scenario
 from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
-from odscen.carla.served_run import ServedJob, run_served
+from odscen.carla.served.served_run import ServedJob, run_served
 from odscen.results.records.run_records import Plan
 from odscen.scenario.document.json_form import dumps
 from odscen.sumo.folder import layout
@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from odscen.app.runs import CheckedRun
-    from odscen.carla.client import Address
+    from odscen.carla.server.client import Address
+    from odscen.results.records.assignment_steps import AssignmentStep
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run
     from odscen.web.wire.run_messages import GoOn, NewRun, RunControl
@@ -218,6 +219,7 @@ class Runs:
             error=active.error,
             finished=self.kept.end_time(run) if over else None,
             slices=self.kept.slices(run),
+            preparing=active.preparing if active.state == "preparing" else None,
         )
 
     def rows(self, *, scenario: str | None = None) -> list[RunInfo]:
@@ -299,7 +301,10 @@ class Runs:
     def _simulate(
         self, active: Active, run: CheckedRun, wish: NewRun
     ) -> tuple[RunState, str | None]:
-        prepared = prepare_run(run)
+        def iterated(step: AssignmentStep) -> None:
+            active.preparing = step.words
+
+        prepared = prepare_run(run, iterated=iterated)
         active.prepared(prepared.plan)
         if wish.carla:
             return self._mirror(active, prepared.plan, run.settings, wish)
@@ -317,7 +322,10 @@ class Runs:
         def ended() -> None:
             active.finishing = True
 
-        failed = large.follow(active.id, prepared=prepared, ended=ended)
+        def preparing(words: str) -> None:
+            active.preparing = words
+
+        failed = large.follow(active.id, preparing=preparing, prepared=prepared, ended=ended)
         if failed is not None:
             return "failed", failed
         info = self.kept.info(active.id)

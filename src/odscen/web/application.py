@@ -15,7 +15,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from odscen.base.version import __version__
-from odscen.carla.client import Address
+from odscen.carla.server.client import Address
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.web import (
     carla_routes,
@@ -29,10 +29,12 @@ from odscen.web import (
     signal_routes,
 )
 from odscen.web.error_answers import RESPONSES, add_error_handlers, error_response
+from odscen.web.exchange import exchange_routes
 from odscen.web.large.large_documents import LARGE
 from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
 from odscen.web.services import Services, Shared
+from odscen.web.sweeps import sweep_routes
 from odscen.web.wire.live_messages import LiveMessage
 from odscen.workspace.child_process import keep_ready
 
@@ -50,6 +52,7 @@ _PACKED = (
     *DEFAULT_EXCLUDED_CONTENT_TYPES,
     "application/octet-stream",
     "application/vnd.apache.parquet",
+    "application/zip",
     "multipart/x-mixed-replace",
 )
 """What is not compressed: it is already, or has to go out picture by picture."""
@@ -126,6 +129,7 @@ def create_app(
         scenario_routes,
         demand_routes,
         run_routes,
+        sweep_routes,
         signal_routes,
         result_routes,
         figure_routes,
@@ -134,6 +138,8 @@ def create_app(
     ):
         app.include_router(routes.router)
     app.include_router(scenario_routes.templates)
+    app.include_router(exchange_routes.router)
+    app.include_router(exchange_routes.exports)
 
     @app.get("/api", include_in_schema=False)
     @app.get("/api/{path:path}", include_in_schema=False)

@@ -6,11 +6,11 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from odscen.carla.served_run import probe
+from odscen.carla.served.served_run import probe
 
 if TYPE_CHECKING:
-    from odscen.carla.client import Address
-    from odscen.carla.served_run import Found
+    from odscen.carla.served.served_run import Found
+    from odscen.carla.server.client import Address
 
 FRESH = 10.0
 """Wall seconds that an answer is good for, while the port is as it was."""

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, File, Form, UploadFile
 
 from odscen.app import demands
+from odscen.app.sized_demand import sized
 from odscen.base.errors import InputError
 from odscen.scenario.document.document_parts import Identifier
 from odscen.scenario.document.scenario_document import Scenario
@@ -68,12 +69,16 @@ def entries(name: str, shared: Shared) -> list[EntryPlace]:
 
 @router.post("/day")
 def day(name: str, wish: WholeDay, shared: Shared) -> DayMade:
-    """Give a scenario 24 hours of traffic on its whole map; takes seconds."""
+    """Give a scenario 24 hours of traffic on its whole map; takes seconds, with a trial minutes."""
     scenario = shared.drafts.get(name).scenario
     # Made before the drafts are locked; a change meanwhile is another version, and refused.
     made, load = demands.with_whole_day(
         shared.map_of(scenario), scenario, trips=wish.trips, day=wish.day
     )
+    found = None
+    if wish.trial:
+        made, sizing = sized(shared.workspace, made, only=wish.day)
+        load, found = load.times(sizing.share), sizing.words
     label = f"A {wish.day} of the whole town"
     draft = shared.drafts.change(name, wish.version, label, lambda _: made)
-    return DayMade(scenario=state_of(shared, draft), **load._asdict())
+    return DayMade(scenario=state_of(shared, draft), found=found, **load._asdict())

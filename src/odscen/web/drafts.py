@@ -23,7 +23,7 @@ from odscen.base.errors import (
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
-from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.json_form import dumps, loads
 from odscen.web import history
 from odscen.web.history import History
 from odscen.web.messages import ScenarioRow
@@ -150,6 +150,8 @@ class Drafts:
             old = self._of_version(name, version)
             scenario = edit(old.scenario)
             text = dumps(scenario)
+            if scenario.formulas:  # one whose number was set to another is no formula any more
+                scenario = loads(text)
             new = history.grown(old.history, text, self._history(name), label=label)
             return self._save(Draft(name, scenario, new), text)
 
@@ -174,6 +176,18 @@ class Drafts:
             del self._open[name]
             self._open[new] = replace(draft, name=new)
             return self._open[new]
+
+    def keep(self, name: str, file: str, text: str) -> None:
+        """Keep a file beside the history of a scenario; it goes where the scenario goes."""
+        with self._lock, disk_errors("scenarios"):
+            write_text(self._history(name) / file, text)
+
+    def kept(self, name: str, file: str) -> str | None:
+        """What was kept under that name; ``None`` if nothing was, or there is no scenario."""
+        try:
+            return (self._history(name) / file).read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return None
 
     def remove(self, name: str) -> RemovedItem:
         """Move a scenario and its history into the wastebasket."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
+from odscen.results.judging.actor_measures import ACTOR_MEASURES
 from odscen.results.measures.figure import Better, SummaryPart
 from odscen.results.measures.registry import RUN_FIGURES
 from odscen.web.messages import Answer
@@ -32,6 +33,24 @@ class FigureInfo(Answer):
     better: Better
     on_page: bool
     display: FigureDisplay
+
+
+class ActorMeasureInfo(Answer):
+    """What a criterion can ask of one actor."""
+
+    name: str
+    unit: str
+    label: str
+    definition: str
+
+
+@router.get("/actors")
+def actor_measures() -> list[ActorMeasureInfo]:
+    """All measures of single actors, in the order in which they are offered."""
+    return [
+        ActorMeasureInfo(name=one.name, unit=one.unit, label=one.label, definition=one.definition)
+        for one in ACTOR_MEASURES
+    ]
 
 
 @router.get("")

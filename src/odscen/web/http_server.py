@@ -17,7 +17,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from odscen.base.errors import InputError, WorkspaceError
-from odscen.carla.client import Address
+from odscen.carla.server.client import Address
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK, check_token
 from odscen.workspace.wastebasket import Wastebasket

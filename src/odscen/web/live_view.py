@@ -57,6 +57,8 @@ class Active:
         Whether a CARLA server shows it too.
     interrupted
         Whether its user has interrupted it, to go on later.
+    preparing
+        How far its routes have been found, in words.
     """
 
     id: str
@@ -68,6 +70,7 @@ class Active:
     finishing: bool = False
     carla: bool = False
     interrupted: bool = False
+    preparing: str | None = None
     error: str | None = None
     ended: RunState | None = None
     future: Future[None] = field(default_factory=Future)

@@ -240,7 +240,7 @@ class DayMade(Answer):
     """A scenario that was given a day of traffic, and what that asks of the busiest junction.
 
     ``volume`` and ``capacity`` are vehicles per hour at ``place`` in the busiest hour, in which
-    ``peak_trips`` set out.
+    ``peak_trips`` depart. ``found`` says what was tried by runs, and is null without a trial.
     """
 
     scenario: ScenarioState
@@ -249,11 +249,16 @@ class DayMade(Answer):
     place: str
     volume: float
     capacity: float
+    found: str | None
 
 
 class WholeDay(RequestBody):
-    """Give a scenario a day of traffic on its whole map."""
+    """Give a scenario a day of traffic on its whole map.
+
+    With a ``trial``, its busiest hour is run, and there are as many trips as it carries.
+    """
 
     version: Version
     day: Literal["weekday", "weekend"] = "weekday"
     trips: Annotated[float, Field(ge=1, le=1e6)] = 51_000.0
+    trial: bool = True

@@ -47,6 +47,8 @@ def fit(run: str, shared: Shared) -> RunFit:
     return RunFit(
         rows=rows,
         met=sum(row.met for row in found.rows),
+        hours=len(found.hours),
+        hours_met=sum(one.met for one in found.hours),
         rmse=found.rmse,
         contradictions=list(found.contradictions),
     )

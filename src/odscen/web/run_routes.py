@@ -27,6 +27,7 @@ from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.services import Shared
 from odscen.web.wire.media_types import HTML
 from odscen.web.wire.run_messages import (
+    EgoOutcome,
     GoOn,
     IncidentInfo,
     NewRun,
@@ -36,6 +37,7 @@ from odscen.web.wire.run_messages import (
     RunControl,
     RunCurve,
     RunCurves,
+    RunEgos,
     RunEvents,
     RunForecast,
     RunInfo,
@@ -148,6 +150,16 @@ def events(run: str, shared: Shared) -> RunEvents:
         ]
         rows = [IncidentInfo(**row) for row in found[:MOST_EVENTS]]
     return RunEvents(events=rows, left_off=max(0, len(found) - MOST_EVENTS))
+
+
+@router.get("/{run}/egos")
+def egos(run: str, shared: Shared) -> RunEgos:
+    """What became of the vehicles under test of a finished run."""
+    path = _kept(shared, run, layout.ACTORS_FILE)
+    with _named(path.parent):
+        found = [one for one in actors_from_json(_text(path)) if one.ego]
+    names = EgoOutcome.model_fields
+    return RunEgos(egos=[EgoOutcome(**{n: getattr(one, n) for n in names}) for one in found])
 
 
 @router.get("/{run}/curves")

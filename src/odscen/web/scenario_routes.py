@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
+import orjson
 from fastapi import APIRouter, File, Form, UploadFile
+from starlette.requests import Request
 from starlette.responses import Response
 
 from odscen.app.maps import load_map
@@ -15,6 +18,7 @@ from odscen.app.variants import apply_edit
 from odscen.base.categories import Category
 from odscen.base.errors import InputError, NotFoundError
 from odscen.lanegraph.shortest_paths import Router
+from odscen.results.judging.criteria import criteria_problems
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.problems import Problem
@@ -26,6 +30,7 @@ from odscen.scenario.placing.region import NodePlace as GraphPlace
 from odscen.scenario.placing.region import name_of, place_of
 from odscen.scenario.templates.template_registry import TEMPLATES
 from odscen.sumo.realize.road_user import RoadUser
+from odscen.sumo.realize.road_users.planned_positions import planned_positions
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.runner.network_fit import place_fit
 from odscen.web.edit_requests import EditRequest
@@ -44,12 +49,15 @@ from odscen.web.messages import (
     TemplateInfo,
     TemplateNumber,
 )
+from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.services import Services, Shared, region_of
 from odscen.web.wire.media_types import Responses
+from odscen.web.wire.plan_messages import PlannedColumns
 from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
     from odscen.scenario.placing.region import Region
+    from odscen.sumo.realize.road_users.planned_positions import PlannedPositions
     from odscen.web.drafts import Draft
 
 router = APIRouter(prefix="/api/scenarios", route_class=LargeDocumentRoute)
@@ -214,6 +222,40 @@ def path(name: str, spawn: str, goal: str, shared: Shared) -> Path:
     )
 
 
+@router.get("/{name}/plan", response_model=PlannedColumns, responses=UNCHANGED)
+def plan(name: str, request: Request, shared: Shared) -> Response:
+    """Where road users are planned to be, each alone on the road; see ``docs/server.md``."""
+    scenario = shared.drafts.get(name).scenario
+    sumo, assets = shared.map_of(scenario).sumo, shared.workspace.assets()
+    with shared.search:
+        found = planned_positions(scenario, sumo, _region(shared, scenario), assets)
+    return answer(request, pack(orjson.dumps(_columns(found), option=orjson.OPT_SERIALIZE_NUMPY)))
+
+
+def _columns(found: PlannedPositions) -> dict[str, object]:
+    """Times to 1/100 s, places to the centimetre, headings to 1e-3 rad, which no screen shows."""
+    return {
+        "users": [
+            {
+                "id": user.id,
+                "category": user.category,
+                "length": body.length,
+                "width": body.width,
+                "ego": user.design.ego,
+                "flow": user.flow,
+            }
+            for user, body in zip(found.users, found.bodies, strict=True)
+        ],
+        "first": found.first,
+        "time": np.round(found.time, 2),
+        "x": np.round(found.x, 2),
+        "y": np.round(found.y, 2),
+        "hdg": np.round(found.hdg, 3),
+        "left_out": found.left_out,
+        "not_planned": found.not_planned,
+    }
+
+
 @router.get("/{name}/roi")
 def roi(name: str, shared: Shared) -> RoiInfo:
     """Segments of the region of interest, and those that may be added or taken out now."""
@@ -261,9 +303,14 @@ def _problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
     with shared.search:
         region = region_of(loaded, scenario.roi)
         problems = check(
-            scenario, loaded.sumo.graph, shared.workspace.assets(), loaded.lights, region=region
+            scenario,
+            loaded.sumo.graph,
+            shared.workspace.assets(),
+            loaded.lights,
+            parking=loaded.sumo.parking,
+            region=region,
         )
-    return (*problems, *place_fit(scenario, loaded.sumo))
+    return (*problems, *criteria_problems(scenario), *place_fit(scenario, loaded.sumo))
 
 
 def _region(shared: Services, scenario: Scenario) -> Region:

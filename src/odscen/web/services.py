@@ -22,11 +22,12 @@ from odscen.web.carla_status import CarlaServer
 from odscen.web.drafts import Drafts
 from odscen.web.jobs import Jobs
 from odscen.web.large.large_documents import LARGE, LargeDocuments
+from odscen.web.sweeps.active_sweeps import Sweeps
 from odscen.workspace.guarded_build import read_scenario_in_child
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
-    from odscen.carla.client import Address
+    from odscen.carla.server.client import Address
     from odscen.scenario.document.scenario_document import Scenario
 
 _WAIT = 5.0
@@ -49,6 +50,7 @@ class Services:
     drafts: Drafts
     jobs: Jobs
     runs: Runs
+    sweeps: Sweeps
     carla: CarlaServer
     large: LargeDocuments | None
     search: threading.Lock = field(default_factory=threading.Lock)
@@ -64,7 +66,8 @@ class Services:
         """
         children = None if large is None else LargeDocuments(workspace, large=large)
         drafts, runs = Drafts(workspace, children), Runs(workspace, carla)
-        return cls(workspace, drafts, Jobs(), runs, CarlaServer(carla), children)
+        sweeps = Sweeps(workspace)
+        return cls(workspace, drafts, Jobs(), runs, sweeps, CarlaServer(carla), children)
 
     def map_of(self, scenario: Scenario) -> LoadedMap:
         """Map that a scenario was made on, loaded."""
@@ -98,6 +101,7 @@ class Services:
     def close(self) -> None:
         """End everything that goes on."""
         self.jobs.close()
+        self.sweeps.close()
         self.runs.close()
 
 

@@ -1,17 +1,20 @@
-"""Routes for traffic lights: their programs in a scenario or a run, and what they showed."""
+"""Routes for traffic lights: programs in a scenario or a run, their timing, what was shown."""
 
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import orjson
-from fastapi import APIRouter
+from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
 from odscen.app.scenarios import read_scenario
-from odscen.app.signals.signal_plans import lights_of
+from odscen.app.signals.green_waves import coordinate_signals
+from odscen.app.signals.program_editing import stretch_cycle, take_over_program
+from odscen.app.signals.signal_optimisation import time_signals
+from odscen.app.signals.signal_plans import export_signals, lights_of, take_signals
 from odscen.app.signals.signal_views import chosen_lights, program_origin
 from odscen.base.errors import InputError, NotFoundError
 from odscen.results.records.light_programs import programs_from_json, stage_spans
@@ -22,13 +25,21 @@ from odscen.results.report.signals.stage_diagrams import (
     detector_label,
     stage_words,
 )
+from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.edits.turn_treatment import crossing_turns
+from odscen.scenario.signals.light import find_light
 from odscen.scenario.signals.program_design import seconds_of_day
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_calls, read_light_states
 from odscen.web.large.large_documents import LargeDocumentRoute
+from odscen.web.messages import OfVersion, ScenarioState, Version
 from odscen.web.packed import UNCHANGED, answer, pack
+from odscen.web.scenario_routes import state_of
 from odscen.web.services import Services, Shared
+from odscen.web.wire.media_types import Responses
 from odscen.web.wire.signal_messages import (
+    CorridorWish,
+    CycleWish,
     DayPlanInfo,
     DetectorInfo,
     LightGroupInfo,
@@ -37,6 +48,9 @@ from odscen.web.wire.signal_messages import (
     PictureKey,
     RunSignals,
     StageInfo,
+    TimedSignalsState,
+    TurnInfo,
+    WebsterWish,
 )
 
 if TYPE_CHECKING:
@@ -48,12 +62,15 @@ if TYPE_CHECKING:
 
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.results.records.light_programs import LightProgram, ShownPlan
-    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.edits.turn_treatment import TurnTreatment
+    from odscen.scenario.signals.light import Light
 
 router = APIRouter(prefix="/api", route_class=LargeDocumentRoute)
 
 _WIDTH = 384.0
 """Pixels of a time bar."""
+
+_XML: Responses = {200: {"content": {"application/xml": {"schema": {"type": "string"}}}}}
 
 _Calls = dict[str, list[tuple[float, float]]]
 
@@ -63,7 +80,86 @@ def of_scenario(name: str, junction: str, shared: Shared) -> LightProgramInfo:
     """What a light is told to show in a scenario, with all plans of the day."""
     scenario = shared.drafts.get(name).scenario
     lights = lights_of(shared.workspace, scenario, whole_day=True)
-    return _program(chosen_lights(lights, [junction])[0], scenario, shared, {})
+    light = chosen_lights(lights, [junction])[0]
+    info = _program(light, scenario, shared, {})
+    view = find_light(shared.map_of(scenario).lights, light.junctions[0])
+    return info if view is None else info.model_copy(update={"turns": _turns(light, view)})
+
+
+@router.post("/scenarios/{name}/signals/{junction}/cycle")
+def set_cycle(name: str, junction: str, wish: CycleWish, shared: Shared) -> ScenarioState:
+    """Give a light another cycle: greens in proportion to what they are."""
+
+    def change(scenario: Scenario) -> Scenario:
+        return stretch_cycle(shared.workspace, scenario, junction, cycle=wish.cycle, plan=wish.plan)
+
+    label = f"Cycle of light {junction}"
+    return state_of(shared, shared.drafts.change(name, wish.version, label, change))
+
+
+@router.post("/scenarios/{name}/signals/{junction}/own")
+def take_over(name: str, junction: str, wish: OfVersion, shared: Shared) -> ScenarioState:
+    """Make the map's program of a light one of the scenario, which can be changed."""
+
+    def change(scenario: Scenario) -> Scenario:
+        return take_over_program(shared.workspace, scenario, junction)
+
+    label = f"Take over the program of {junction}"
+    return state_of(shared, shared.drafts.change(name, wish.version, label, change))
+
+
+@router.post("/scenarios/{name}/signal-times/webster")
+def webster(name: str, wish: WebsterWish, shared: Shared) -> TimedSignalsState:
+    """Time lights after the demand: cycle and splits by Webster's method."""
+    scenario = shared.drafts.get(name).scenario
+    # Made before the drafts are locked; a change meanwhile is another version, and refused.
+    timed = time_signals(shared.workspace, scenario, junctions=wish.junctions)
+    draft = shared.drafts.change(
+        name, wish.version, "Time lights after the demand", lambda _: timed.scenario
+    )
+    state = state_of(shared, draft)
+    return TimedSignalsState(state=state, notes=list(timed.to_words()), picture="")
+
+
+@router.post("/scenarios/{name}/signal-times/corridor")
+def corridor(name: str, wish: CorridorWish, shared: Shared) -> TimedSignalsState:
+    """Coordinate lights: one cycle, and the offsets with the widest bands."""
+    scenario = shared.drafts.get(name).scenario
+    found = coordinate_signals(
+        shared.workspace, scenario, junctions=wish.junctions, along=wish.along,
+        favoured=wish.favoured, speed=wish.speed, cycle=wish.cycle,
+    )  # fmt: skip
+    draft = shared.drafts.change(name, wish.version, "Coordinate lights", lambda _: found.scenario)
+    return TimedSignalsState(
+        state=state_of(shared, draft), notes=list(found.to_words()), picture=found.to_svg()
+    )
+
+
+@router.post("/scenarios/{name}/signal-times/import")
+def import_programs(
+    name: str,
+    shared: Shared,
+    file: Annotated[UploadFile, File(description="SUMO's programs: .tll.xml, .add.xml, .net.xml.")],
+    version: Annotated[Version, Form()],
+    junction: Annotated[str | None, Form(description="Only this light.")] = None,
+) -> TimedSignalsState:
+    """Take programs over from SUMO's ``tlLogic``, with ``WAUT`` as plans of the day, and loops."""
+    scenario = shared.drafts.get(name).scenario
+    given = file.filename or "file"
+    made, notes = take_signals(
+        shared.workspace, scenario, file.file.read(), file=given,
+        junctions=() if junction is None else (junction,),
+    )  # fmt: skip
+    draft = shared.drafts.change(name, version, "Import signal programs", lambda _: made)
+    return TimedSignalsState(state=state_of(shared, draft), notes=list(notes), picture="")
+
+
+@router.get("/scenarios/{name}/signals.add.xml", response_class=Response, responses=_XML)
+def export_programs(name: str, shared: Shared) -> Response:
+    """SUMO's additional file with the programs that the scenario gives to lights."""
+    text = export_signals(shared.workspace, shared.drafts.get(name).scenario)
+    headers = {"Content-Disposition": f'attachment; filename="{name}.signals.add.xml"'}
+    return Response(text, media_type="application/xml", headers=headers)
 
 
 @router.get("/runs/{run}/signals", response_model=RunSignals, responses=UNCHANGED)
@@ -132,9 +228,11 @@ def _program(
                 length=one.length,
                 gap=one.gap,
                 calls=calls.get(one.id, []),
+                place=list(one.place),
             )
             for one in light.detectors
         ],
+        turns=[],
         site=str(pictures.site() or ""),
         ground=str(pictures.ground() or ""),
         legend=[
@@ -142,6 +240,27 @@ def _program(
             for shape, words in legend_shapes([light])
         ],
     )
+
+
+def _turns(light: LightProgram, view: Light) -> list[TurnInfo]:
+    """Turns across oncoming traffic, and how the stages of the first plan treat them."""
+    states = [stage.state for stage in stage_spans(light.plans[0])]
+    return [
+        TurnInfo(
+            approach=one.approach,
+            turn="left" if one.turn == "left" else "right",
+            treatment=_treatment({state[n] for state in states for n in one.movements}),
+            alone=one.alone,
+        )
+        for one in crossing_turns(view)
+    ]
+
+
+def _treatment(letters: set[str]) -> TurnTreatment:
+    """How movements are treated that show these letters in the stages of a cycle."""
+    if {"g", "G"} <= letters:
+        return "both"
+    return "protected" if "G" in letters else "permissive"
 
 
 def _plan(

@@ -125,6 +125,7 @@ def test_a_large_scenario_that_needs_more_than_its_limit_is_refused_and_nothing_
     assert far.get(f"/api/maps/{CROSSING}").status_code == 200
 
 
+@pytest.mark.slow
 def test_a_run_of_a_large_scenario_is_checked_watched_and_reported_by_another_process(
     far: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -181,6 +182,7 @@ def test_the_forecast_of_a_large_scenario_is_that_of_a_small_one(
     assert {**near, "free": 0} == {**other, "free": 0}
 
 
+@pytest.mark.slow
 def test_a_long_run_of_a_large_scenario_is_interrupted_and_resumed_to_its_end(
     far: TestClient, workspace: Workspace
 ) -> None:

@@ -2,11 +2,19 @@ import { type Carrier, type Editing, onFoot, placeHover } from "./handler";
 
 /** Takes one along to a free start; the others that are selected come with it. */
 export function carrier(editing: Editing, id: string): Carrier {
-  const { starts, selection, changes, say } = editing;
+  const { ones, starts, selection, changes, say } = editing;
   const walk = onFoot(editing, id);
   const others = selection.includes(id) ? selection.filter((other) => other !== id) : [];
+  const goal = ones.find((one) => one.id === id)?.goal ?? null;
   return {
-    under: ({ x, y, reach }) => placeHover(starts.near(x, y, reach, walk)),
+    hint:
+      others.length === 0
+        ? `Moving ${id}: drop it on a free point`
+        : `Moving ${others.length + 1} road users: drop them where ${id} starts`,
+    under: ({ x, y, reach }) => {
+      const to = starts.near(x, y, reach, walk);
+      return placeHover(to, to && goal !== null ? { spawn: to.id, goal } : undefined);
+    },
     drop: ({ x, y, reach }) => {
       const to = starts.near(x, y, reach, walk);
       if (to) changes.move([id, ...others], to);

@@ -1,10 +1,12 @@
 import { onFoot, type Tool } from "./handler";
-import { startingHandler } from "./starting";
+import { NEXT_POINT, startingHandler } from "./starting";
 
 /** Copies road users once, so that the first of them starts where the click is. */
 export const copyTool = (ids: readonly string[]): Tool => ({
   key: `copy ${ids.join(" ")}`,
   help: "Click where the copy starts. Escape stops.",
+  elsewhere: NEXT_POINT,
+  goals: false,
   makes: false,
   handler: (editing) =>
     startingHandler(editing, {
@@ -12,7 +14,6 @@ export const copyTool = (ids: readonly string[]): Tool => ({
       badge: null,
       who: "copy",
       prompt: "Point at the place to copy to",
-      setsGoals: false,
       apply: (to) => {
         editing.changes.copy(ids, to);
         editing.done();

@@ -1,6 +1,6 @@
 import { flowWord } from "../../ui/words";
 import type { Tool } from "./handler";
-import { startHelp, startingHandler, startPrompt } from "./starting";
+import { NEXT_POINT, startHelp, startingHandler, startPrompt } from "./starting";
 
 /** Places a flow of vehicles or pedestrians with each click. */
 export function flowTool(walks: boolean): Tool {
@@ -8,6 +8,8 @@ export function flowTool(walks: boolean): Tool {
   return {
     key: walks ? "pedestrian flow" : "vehicle flow",
     help: startHelp(who, walks),
+    elsewhere: NEXT_POINT,
+    goals: false,
     makes: true,
     handler: (editing) =>
       startingHandler(editing, {
@@ -15,7 +17,6 @@ export function flowTool(walks: boolean): Tool {
         badge: null,
         who,
         prompt: startPrompt(who, walks),
-        setsGoals: true,
         apply: (to) => editing.changes.placeFlow(walks, to),
       }),
   };

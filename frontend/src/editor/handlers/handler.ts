@@ -10,9 +10,17 @@ import type { PlacePick } from "../pick";
 import type { Starts } from "../placing";
 import type { Step } from "../scene";
 
+/** A start and a goal, one of which is being chosen: the route between them is shown before the click. */
+export interface Trial {
+  spawn: string;
+  goal: string;
+}
+
 /** What lies under the pointer, as far as the handler in charge cares. */
 export type Hover =
-  { is: "place"; place: Place } | { is: "segment"; row: number } | { is: "light"; junction: string };
+  | { is: "place"; place: Place; trial?: Trial | undefined }
+  | { is: "segment"; row: number }
+  | { is: "light"; junction: string };
 
 /** What the pointer does on the map now: one for each step of the editor and for each tool. */
 export interface Handler {
@@ -35,12 +43,14 @@ export interface Handler {
 /** Takes something along while the button is held down. */
 export interface Carrier {
   under(at: Pointed): Hover | null;
+  /** What is taken along, and how it is put down. */
+  readonly hint: string;
   drop(at: Pointed): void;
 }
 
-/** A handler that uses up starts of the region, on the map or without it. */
+/** A handler that takes points of the region, on the map or without it. */
 export interface ToolHandler extends Handler {
-  /** Uses the next free start, for those who do not point. */
+  /** Takes the next point there is, for those who do not point. */
   somewhere(): void;
 }
 
@@ -50,6 +60,10 @@ export interface Tool {
   readonly key: string;
   /** What is said beside the map. */
   readonly help: string;
+  /** The button for those who do not point. */
+  readonly elsewhere: string;
+  /** Whether the goals that the selected one can have are shown meanwhile. */
+  readonly goals: boolean;
   /** Whether it makes something new, so that nothing stays selected when it is taken. */
   readonly makes: boolean;
   handler(editing: Editing): ToolHandler;
@@ -104,4 +118,5 @@ export function onFoot({ graph, ones }: Pick<Editing, "graph" | "ones">, id: str
   return spawn !== undefined && graph.place(spawn)?.walk === true;
 }
 
-export const placeHover = (place: Place | null): Hover | null => place && { is: "place", place };
+export const placeHover = (place: Place | null, trial?: Trial): Hover | null =>
+  place && { is: "place", place, trial };

@@ -15,6 +15,7 @@ const OF_STEP: Partial<Record<Step, (editing: Editing) => Handler>> = {
   transit: lookingHandler,
   measures: lookingHandler,
   rules: lookingHandler,
+  study: lookingHandler,
 };
 
 /** Who is in charge of the map; lights can be asked for their programs unless places are chosen. */

@@ -3,13 +3,14 @@ import { nth } from "../../lists";
 import type { Place } from "../../map/graph";
 import { laneKey } from "../../map/laneShapes";
 import { laneWord } from "../placeWords";
-import type { PickBy } from "../pick";
+import { namedPlace, type PickBy } from "../pick";
 import { type Editing, type Handler, type Hover, LOOKING, placeHover } from "./handler";
 import { segmentAt, segmentHover } from "./segments";
 
 /** A click this near to a lane, or to a light, means it, metres. */
 const LANE_REACH = 6;
 const LIGHT_REACH = 20;
+const NODE_REACH = 2;
 
 const PROMPT: Record<PickBy, string> = {
   segment: "Click a road or junction. Escape stops choosing.",
@@ -18,6 +19,9 @@ const PROMPT: Record<PickBy, string> = {
   point: "Click the point of a lane. Escape stops choosing.",
   light: "Click a traffic light. Escape stops choosing.",
   node: "Click a point of a lane inside the region. Escape stops choosing.",
+  goal: "Click a point of a lane or walkway. Escape stops choosing.",
+  place: "Click a point of a lane or walkway, or the ground. Escape stops choosing.",
+  ground: "Click the ground, point after point. Escape stops choosing.",
 };
 
 /** Names places for a form: a segment, a lane, a turn by its two roads, a point of a lane, a light. */
@@ -25,13 +29,15 @@ export const pickingHandler = (editing: Editing): Handler => {
   const { pick, lights } = editing;
   const by = pick.now?.by ?? "segment";
   const whole = by === "segment" || by === "turn";
-  const take = (name: string, s = 0): void => pick.taker.current({ name, s });
+  const take = (name: string, s = 0): void => pick.taker.current(namedPlace(name, s));
   return {
     ...LOOKING,
     aim: true,
     walks: false,
     under: (at) => {
       if (whole) return segmentHover(editing.picker, at);
+      if (by === "goal" || by === "place") return placeHover(anyPlaceAt(editing, at));
+      if (by === "ground") return null;
       return by === "light" ? lightHover(editing, at) : placeHover(laneAt(editing, at, by));
     },
     hint: (hover) => said(editing, by, hover),
@@ -41,7 +47,8 @@ export const pickingHandler = (editing: Editing): Handler => {
         const junction = lights?.junctionAt({ ...at, reach: Math.max(at.reach, LIGHT_REACH) });
         if (junction) take(junction);
         else editing.say("There is no traffic light here.");
-      } else {
+      } else if (by === "goal" || by === "place" || by === "ground") pickPoint(editing, at, by);
+      else {
         const place = laneAt(editing, at, by);
         if (!place) editing.say(MISSED[by]);
         else if (by === "node") take(place.id);
@@ -56,6 +63,23 @@ const MISSED: Record<"lane" | "point" | "node", string> = {
   point: "There is no lane outside junctions here.",
   node: "There is no lane of the region here, or it lies in a junction.",
 };
+
+/** The nearest node of a lane or walkway, or the ground itself. */
+function pickPoint(editing: Editing, at: Pointed, by: "goal" | "place" | "ground"): void {
+  const place = by === "ground" ? null : anyPlaceAt(editing, at);
+  if (!place && by === "goal") {
+    editing.say("There is no lane or walkway here.");
+    return;
+  }
+  const { x, y, hdg } = place ?? { ...at, hdg: 0 };
+  editing.pick.taker.current({ name: place?.id ?? "", s: 0, x: cm(x), y: cm(y), hdg });
+}
+
+/** Metres to the centimetre. */
+const cm = (metres: number): number => Math.round(metres * 100) / 100;
+
+const anyPlaceAt = ({ picker }: Editing, at: Pointed): Place | null =>
+  picker.place(at.x, at.y, Math.max(at.reach, NODE_REACH), { vehicles: true, walks: true });
 
 function pickSegment(editing: Editing, at: Pointed, by: PickBy, take: (name: string) => void): void {
   const { graph, picker, pick, say } = editing;

@@ -1,7 +1,7 @@
 import type { Category } from "../../api/types";
 import { CATEGORY_WORD } from "../../ui/words";
 import type { Tool } from "./handler";
-import { startHelp, startingHandler, startPrompt } from "./starting";
+import { NEXT_POINT, startHelp, startingHandler, startPrompt } from "./starting";
 
 /** Places one road user of a kind with each click. */
 export function placeTool(category: Category): Tool {
@@ -10,6 +10,8 @@ export function placeTool(category: Category): Tool {
   return {
     key: `place ${category}`,
     help: startHelp(who, walks),
+    elsewhere: NEXT_POINT,
+    goals: false,
     makes: true,
     handler: (editing) =>
       startingHandler(editing, {
@@ -17,7 +19,6 @@ export function placeTool(category: Category): Tool {
         badge: category,
         who,
         prompt: startPrompt(who, walks),
-        setsGoals: true,
         apply: (to) => editing.changes.place(category, to),
       }),
   };

@@ -1,7 +1,8 @@
 import { type Editing, type Handler, LOOKING } from "./handler";
+import { rowsWithin } from "../regions";
 import { segmentAt, segmentHover } from "./segments";
 
-/** Lets the region of interest grow and shrink, segment by segment. */
+/** Lets the region of interest grow and shrink, segment by segment or by a rectangle. */
 export const regionHandler = ({ graph, picker, roi, region, changes }: Editing): Handler => ({
   ...LOOKING,
   aim: true,
@@ -11,8 +12,11 @@ export const regionHandler = ({ graph, picker, roi, region, changes }: Editing):
     if (segment !== null && region.inside.includes(segment) && !region.removable.includes(segment)) {
       return "This segment holds the region together and cannot be removed";
     }
-    return roi.length === 0 ? "Click a road or junction to begin the region" : null;
+    return roi.length === 0
+      ? "Click a road or junction to begin the region, or drag a rectangle with Shift"
+      : null;
   },
+  frame: (bounds) => changes.extendRegion(rowsWithin(graph, bounds)),
   pick: (at) => {
     const row = segmentAt(picker, at);
     if (row === null) return;

@@ -3,9 +3,10 @@ import type { Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
 import { inFrame, nearestOne } from "../scene";
 import { carrier } from "./carry";
+import { chosenGoalAt, goalCarrier } from "./goal";
 import { type Editing, type Handler, LOOKING, onFoot } from "./handler";
 
-/** Without a tool: a click selects or sets the goal, a drag takes road users along or draws a frame. */
+/** Without a tool: a click selects or sets the goal, a drag takes road users or a goal along, or draws a frame. */
 export const selectHandler = (editing: Editing): Handler => ({
   ...LOOKING,
   walks: editing.one ? onFoot(editing, editing.one.id) : null,
@@ -17,7 +18,8 @@ export const selectHandler = (editing: Editing): Handler => ({
   },
   grab: (at) => {
     const id = oneAt(editing, at);
-    return id === null ? null : carrier(editing, id);
+    if (id !== null) return carrier(editing, id);
+    return editing.one && chosenGoalAt(editing, at) ? goalCarrier(editing, editing.one) : null;
   },
   frame: (bounds) => selectFrame(editing, bounds),
 });

@@ -2,7 +2,7 @@ import type { Category } from "../../api/types";
 import type { Place } from "../../map/graph";
 import { laneWord } from "../placeWords";
 import { type Editing, type Hover, LOOKING, placeHover, type ToolHandler } from "./handler";
-import { choose, goalAt, oneAt, selectFrame } from "./select";
+import { choose, oneAt, selectFrame } from "./select";
 
 /** What tools differ in that use up starts of the region. */
 interface Starting {
@@ -12,15 +12,13 @@ interface Starting {
   who: string;
   /** Said while nothing is under the pointer. */
   prompt: string;
-  /** Whether a click on a goal still sets the goal of the one that is selected. */
-  setsGoals: boolean;
   apply: (to: Place) => void;
 }
 
-/** A click on a free start uses it; a click on a road user selects. */
+/** A click on a free start uses it, whatever goals lie there; a click on a road user selects. */
 export function startingHandler(
   editing: Editing,
-  { walks, badge, who, prompt, setsGoals, apply }: Starting,
+  { walks, badge, who, prompt, apply }: Starting,
 ): ToolHandler {
   const { graph, starts, ones, roi, say, openStep } = editing;
   return {
@@ -31,10 +29,8 @@ export function startingHandler(
     under: ({ x, y, reach }) => placeHover(starts.near(x, y, reach, walks)),
     hint: (hover) => (hover?.is === "place" ? whereabouts(editing, hover) : prompt),
     pick: (at) => {
-      const goal = setsGoals ? goalAt(editing, at) : null;
       const there = oneAt(editing, at);
-      if (goal) goal.set();
-      else if (there !== null) choose(editing, there, at.shift);
+      if (there !== null) choose(editing, there, at.shift);
       else {
         const to = starts.near(at.x, at.y, at.reach, walks);
         if (to) apply(to);
@@ -59,6 +55,9 @@ function whereabouts({ graph }: Editing, { place }: Extract<Hover, { is: "place"
   const degrees = Math.round((((90 - (place.hdg * 180) / Math.PI) % 360) + 360) % 360);
   return `${laneWord(graph, place.id)}${place.walk ? "" : `, heading ${degrees}°`}`;
 }
+
+/** The button for those who do not point. */
+export const NEXT_POINT = "Use the next free point";
 
 /** What is said beside the map of a tool that makes something new. */
 export const startHelp = (who: string, walks: boolean): string =>

@@ -90,7 +90,12 @@ class LargeRun:
         self._folder.cleanup()
 
     def follow(
-        self, name: str, *, prepared: Callable[[float | None], None], ended: Callable[[], None]
+        self,
+        name: str,
+        *,
+        preparing: Callable[[str], None],
+        prepared: Callable[[float | None], None],
+        ended: Callable[[], None],
     ) -> str | None:
         """Carry it out, to its end.
 
@@ -98,6 +103,8 @@ class LargeRun:
         ----------
         name
             Of the run's folder.
+        preparing
+            Called with words on how far routes by travel time have been found.
         prepared
             Called with the length of a slice, s, when it is prepared; ``None`` for one piece.
         ended
@@ -110,7 +117,11 @@ class LargeRun:
         failed: str | None = None
         try:
             self._write(f"{name}\n".encode())
-            prepared(self._said()["slice_length"])
+            said = self._said()
+            while "preparing" in said:
+                preparing(said["preparing"])
+                said = self._said()
+            prepared(said["slice_length"])
             self._live.attach(self._process)
             for message, payload in messages(self._process):
                 self._live.take(message, payload)

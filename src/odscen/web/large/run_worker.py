@@ -87,7 +87,7 @@ def main() -> int:
         if not name:
             return 0
         run = replace(checked, name=name, folder=workspace.runs / name)
-        prepared = prepare_run(run)
+        prepared = prepare_run(run, iterated=lambda step: say({"preparing": step.words}))
         Path(job["introduction"]).write_text(introduction(prepared.plan), encoding="utf-8")
         say({"slice_length": prepared.plan.slice_length})
         said_all = True

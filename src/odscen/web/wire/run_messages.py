@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
 
 from odscen.base.categories import Category
+from odscen.results.records.outcomes import ActorStatus
 from odscen.results.records.run_records import EventKind
 from odscen.web.messages import Answer, Name, RequestBody
 from odscen.web.wire.summary_messages import RunSummary
@@ -99,7 +100,8 @@ class RunProgress(Answer):
 class RunInfo(Answer):
     """A run, going on or finished; ``summary`` is that of ``summary.json``.
 
-    ``finished`` is when its results were written, in seconds since 1970. ``carla`` says that it is
+    ``finished`` is when its results were written, in seconds since 1970. ``preparing`` says how far
+    routes by travel time have been found before it begins. ``carla`` says that it is
     shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
     ``slices``; one that is ``interrupted`` can go on from the last of them.
     """
@@ -115,6 +117,7 @@ class RunInfo(Answer):
     finished: float | None = None
     carla: bool = False
     slices: RunSlices | None = None
+    preparing: str | None = None
 
 
 class RunFile(Answer):
@@ -144,10 +147,15 @@ class FitRow(Answer):
 
 
 class RunFit(Answer):
-    """All counts of a run's scenario against the run; ``rmse`` in vehicles per slice."""
+    """All counts of a run's scenario against the run; ``rmse`` in vehicles per slice.
+
+    ``hours`` are those that slices of a place make up, ``hours_met`` how many of them are met.
+    """
 
     rows: list[FitRow]
     met: int
+    hours: int
+    hours_met: int
     rmse: float | None
     contradictions: list[str]
 
@@ -229,6 +237,28 @@ class RunEvents(Answer):
 
     events: list[IncidentInfo]
     left_off: int
+
+
+class EgoOutcome(Answer):
+    """What became of a vehicle under test; seconds, m/s.
+
+    ``travel_time`` and ``delay`` are known of one that arrived.
+    """
+
+    id: str
+    status: ActorStatus
+    travel_time: float | None
+    delay: float | None
+    mean_speed: float | None
+    collisions: int
+    emergency_stops: int
+    teleports: int
+
+
+class RunEgos(Answer):
+    """The vehicles under test of a finished run, in the order of the scenario."""
+
+    egos: list[EgoOutcome]
 
 
 class ReplayActor(Answer):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from odscen.app.signals.signal_views import ProgramOrigin
-from odscen.web.messages import Answer
+from odscen.web.messages import Answer, OfVersion, ScenarioState
 
 
 class StageInfo(Answer):
@@ -70,7 +72,8 @@ class DetectorInfo(Answer):
     ``label`` names it in the pictures, where its shape has its id as ``data-detector``. ``bus`` if
     it is an area of ``length`` metres that sees buses only, which have priority for its stages.
     ``calls`` are begin and end of the times in which it saw a road user, seconds of a run; none
-    without a run, and none of an area for buses, which SUMO does not log.
+    without a run, and none of an area for buses, which SUMO does not log. ``place`` are points
+    along it in driving direction, x and y in metres.
     """
 
     id: str
@@ -82,6 +85,20 @@ class DetectorInfo(Answer):
     length: float
     gap: float
     calls: list[tuple[float, float]]
+    place: list[tuple[float, float]]
+
+
+class TurnInfo(Answer):
+    """A turn across oncoming traffic, and how it is treated in the first plan.
+
+    ``both`` is protected in one stage and permissive in another. ``alone`` if no other movement
+    uses its lanes, so that it can have an arrow.
+    """
+
+    approach: str
+    turn: Literal["left", "right"]
+    treatment: Literal["permissive", "protected", "both"]
+    alone: bool
 
 
 class PictureKey(Answer):
@@ -95,6 +112,7 @@ class LightProgramInfo(Answer):
     """What a light is told to show. ``site`` is the junction with its detectors, as SVG.
 
     ``ground`` is what the pictures of the stages refer to: it has to be in the page with them.
+    ``turns`` are those across oncoming traffic; none in a run.
     """
 
     id: str
@@ -104,6 +122,7 @@ class LightProgramInfo(Answer):
     groups: list[LightGroupInfo]
     plans: list[DayPlanInfo]
     detectors: list[DetectorInfo]
+    turns: list[TurnInfo]
     site: str
     ground: str
     legend: list[PictureKey]
@@ -123,3 +142,41 @@ class RunSignals(Answer):
     """What the lights of a finished run showed; none if the map has none."""
 
     lights: list[ShownStates]
+
+
+class CycleWish(OfVersion):
+    """Another cycle for a light, seconds; ``plan`` is a plan of the day where it has several."""
+
+    cycle: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
+    plan: str | None = None
+
+
+class WebsterWish(OfVersion):
+    """Lights to be timed after the demand: all, or these junctions."""
+
+    junctions: tuple[str, ...] = ()
+
+
+class CorridorWish(OfVersion):
+    """Lights to be coordinated: junctions in driving order, or those along roads.
+
+    ``speed`` is that of progression, m/s; the speed limits if not given. ``cycle`` in seconds; the
+    longest of the lights if not given.
+    """
+
+    junctions: tuple[str, ...] = ()
+    along: tuple[str, ...] = ()
+    favoured: Literal["both", "out", "back"] = "both"
+    speed: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
+    cycle: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)] | None = None
+
+
+class TimedSignalsState(Answer):
+    """A scenario whose lights have been timed, and in words what came of it.
+
+    ``picture`` is the time-space diagram of a corridor as SVG, else empty.
+    """
+
+    state: ScenarioState
+    notes: list[str]
+    picture: str

@@ -53,6 +53,17 @@ class ExpectationInfo(Answer):
     passed: bool
 
 
+class CriterionInfo(Answer):
+    """A criterion of the scenario: ``value`` in ``unit``, and when it came about, s."""
+
+    criterion: str
+    words: str
+    value: float | None
+    unit: str
+    passed: bool
+    time: float | None
+
+
 class SliceInfo(Answer):
     """A slice of a long run: its end, and what it took up to there; megabytes."""
 
@@ -100,6 +111,7 @@ class RunSummary(Answer):
     insertion_error_max: float | None = None
     figures: dict[str, float | None] = Field(default_factory=dict)
     gridlock: GridlockInfo | None = None
+    criteria: list[CriterionInfo] = Field(default_factory=list)
     expectations: list[ExpectationInfo] = Field(default_factory=list)
     problems: list[str] = Field(default_factory=list)
     notes: list[str] = Field(default_factory=list)

@@ -1,0 +1,30 @@
+import { address, call } from "./client";
+import { followJob } from "./maps";
+import type { components } from "./schema";
+import type { Job } from "./types";
+
+type Schemas = components["schemas"];
+
+/** What became of each element of the file that a scenario was imported from. */
+export type ImportReport = Schemas["ImportInfo"];
+export type ImportRow = Schemas["ImportRow"];
+/** Files of an export, and what its format cannot say. */
+export type ExportNotes = Schemas["ExportInfo"];
+export type ExportNote = Schemas["ExportNote"];
+
+export const exchange = {
+  /** Takes a scenario of OpenSCENARIO, with its map and catalogs; gives its name, null if cancelled. */
+  bring: async (files: readonly File[], onStep: (job: Job) => void): Promise<string | null> => {
+    const body = new FormData();
+    for (const file of files) body.append("files", file);
+    const { job } = await call("post", "/api/imports/openscenario", { body });
+    const done = await followJob(job, onStep);
+    return done?.result ?? null;
+  },
+  report: (name: string) => call("get", "/api/scenarios/{name}/import", { path: { name } }),
+  planUrl: (name: string) => address("/api/scenarios/{name}/import/plan", { path: { name } }),
+  notes: (name: string, to: string, version: string | null) =>
+    call("get", "/api/scenarios/{name}/export/notes", { path: { name }, query: { to, version } }),
+  exportUrl: (name: string, to: string, version: string | null) =>
+    address("/api/scenarios/{name}/export", { path: { name }, query: { to, version } }),
+};

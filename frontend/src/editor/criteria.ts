@@ -1,0 +1,75 @@
+import type { ActorMeasureInfo, FigureInfo } from "../api/figures";
+
+/** Operators of criteria, in the words of the reports. */
+export const OPERATORS: [op: string, words: string][] = [
+  [">=", "at least"],
+  ["<=", "at most"],
+  ["==", "exactly"],
+  [">", "more than"],
+  ["<", "less than"],
+];
+/** What is asked of a road user most, as the reports say it. */
+const PLAIN: Record<string, string> = {
+  "arrived == 1": "reaches its goal",
+  "arrived >= 1": "reaches its goal",
+  "collided == 0": "does not collide",
+};
+/** Means every ego where no road user has this id. */
+export const EGO = "ego";
+/** The subject of criteria about all road users. */
+export const WHOLE_RUN = "";
+
+/** A criterion in parts: `name(actor) op bound unit`. */
+export interface Criterion {
+  name: string;
+  /** Id of a road user, or "ego"; "" for the whole run. */
+  actor: string;
+  op: string;
+  bound: number;
+  unit: string;
+}
+
+type Measure = Pick<FigureInfo | ActorMeasureInfo, "name" | "label" | "unit">;
+
+const FORM =
+  /^\s*([A-Za-z_]\w*)\s*(?:\(\s*([^()\s]+)\s*\)\s*)?(>=|<=|==|>|<)\s*([-+.\deE]+)\s*(%|[A-Za-z][A-Za-z/\d]*)?\s*$/;
+
+/** The parts of a criterion; null if it is not one. */
+export function partsOf(text: string): Criterion | null {
+  const found = FORM.exec(text);
+  if (!found) return null;
+  const [, name = "", actor = WHOLE_RUN, op = "", bound = "", unit = ""] = found;
+  return { name, actor, op, bound: Number(bound), unit };
+}
+
+/** The text of a criterion, as files have it. */
+export function textOf({ name, actor, op, bound, unit }: Criterion): string {
+  const about = actor === WHOLE_RUN ? name : `${name}(${actor})`;
+  return `${about} ${op} ${bound}${unit ? ` ${unit}` : ""}`;
+}
+
+/** A criterion as a sentence; as it is written where the measure is not known. */
+export function criterionWords(
+  text: string,
+  measures: { run: readonly Measure[]; actors: readonly Measure[] },
+): string {
+  const parts = partsOf(text);
+  if (!parts) return text;
+  const known = parts.actor === WHOLE_RUN ? measures.run : measures.actors;
+  const measure = known.find(({ name }) => name === parts.name);
+  if (!measure) return text;
+  const plain = PLAIN[`${parts.name} ${parts.op} ${parts.bound}`];
+  if (parts.actor !== WHOLE_RUN && plain) return `${parts.actor} ${plain}`;
+  const about = parts.actor === WHOLE_RUN ? measure.label : `${measure.label} of ${parts.actor}`;
+  const op = OPERATORS.find(([sign]) => sign === parts.op)?.[1] ?? parts.op;
+  const unit = parts.unit || measure.unit;
+  return `${about.charAt(0).toUpperCase()}${about.slice(1)}: ${op} ${parts.bound}${unit ? ` ${unit}` : ""}`;
+}
+
+/** What the head of the step says. */
+export const criteriaNote = (criteria: readonly string[]): string =>
+  criteria.length === 0
+    ? "When has a run passed?"
+    : criteria.length === 1
+      ? "1 criterion"
+      : `${criteria.length} criteria`;

@@ -1,0 +1,73 @@
+import type { Actor, Flow } from "../../api/types";
+import type { Place } from "../../map/graph";
+import type { Pointed } from "../../map/MapCanvas";
+import { placeWord } from "../placeWords";
+import { viasOf } from "../placing";
+import { nearestOne } from "../scene";
+import { type Carrier, type Editing, LOOKING, onFoot, placeHover, type Tool } from "./handler";
+import { selectFrame } from "./select";
+
+const NOWHERE = "No goal can be here: it lies on a lane or walkway inside the region.";
+
+/** Chooses where one goes: a goal that is suggested, or any point of the region. */
+export const goalTool = (id: string): Tool => ({
+  key: `goal ${id}`,
+  help: `Now click where ${id} goes: a diamond, or any other point of the region. Escape stops.`,
+  elsewhere: "Use the first suggestion",
+  goals: true,
+  makes: false,
+  handler: (editing) => {
+    const one = editing.ones.find((each) => each.id === id);
+    return {
+      ...LOOKING,
+      aim: true,
+      walks: onFoot(editing, id),
+      under: (at) => (one ? goalHover(editing, one, at) : null),
+      hint: (hover) =>
+        hover?.is === "place"
+          ? `${id} goes to ${placeWord(editing.graph, hover.place.id)}`
+          : `Point at where ${id} goes`,
+      pick: (at) => {
+        if (one && take(editing, one, at)) editing.done();
+      },
+      frame: (bounds) => selectFrame(editing, bounds),
+      somewhere: () => {
+        const [first] = editing.goals ?? [];
+        if (!one || !first) return editing.say("No goal can be reached from the start.");
+        editing.changes.setGoal(one, first.id);
+        editing.done();
+      },
+    };
+  },
+});
+
+/** The goal that is set, if it is pointed at. */
+export function chosenGoalAt({ graph, one }: Editing, at: Pointed): Place | null {
+  const place = one?.goal ? graph.place(one.goal) : undefined;
+  return place ? nearestOne([place], at.x, at.y, at.reach) : null;
+}
+
+/** Takes the goal of the selected one along. */
+export const goalCarrier = (editing: Editing, one: Actor | Flow): Carrier => ({
+  hint: `Moving the goal of ${one.id}: drop it on any point that it can reach`,
+  under: (at) => goalHover(editing, one, at),
+  drop: (at) => void take(editing, one, at),
+});
+
+function goalHover(editing: Editing, one: Actor | Flow, at: Pointed) {
+  const place = goalNear(editing, one, at);
+  return placeHover(place, place ? { spawn: viasOf(one).at(-1) ?? one.spawn, goal: place.id } : undefined);
+}
+
+function take(editing: Editing, one: Actor | Flow, at: Pointed): boolean {
+  const place = goalNear(editing, one, at);
+  if (!place) editing.say(NOWHERE);
+  else if (place.id !== one.goal) editing.changes.setGoal(one, place.id);
+  return place !== null;
+}
+
+/** A suggestion that is pointed at, or else the nearest point of the region; not the start itself. */
+function goalNear(editing: Editing, one: Actor | Flow, { x, y, reach }: Pointed): Place | null {
+  const suggested = nearestOne(editing.goals ?? [], x, y, reach);
+  return suggested ?? editing.starts.anyNear(x, y, reach, onFoot(editing, one.id), one.spawn);
+}

@@ -1,0 +1,223 @@
+import { Button, Group, SegmentedControl, Select } from "@mantine/core";
+import { useState } from "react";
+
+import { Committed } from "../Committed";
+import { CONDITION_KINDS, conditionKind } from "./conditionKinds";
+import { type Condition, type ConditionGroup, isGroup, type Join, newCondition, NOW, settled } from "./draft";
+import { type About, FieldInput } from "./FieldInput";
+
+const JOIN_WORD: Record<Join, string> = {
+  all: "All of several hold",
+  any: "Any of several holds",
+  not: "Something does not hold",
+};
+const isJoin = (kind: string): kind is Join => kind in JOIN_WORD;
+const EDGE = { none: "As long as it is true", rising: "Only as it becomes true" };
+
+type ConditionProps = About & {
+  others: readonly string[];
+  condition: Condition;
+  onChange: (condition: Condition) => void;
+};
+
+/** When a rule fires: one condition, or a list of them that is joined. */
+export function WhenForm({ condition, onChange, ...about }: ConditionProps) {
+  const { others } = about;
+  const listed = isGroup(condition) && condition.join !== "not" ? condition : null;
+  const add = (): void => {
+    const next = newCondition("time", others);
+    if (listed) onChange({ ...listed, of: [...listed.of, next] });
+    else {
+      const { delay, edge } = condition;
+      onChange({ join: "all", of: [{ ...condition, ...NOW }, next], delay, edge });
+    }
+  };
+  return (
+    <>
+      {listed ? (
+        <Parts group={listed} label="Condition" root onChange={onChange} {...about} />
+      ) : (
+        <ConditionForm label="Condition" condition={condition} timed onChange={onChange} {...about} />
+      )}
+      <Button size="compact-sm" variant="default" onClick={add}>
+        Add a condition
+      </Button>
+      {listed && <TimingFields condition={listed} onChange={onChange} />}
+    </>
+  );
+}
+
+/** Conditions that are joined, each with its form. */
+function Parts({
+  group,
+  label,
+  root = false,
+  onChange,
+  ...about
+}: About & {
+  others: readonly string[];
+  group: ConditionGroup;
+  label: string;
+  root?: boolean;
+  onChange: (condition: Condition) => void;
+}) {
+  const put = (of: readonly Condition[]): void => {
+    const [only] = of;
+    // One that is left needs no list, unless both have times of their own.
+    if (root && only && of.length === 1 && only.delay === 0 && only.edge === "none")
+      onChange({ ...only, delay: group.delay, edge: group.edge });
+    else onChange({ ...group, of });
+  };
+  const name = (n: number): string => (root ? `${label} ${n + 1}` : `${label}.${n + 1}`);
+  return (
+    <>
+      {group.of.map((one, n) => (
+        <ConditionForm
+          key={n}
+          label={name(n)}
+          condition={one}
+          timed={one.delay > 0 || one.edge !== "none"}
+          onChange={(next) => put(group.of.map((each, k) => (k === n ? next : each)))}
+          onRemove={
+            group.join !== "not" && group.of.length > 1
+              ? () => put(group.of.filter((_, k) => k !== n))
+              : undefined
+          }
+          {...about}
+        />
+      ))}
+      {root && group.of.length > 1 && (
+        <SegmentedControl
+          fullWidth
+          aria-label="How conditions are joined"
+          data={[
+            { value: "all", label: "All hold" },
+            { value: "any", label: "Any holds" },
+          ]}
+          value={group.join}
+          onChange={(join) => onChange({ ...group, join: join === "any" ? join : "all" })}
+        />
+      )}
+      {!root && group.join !== "not" && (
+        <Button
+          size="compact-sm"
+          variant="default"
+          onClick={() => put([...group.of, newCondition("time", about.others)])}
+        >
+          {`Add one to ${label.toLowerCase()}`}
+        </Button>
+      )}
+    </>
+  );
+}
+
+function ConditionForm({
+  label,
+  condition,
+  timed,
+  onChange,
+  onRemove,
+  ...about
+}: ConditionProps & {
+  label: string;
+  /** Whether its delay and edge are shown at once. */
+  timed: boolean;
+  onRemove?: () => void;
+}) {
+  const { others, rules } = about;
+  const [shown, setShown] = useState(timed);
+  const kinds = Object.entries(CONDITION_KINDS).filter(([value]) => value !== "rule" || rules.length > 0);
+  const kind = isGroup(condition) ? condition.join : condition.kind;
+  const choose = (next: string): void => {
+    const { delay, edge } = condition;
+    if (!isJoin(next)) onChange({ ...newCondition(next, others), delay, edge });
+    else if (isGroup(condition) && condition.join !== "not" && next !== "not")
+      onChange({ ...condition, join: next });
+    else onChange({ join: next, of: [{ ...condition, ...NOW }], delay, edge });
+  };
+  return (
+    <section className="fold" aria-label={label}>
+      <Select
+        label={label}
+        data={[
+          ...kinds.map(([value, one]) => ({ value, label: one.label })),
+          ...Object.entries(JOIN_WORD).map(([value, word]) => ({ value, label: word })),
+        ]}
+        value={kind}
+        allowDeselect={false}
+        onChange={(next) => {
+          if (next && next !== kind) choose(next);
+        }}
+      />
+      {isGroup(condition) ? (
+        <Parts group={condition} label={label} onChange={onChange} {...about} />
+      ) : (
+        conditionKind(condition.kind)?.fields.map((field) => (
+          <FieldInput
+            key={`${condition.kind} ${field.label}`}
+            where={label}
+            field={field}
+            values={condition.values}
+            {...about}
+            onChange={(values) =>
+              onChange({ ...condition, values: settled(conditionKind(condition.kind), values, others) })
+            }
+          />
+        ))
+      )}
+      {shown && <TimingFields condition={condition} onChange={onChange} />}
+      <Group gap={6}>
+        {!shown && (
+          <Button
+            size="compact-sm"
+            variant="default"
+            aria-label={`When it counts: ${label.toLowerCase()}`}
+            onClick={() => setShown(true)}
+          >
+            When it counts
+          </Button>
+        )}
+        {onRemove && (
+          <Button
+            size="compact-sm"
+            variant="default"
+            aria-label={`Remove ${label.toLowerCase()}`}
+            onClick={onRemove}
+          >
+            Remove
+          </Button>
+        )}
+      </Group>
+    </section>
+  );
+}
+
+/** How much later a condition counts, and whether only as it becomes true. */
+function TimingFields({
+  condition,
+  onChange,
+}: {
+  condition: Condition;
+  onChange: (condition: Condition) => void;
+}) {
+  return (
+    <Group grow align="flex-start">
+      <Committed
+        label="Delay"
+        suffix=" s"
+        min={0}
+        max={1e6}
+        digits={1}
+        value={condition.delay}
+        onCommit={(delay) => onChange({ ...condition, delay: delay ?? 0 })}
+      />
+      <Select
+        label="Counts"
+        data={Object.entries(EDGE).map(([value, word]) => ({ value, label: word }))}
+        value={condition.edge}
+        allowDeselect={false}
+        onChange={(edge) => onChange({ ...condition, edge: edge === "rising" ? edge : "none" })}
+      />
+    </Group>
+  );
+}

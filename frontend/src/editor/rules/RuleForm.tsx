@@ -1,0 +1,73 @@
+import { Button, Group, Stack, Text } from "@mantine/core";
+import { useEffect, useState } from "react";
+
+import { Committed } from "../Committed";
+import { CommittedText } from "../FormParts";
+import { WhenForm } from "./ConditionForm";
+import { type Draft, missing, sentence } from "./draft";
+import { type About, ChoiceInput } from "./FieldInput";
+import { ThenForm } from "./ThenForm";
+
+/** A rule that is being made or changed: nothing is sent before it is whole. */
+export function RuleForm({
+  draft: begun,
+  saveLabel,
+  actors,
+  rules,
+  pick,
+  onDraft,
+  onSave,
+  onCancel,
+}: About & {
+  draft: Draft;
+  saveLabel: string;
+  /** With every change, and null at the end: for the map. */
+  onDraft: (draft: Draft | null) => void;
+  onSave: (draft: Draft) => void;
+  onCancel: () => void;
+}) {
+  const [draft, setDraft] = useState(begun);
+  useEffect(() => {
+    onDraft(draft);
+    return () => onDraft(null);
+  }, [draft, onDraft]);
+  const put = (fields: Partial<Draft>): void => setDraft((old) => ({ ...old, ...fields }));
+  const taken = rules.includes(draft.id.trim());
+  const lacking = missing(draft);
+  const about = { actors, rules, pick, others: actors.filter((one) => one !== draft.actor) };
+  return (
+    <Stack gap={8}>
+      <CommittedText label="Name" value={draft.id} maxLength={60} onCommit={(id) => put({ id })} />
+      <ChoiceInput
+        label="Who acts"
+        value={draft.actor}
+        data={actors.map((one) => ({ value: one, label: one }))}
+        onChange={(actor) => put({ actor: actor ?? "" })}
+      />
+      <WhenForm condition={draft.when} onChange={(when) => put({ when })} {...about} />
+      <ThenForm then={draft.then} onChange={(then) => put({ then })} {...about} />
+      <Committed
+        label="Fires at most"
+        suffix={draft.times === 1 ? " time" : " times"}
+        min={1}
+        max={100_000}
+        digits={0}
+        value={draft.times}
+        onCommit={(times) => put({ times: times ?? 1 })}
+      />
+      <Text size="sm" role="status">
+        {sentence(draft)}
+      </Text>
+      {lacking.length > 0 && <Text size="sm">Still to give: {lacking.join(", ")}.</Text>}
+      {taken && <Text size="sm">There is a rule {draft.id} already; choose another name.</Text>}
+      <Group gap={6}>
+        <Button disabled={lacking.length > 0 || taken} onClick={() => onSave(draft)}>
+          {saveLabel}
+        </Button>
+        <Button variant="default" onClick={onCancel}>
+          Cancel
+        </Button>
+      </Group>
+    </Stack>
+  );
+}

@@ -1,0 +1,100 @@
+import { Button, Text } from "@mantine/core";
+import { useState } from "react";
+
+import type { Edit, ScenarioDocument } from "../../api/types";
+import { count } from "../../ui/words";
+import { PartCard } from "../DemandParts";
+import { OpenAndShow } from "../FormParts";
+import type { PlacePick } from "../pick";
+import { type Draft, draftOf, newDraft, type Rule, ruleOf, sentence } from "./draft";
+import { RuleForm } from "./RuleForm";
+
+/** Rules as sentences, with a form for each; where they act is on the map. */
+export function RulesStep({
+  document: { actors, flows, rules },
+  pick,
+  onDraft,
+  onEdit,
+  onShow,
+}: {
+  document: Pick<ScenarioDocument, "actors" | "flows" | "rules">;
+  pick: PlacePick;
+  /** The rule whose form is open, as it is now. */
+  onDraft: (draft: Draft | null) => void;
+  onEdit: (edit: Edit, label?: string) => void;
+  onShow: (rule: Rule) => void;
+}) {
+  /** Id of the rule whose form is open, "" for a new one. */
+  const [open, setOpen] = useState<string | null>(null);
+  const ids = [...actors].sort((one, other) => Number(other.ego) - Number(one.ego)).map(({ id }) => id);
+  const close = (): void => {
+    pick.stop();
+    setOpen(null);
+  };
+  const save = (draft: Draft): void => {
+    const renamed = open && open !== draft.id.trim() ? { instead_of: open } : {};
+    onEdit({ kind: "set_rule", rule: ruleOf(draft), ...renamed });
+    close();
+  };
+  const form = (draft: Draft, saveLabel: string) => (
+    <RuleForm
+      draft={draft}
+      saveLabel={saveLabel}
+      actors={ids}
+      rules={rules.map(({ id }) => id).filter((id) => id !== open)}
+      pick={pick}
+      onDraft={onDraft}
+      onSave={save}
+      onCancel={close}
+    />
+  );
+  const opened = (id: string): void => {
+    pick.stop();
+    setOpen(open === id ? null : id);
+  };
+  return (
+    <>
+      <Text size="sm">When something holds, a road user does something; the rest is left to SUMO.</Text>
+      {rules.map((rule) => {
+        const draft = draftOf(rule);
+        return (
+          <PartCard
+            key={rule.id}
+            name={rule.id}
+            what={rule.actor}
+            onRemove={() => {
+              close();
+              onEdit({ kind: "remove_rule", rule: rule.id });
+            }}
+          >
+            <Text size="sm">{sentence(draft)}</Text>
+            <OpenAndShow
+              part={rule.id}
+              open={open === rule.id}
+              onOpen={() => opened(rule.id)}
+              onShow={() => onShow(rule)}
+            />
+            {open === rule.id && form(draft, "Save the rule")}
+          </PartCard>
+        );
+      })}
+      {open === "" ? (
+        <section className="fold" aria-label="New rule">
+          {form(newDraft(ids, rules), "Add the rule")}
+        </section>
+      ) : (
+        <Button disabled={ids.length === 0} onClick={() => opened("")}>
+          Add a rule
+        </Button>
+      )}
+      {ids.length === 0 && (
+        <Text size="sm">
+          {flows.length > 0 ? "Rules are made for single road users." : "Place a road user first."}
+        </Text>
+      )}
+    </>
+  );
+}
+
+export const ruleNote = (rules: readonly Rule[]): string =>
+  rules.length === 0 ? "When this, then that" : count(rules.length, "rule");

@@ -1,0 +1,136 @@
+import { Button, Group, Select } from "@mantine/core";
+
+import { nth } from "../../lists";
+import { ListButtons } from "../FormParts";
+import { ACTION_KINDS, actionKind } from "./actionKinds";
+import { type Item, newItem, settled } from "./draft";
+import { type About, FieldInput } from "./FieldInput";
+
+type Then = readonly (readonly Item[])[];
+
+const KINDS = Object.entries(ACTION_KINDS).map(([value, { label }]) => ({ value, label }));
+
+/** What the road user then does: actions in their order, of which each may be several at once. */
+export function ThenForm({
+  then,
+  onChange,
+  ...about
+}: About & { others: readonly string[]; then: Then; onChange: (then: Then) => void }) {
+  const fresh = (): Item => newItem("brake", actionKind("brake"), about.others);
+  const put = (n: number, items: readonly Item[]): void =>
+    onChange(
+      items.length > 0 ? then.map((one, k) => (k === n ? items : one)) : then.filter((_, k) => k !== n),
+    );
+  const swap = (n: number): void => {
+    const next = [...then];
+    [next[n - 1], next[n]] = [nth(then, n), nth(then, n - 1)];
+    onChange(next);
+  };
+  return (
+    <>
+      {then.map((items, n) => {
+        const label = then.length > 1 ? `Action ${n + 1}` : "Action";
+        return (
+          <section key={n} className="fold" aria-label={label}>
+            {items.map((item, m) => (
+              <ActionForm
+                key={m}
+                label={items.length > 1 ? `${label}, part ${m + 1}` : label}
+                item={item}
+                onChange={(next) =>
+                  put(
+                    n,
+                    items.map((one, k) => (k === m ? next : one)),
+                  )
+                }
+                onRemove={
+                  items.length > 1
+                    ? () =>
+                        put(
+                          n,
+                          items.filter((_, k) => k !== m),
+                        )
+                    : undefined
+                }
+                {...about}
+              />
+            ))}
+            <Group justify="space-between" gap={6}>
+              <Button
+                size="compact-sm"
+                variant="default"
+                aria-label={`At the same time as ${label.toLowerCase()}`}
+                onClick={() => put(n, [...items, fresh()])}
+              >
+                At the same time
+              </Button>
+              {then.length > 1 && (
+                <ListButtons
+                  earlier={`Move ${label.toLowerCase()} earlier`}
+                  removal={`Remove ${label.toLowerCase()}`}
+                  first={n === 0}
+                  only={false}
+                  onEarlier={() => swap(n)}
+                  onRemove={() => put(n, [])}
+                />
+              )}
+            </Group>
+          </section>
+        );
+      })}
+      <Button size="compact-sm" variant="default" onClick={() => onChange([...then, [fresh()]])}>
+        Then another action
+      </Button>
+    </>
+  );
+}
+
+function ActionForm({
+  label,
+  item,
+  onChange,
+  onRemove,
+  ...about
+}: About & {
+  others: readonly string[];
+  label: string;
+  item: Item;
+  onChange: (item: Item) => void;
+  onRemove?: () => void;
+}) {
+  const { others } = about;
+  const known = actionKind(item.kind);
+  return (
+    <>
+      <Select
+        label={label}
+        data={KINDS}
+        value={item.kind}
+        allowDeselect={false}
+        onChange={(kind) => {
+          if (kind && kind !== item.kind) onChange(newItem(kind, actionKind(kind), others));
+        }}
+      />
+      {known?.fields.map((field) => (
+        <FieldInput
+          key={`${item.kind} ${field.is === "one" ? field.label : field.name}`}
+          where={label}
+          field={field}
+          values={item.values}
+          {...about}
+          onChange={(values) => onChange({ ...item, values: settled(known, values, others) })}
+        />
+      ))}
+      {onRemove && (
+        <Button
+          size="compact-sm"
+          variant="default"
+          aria-label={`Remove ${label.toLowerCase()}`}
+          onClick={onRemove}
+        >
+          Remove
+        </Button>
+      )}
+    </>
+  );
+}

@@ -1,0 +1,158 @@
+import type { PickBy } from "../pick";
+
+/** Fields of a condition or action, without those that are not given. */
+export type Values = Readonly<Record<string, unknown>>;
+
+interface Named {
+  name: string;
+  label: string;
+}
+
+/** A field of the form; `scale` is how many of its unit are one of the document's. */
+export type PlainField =
+  | (Named & {
+      is: "number";
+      suffix: string;
+      min: number;
+      max: number;
+      digits: number;
+      scale: number;
+      /** What a new one begins with; without it the field may be empty. */
+      start?: number;
+    })
+  | (Named & { is: "actor"; optional?: boolean })
+  /** A place, light or movement, picked on the map or typed. */
+  | (Named & { is: "place"; by: PickBy; hint: string })
+  | (Named & { is: "rule" })
+  | (Named & { is: "choice"; choices: Readonly<Record<string, string>>; optional?: boolean })
+  | (Named & { is: "flag"; otherwise: boolean })
+  /** Places in their order; with `timed` also the speeds or times at them. */
+  | (Named & { is: "points"; timed: boolean })
+  | (Named & { is: "pose" })
+  /** A recorded trajectory, which is only shown. */
+  | (Named & { is: "rows" })
+  | (Named & { is: "name" })
+  /** Values of a kind of one's own, which are only shown. */
+  | (Named & { is: "given" });
+
+/** Exactly one of several fields, by their labels. */
+export interface OneOf {
+  is: "one";
+  label: string;
+  of: readonly PlainField[];
+}
+
+export type Field = (PlainField | OneOf) & {
+  /** Whether it has no meaning with the other values; it is then left out. */
+  without?: (values: Values) => boolean;
+};
+
+/** A kind of condition or action. */
+export interface Kind {
+  label: string;
+  fields: readonly Field[];
+  words: (values: Values, actor: string) => string;
+}
+
+type NumberField = Extract<PlainField, { is: "number" }>;
+
+export const number = (
+  name: string,
+  label: string,
+  suffix: string,
+  start?: number,
+  more: Partial<Pick<NumberField, "min" | "max" | "digits" | "scale">> = {},
+): NumberField => ({
+  is: "number",
+  name,
+  label,
+  suffix,
+  min: 0,
+  max: 1e4,
+  digits: 1,
+  scale: 1,
+  start,
+  ...more,
+});
+
+export const speed = (name: string, label: string, start?: number): NumberField =>
+  number(name, label, " km/h", start, { max: 360, scale: 3.6 });
+
+export const place = (name: string, label: string): PlainField => ({
+  is: "place",
+  name,
+  label,
+  by: "place",
+  hint: "a node, or x, y in metres",
+});
+
+export const light = (): PlainField => ({
+  is: "place",
+  name: "light",
+  label: "Traffic light",
+  by: "light",
+  hint: "its junction",
+});
+
+export const movement = (): PlainField => ({
+  is: "place",
+  name: "movement",
+  label: "Movement",
+  by: "turn",
+  hint: "r1>r2, or walk r1",
+});
+
+export const OF: Field = { is: "actor", name: "of", label: "Whose (its own if empty)", optional: true };
+export const TO: Field = { is: "actor", name: "to", label: "Other road user" };
+export const OVER = number("over", "Duration", " s", 3, { min: 0.1 });
+
+/** Of a kind that an installed package gives. */
+export const OWN: readonly Field[] = [
+  { is: "name", name: "kind", label: "Its name" },
+  { is: "given", name: "values", label: "Values" },
+  { is: "actor", name: "to", label: "Other road user (may be empty)", optional: true },
+];
+
+/** Values by name, as in "gap 3, side left". */
+export const listed = (values: unknown): string =>
+  Object.entries(given(values) ? (values as object) : {})
+    .map(([name, value]) => `${name} ${String(value)}`)
+    .join(", ");
+
+/** Below or above a value. */
+export const bound = (suffix: string, start: number, scale = 1, min = 0): Field => ({
+  is: "one",
+  label: "Bound",
+  of: [
+    number("below", "Below", suffix, start, { digits: 2, scale, min, max: 1e6 }),
+    number("above", "Above", suffix, start, { digits: 2, scale, min, max: 1e6 }),
+  ],
+});
+
+// Words
+
+export const given = (value: unknown): boolean => value !== undefined && value !== null;
+
+export const text = (value: unknown): string =>
+  Array.isArray(value)
+    ? value.map((one) => (typeof one === "number" ? String(Number(one.toFixed(2))) : "?")).join(", ")
+    : typeof value === "string" && value
+      ? value
+      : "…";
+
+export const amount = (value: unknown, unit: string, scale = 1): string =>
+  typeof value !== "number" ? `… ${unit}` : `${Number((value * scale).toFixed(2))} ${unit}`;
+
+/** Words with an amount if there is one. */
+export const maybe = (value: unknown, words: string, unit: string, scale = 1): string =>
+  given(value) ? `${words} ${amount(value, unit, scale)}` : "";
+
+export const limit = (values: Values, unit: string, scale = 1): string =>
+  given(values.above)
+    ? `above ${amount(values.above, unit, scale)}`
+    : `below ${amount(values.below, unit, scale)}`;
+
+export const whose = (values: Values, actor: string): string => (given(values.of) ? text(values.of) : actor);
+
+export const between = (values: Values): string =>
+  given(values.of) ? `of ${text(values.of)} to ${text(values.to)}` : `to ${text(values.to)}`;

@@ -1,0 +1,48 @@
+import { Button, Text, Title } from "@mantine/core";
+
+import type { CriterionInfo } from "../api/runs";
+import { clock } from "../ui/words";
+
+/** What the scenario asked of the run: met or not, the value, and its moment in the recording. */
+export function Criteria({
+  criteria,
+  onShow,
+}: {
+  criteria: readonly CriterionInfo[];
+  /** Shows a second of the run in the recording; null without one. */
+  onShow: ((time: number) => void) | null;
+}) {
+  if (criteria.length === 0) return null;
+  const missed = criteria.filter(({ passed }) => !passed).length;
+  return (
+    <section aria-label="Criteria" style={{ marginTop: 14 }}>
+      <Title order={3} size="h5">
+        {missed === 0 ? "All criteria are met" : `${missed} of ${criteria.length} criteria not met`}
+      </Title>
+      <ul className="criteria">
+        {criteria.map(({ criterion, words, passed, value, unit, time }) => (
+          <li key={criterion}>
+            <strong data-met={passed}>{passed ? "Met" : "Not met"}:</strong> {words}
+            <Text size="sm" c="dimmed" component="span">
+              {value === null ? " (not measured)" : `, is ${rounded(value)}${unit ? ` ${unit}` : ""}`}
+              {time !== null && !onShow && ` at ${clock(time)}`}
+            </Text>
+            {time !== null && onShow && (
+              <Button
+                size="compact-xs"
+                variant="default"
+                ml={6}
+                aria-label={`Show ${words} at ${clock(time)}`}
+                onClick={() => onShow(time)}
+              >
+                {clock(time)}
+              </Button>
+            )}
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}
+
+const rounded = (value: number): string => String(Number(value.toFixed(2)));

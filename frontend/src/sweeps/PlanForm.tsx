@@ -1,0 +1,305 @@
+import {
+  Alert,
+  Button,
+  Group,
+  NumberInput,
+  SegmentedControl,
+  Select,
+  TagsInput,
+  Text,
+  TextInput,
+} from "@mantine/core";
+import { useEffect, useMemo, useRef, useState } from "react";
+
+import { allFigures } from "../api/figures";
+import { type PlannedSweep, sweeps } from "../api/sweeps";
+import type { ScenarioDocument } from "../api/types";
+import { shortNumber } from "../editor/parameters";
+import { go } from "../ui/address";
+import { reasonOf } from "../ui/reason";
+import { useLoaded } from "../ui/useLoaded";
+import { bytes, count } from "../ui/words";
+import { countOf, faultOf, lasting, METHODS, newForm, type SweepForm, type Varied, wishOf } from "./plan";
+
+const HOW = [
+  { value: "fixed", label: "Fixed" },
+  { value: "range", label: "Range" },
+  { value: "set", label: "Set" },
+];
+
+/** What is varied and how; says what it takes before it starts. */
+export function PlanForm({ scenario, document }: { scenario: string; document: ScenarioDocument }) {
+  const [form, setForm] = useState(() => newForm(document));
+  const [planned, setPlanned] = useState<PlannedSweep | null>(null);
+  const [failure, setFailure] = useState<string | null>(null);
+  const [busy, setBusy] = useState<"plan" | "start" | null>(null);
+  const figures = useLoaded(allFigures).value;
+  const set = (fields: Partial<SweepForm>): void => {
+    setForm({ ...form, ...fields });
+    setPlanned(null); // which is of another sweep now
+    setFailure(null);
+  };
+  const answer = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    if (planned) answer.current?.scrollIntoView({ block: "nearest" });
+  }, [planned]);
+  const fault = faultOf(form);
+  const cases = countOf(form);
+  const wish = useMemo(() => wishOf(scenario, form), [scenario, form]);
+  const failed = (error: unknown): void => {
+    setFailure(reasonOf(error));
+    setBusy(null);
+  };
+  const plan = (): void => {
+    setBusy("plan");
+    setFailure(null);
+    sweeps.plan(wish).then((found) => {
+      setPlanned(found);
+      setBusy(null);
+    }, failed);
+  };
+  const start = (): void => {
+    setBusy("start");
+    sweeps.start(wish).then(({ sweep }) => go({ view: "sweep", scenario, sweep }), failed);
+  };
+  const grid = form.method === "grid";
+  return (
+    <div className="plan-form">
+      {Object.entries(document.parameters).map(([name, { value, unit, description }]) => (
+        <VariedRow
+          key={name}
+          name={name}
+          unit={unit}
+          value={value}
+          description={description}
+          computed={document.formulas[`parameters/${name}/value`]}
+          grid={grid}
+          varied={form.varied[name]}
+          onVaried={(one) => set({ varied: { ...form.varied, [name]: one } })}
+        />
+      ))}
+      <div className="plan-fields">
+        <Select
+          label="Plan"
+          data={[...METHODS]}
+          value={form.method}
+          allowDeselect={false}
+          onChange={(method) => {
+            const found = METHODS.find((one) => one.value === method);
+            if (found) set({ method: found.value });
+          }}
+        />
+        {!grid && (
+          <>
+            <Whole
+              label="Number of cases"
+              value={form.samples}
+              onValue={(samples) => set({ samples })}
+              least={1}
+            />
+            <Whole
+              label="Random seed of the samples"
+              value={form.sampleSeed}
+              onValue={(sampleSeed) => set({ sampleSeed })}
+              least={0}
+            />
+          </>
+        )}
+        <NumberInput
+          label="Random seed of the runs"
+          placeholder={`the scenario's, ${document.seed}`}
+          allowDecimal={false}
+          min={0}
+          value={form.seed ?? ""}
+          onChange={(next) => set({ seed: typeof next === "number" ? next : null })}
+        />
+        <NumberInput
+          label="Least time to collision of a safe case"
+          placeholder="no collision is enough"
+          suffix=" s"
+          min={0}
+          step={0.1}
+          value={form.ttc ?? ""}
+          onChange={(next) => set({ ttc: typeof next === "number" ? next : null })}
+        />
+        <Whole
+          label="Runs at a time"
+          value={form.processes}
+          onValue={(processes) => set({ processes })}
+          least={1}
+          most={256}
+        />
+        <TagsInput
+          className="plan-wide"
+          label="Figures of runs as more columns"
+          placeholder="for example mean_speed"
+          data={(figures ?? []).map(({ name }) => name)}
+          value={[...form.figures]}
+          onChange={(names) => set({ figures: names })}
+        />
+      </div>
+      {fault ? (
+        <Text size="sm" role="status">
+          {fault}
+        </Text>
+      ) : (
+        <Text size="sm" role="status">
+          {count(cases, "case")}, each a run of {shortNumber(document.simulation.duration)} s.
+        </Text>
+      )}
+      {failure && (
+        <Alert color="red" title="This sweep is not possible">
+          {failure}
+        </Alert>
+      )}
+      {planned && (
+        <Alert
+          ref={answer}
+          role="status"
+          color={planned.disk > planned.free ? "red" : "blue"}
+          title={planned.disk > planned.free ? "Not enough disk space" : "What it takes"}
+        >
+          {costOf(planned)}
+        </Alert>
+      )}
+      <Group>
+        <Button
+          variant={planned ? "default" : "filled"}
+          loading={busy === "plan"}
+          disabled={fault !== null || busy !== null}
+          onClick={plan}
+        >
+          Plan the sweep
+        </Button>
+        {planned && (
+          <Button loading={busy === "start"} disabled={busy !== null} onClick={start}>
+            Run {count(planned.cases, "case")}
+          </Button>
+        )}
+      </Group>
+    </div>
+  );
+}
+
+/** The forecast in a sentence. */
+export function costOf(planned: PlannedSweep): string {
+  const { cases, tried, case_seconds, seconds, disk, free, processes, patience } = planned;
+  const room = `${bytes(disk)} of disk (${bytes(free)} free)`;
+  if (seconds === null)
+    return `${count(cases, "case")}. One of them, ${tried}, was tried and takes more than ${patience} s.`;
+  const one = `One of them, ${tried}, was tried and took ${case_seconds.toFixed(1)} s`;
+  const together = processes === 1 ? "one after another" : `${processes} at a time`;
+  return `${count(cases, "case")}. ${one}: about ${lasting(seconds)} for all, ${together}, and ${room}.`;
+}
+
+function Whole({
+  label,
+  value,
+  least,
+  most = 100_000,
+  onValue,
+}: {
+  label: string;
+  value: number;
+  least: number;
+  most?: number;
+  onValue: (value: number) => void;
+}) {
+  return (
+    <NumberInput
+      label={label}
+      allowDecimal={false}
+      min={least}
+      max={most}
+      value={value}
+      onChange={(next) => {
+        if (typeof next === "number") onValue(Math.max(least, next));
+      }}
+    />
+  );
+}
+
+/** One parameter of the form: fixed, a range, or a set of values. */
+function VariedRow({
+  name,
+  unit,
+  value,
+  description,
+  computed,
+  grid,
+  varied,
+  onVaried,
+}: {
+  name: string;
+  unit: string;
+  value: number;
+  description: string;
+  computed: string | undefined;
+  grid: boolean;
+  varied: Varied | undefined;
+  onVaried: (varied: Varied) => void;
+}) {
+  if (!varied) return null;
+  const suffix = unit ? ` ${unit}` : "";
+  const number = (label: string, key: "low" | "high") => (
+    <NumberInput
+      label={label}
+      aria-label={`${label} of ${name}`}
+      suffix={suffix}
+      value={varied[key]}
+      onChange={(next) => {
+        if (typeof next === "number") onVaried({ ...varied, [key]: next });
+      }}
+    />
+  );
+  return (
+    <section className="fold varied" aria-label={`Parameter ${name}`}>
+      <div className="varied-name">
+        <Text fw={600} size="sm">
+          {name}
+        </Text>
+        <Text size="xs" c="dimmed">
+          {[description, `now ${shortNumber(value)}${suffix}`].filter(Boolean).join(", ")}
+        </Text>
+      </div>
+      {computed !== undefined ? (
+        <Text size="sm">Computed: {computed}</Text>
+      ) : (
+        <SegmentedControl
+          size="xs"
+          aria-label={`How ${name} is varied`}
+          data={HOW}
+          value={varied.how}
+          onChange={(how) => onVaried({ ...varied, how: how as Varied["how"] })}
+        />
+      )}
+      {varied.how === "range" && (
+        <>
+          {number("From", "low")}
+          {number("To", "high")}
+          {grid && (
+            <NumberInput
+              label="Values"
+              aria-label={`Values of ${name}`}
+              allowDecimal={false}
+              min={2}
+              max={10_000}
+              value={varied.steps}
+              onChange={(next) => {
+                if (typeof next === "number") onVaried({ ...varied, steps: Math.max(2, next) });
+              }}
+            />
+          )}
+        </>
+      )}
+      {varied.how === "set" && (
+        <TextInput
+          label={`Values, between commas${unit ? `, ${unit}` : ""}`}
+          aria-label={`Values of ${name}`}
+          value={varied.values}
+          onChange={(event) => onVaried({ ...varied, values: event.currentTarget.value })}
+        />
+      )}
+    </section>
+  );
+}

@@ -1,0 +1,160 @@
+import { Group, Select } from "@mantine/core";
+import { useId, useState } from "react";
+
+import type { SweepCase, SweepCases } from "../api/sweeps";
+import { shortNumber } from "../editor/parameters";
+import { marksOf, type Verdict, VERDICT_WORD, verdictOf } from "./plan";
+
+const W = 760;
+const H = 420;
+const BOX = { left: 62, right: W - 16, top: 16, bottom: H - 48 };
+const ORDER: readonly Verdict[] = ["other", "calm", "safe", "unsafe"];
+
+interface Axis {
+  name: string;
+  label: string;
+  of: (one: SweepCase) => number | null;
+}
+
+/** Cases in the plane of two parameters, and the boundary between those that are safe and not. */
+export function Plane({ table, onOpen }: { table: SweepCases; onOpen: (name: string) => void }) {
+  const id = useId();
+  const axes = axesOf(table);
+  const [chosen, setChosen] = useState<[number, number]>([0, 1]);
+  const [across, up] = [axes[chosen[0]], axes[chosen[1]]];
+  const dots = table.cases.flatMap((one) => {
+    const [x, y] = [across?.of(one) ?? null, up?.of(one) ?? null];
+    return x === null || y === null ? [] : [{ one, x, y, verdict: verdictOf(one, table.columns) }];
+  });
+  if (!across || !up || dots.length === 0) return null;
+  const [px, xs] = scaleOf(
+    dots.map(({ x }) => x),
+    BOX.left,
+    BOX.right,
+  );
+  const [py, ys] = scaleOf(
+    dots.map(({ y }) => y),
+    BOX.bottom,
+    BOX.top,
+  );
+  const plane = table.parameters.length === 2 && chosen[0] < 2 && chosen[1] < 2;
+  const flip = chosen[0] === 1;
+  const line = plane
+    ? table.boundary
+        .map((ends) =>
+          ends.map(([a, b]) => (flip ? [b, a] : [a, b])).map(([x = 0, y = 0]) => `${px(x)},${py(y)}`),
+        )
+        .map(([from, to]) => `M${from}L${to}`)
+        .join("")
+    : "";
+  const pick = (label: string, at: 0 | 1) => (
+    <Select
+      size="xs"
+      label={label}
+      data={axes.map((axis, n) => ({ value: String(n), label: axis.label, disabled: n === chosen[1 - at] }))}
+      value={String(chosen[at])}
+      allowDeselect={false}
+      onChange={(next) => {
+        if (next !== null) setChosen(at === 0 ? [Number(next), chosen[1]] : [chosen[0], Number(next)]);
+      }}
+    />
+  );
+  return (
+    <figure className="plane" aria-labelledby={id}>
+      <figcaption id={id}>
+        Safe and not: each dot is a case
+        {plane && line && ", the line is the boundary, half-way between neighbours"}
+      </figcaption>
+      {axes.length > 2 && (
+        <Group gap="sm" mb={6}>
+          {pick("Across", 0)}
+          {pick("Up", 1)}
+        </Group>
+      )}
+      {/* The table below has all of this for readers of the screen. */}
+      <svg viewBox={`0 0 ${W} ${H}`} aria-hidden="true">
+        {xs.map((v) => (
+          <g key={v}>
+            <line className="plane-grid" x1={px(v)} x2={px(v)} y1={BOX.top} y2={BOX.bottom} />
+            <text x={px(v)} y={BOX.bottom + 18} textAnchor="middle">
+              {shortNumber(v)}
+            </text>
+          </g>
+        ))}
+        {ys.map((v) => (
+          <g key={v}>
+            <line className="plane-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
+            <text x={BOX.left - 8} y={py(v) + 4} textAnchor="end">
+              {shortNumber(v)}
+            </text>
+          </g>
+        ))}
+        <text x={(BOX.left + BOX.right) / 2} y={H - 8} textAnchor="middle">
+          {across.label}
+        </text>
+        <text transform={`translate(14 ${(BOX.top + BOX.bottom) / 2}) rotate(-90)`} textAnchor="middle">
+          {up.label}
+        </text>
+        {line && <path className="plane-boundary" d={line} />}
+        {ORDER.flatMap((verdict) =>
+          dots
+            .filter((dot) => dot.verdict === verdict)
+            .map(({ one, x, y }) => (
+              <circle
+                key={one.case}
+                className="plane-dot"
+                data-case={one.case}
+                data-verdict={verdict}
+                data-open={one.status !== "refused"}
+                cx={px(x)}
+                cy={py(y)}
+                r={table.cases.length > 400 ? 4 : 6}
+                onClick={() => {
+                  if (one.status !== "refused") onOpen(one.case);
+                }}
+              >
+                <title>{titleOf(one, table, verdict)}</title>
+              </circle>
+            )),
+        )}
+      </svg>
+      <div className="plane-key" aria-hidden="true">
+        {ORDER.filter((verdict) => dots.some((dot) => dot.verdict === verdict)).map((verdict) => (
+          <span key={verdict} className="verdict" data-verdict={verdict}>
+            {VERDICT_WORD[verdict]} ({dots.filter((dot) => dot.verdict === verdict).length})
+          </span>
+        ))}
+      </div>
+    </figure>
+  );
+}
+
+/** Parameters, and after them the least time to collision. */
+function axesOf({ parameters, columns }: SweepCases): Axis[] {
+  const found: Axis[] = parameters.map(({ name, unit }, n) => ({
+    name,
+    label: unit ? `${name}, ${unit}` : name,
+    of: ({ values }) => values[n] ?? null,
+  }));
+  const ttc = columns.findIndex(({ name }) => name === "min_ttc");
+  const last: Axis = { name: "min_ttc", label: "min_ttc, s", of: ({ measures }) => measures[ttc] ?? null };
+  return ttc < 0 ? found : [...found, last];
+}
+
+/** Where values lie, with a little room around, and round numbers between. */
+function scaleOf(values: readonly number[], from: number, to: number): [(v: number) => number, number[]] {
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const room = (high - low) * 0.05 || Math.abs(low) * 0.05 || 1;
+  const [a, b] = [low - room, high + room];
+  const at = (v: number): number => Number((from + ((to - from) * (v - a)) / (b - a)).toFixed(2));
+  return [at, marksOf(a, b)];
+}
+
+function titleOf(one: SweepCase, { parameters }: SweepCases, verdict: Verdict): string {
+  const values = parameters.map(({ name, unit }, n) =>
+    `${name} ${shortNumber(one.values[n] ?? 0)} ${unit}`.trim(),
+  );
+  const word =
+    verdict === "other" ? [one.status, one.detail].filter(Boolean).join(": ") : VERDICT_WORD[verdict];
+  return `${one.case}: ${values.join(", ")}: ${word}`;
+}

@@ -1,0 +1,137 @@
+import { Alert, Anchor, Button, Group, Loader, Modal, Progress, Text, Title } from "@mantine/core";
+import { useState } from "react";
+
+import { type SweepInfo, sweeps } from "../api/sweeps";
+import { go, hashOf } from "../ui/address";
+import { tell, tellError } from "../ui/notices";
+import { count } from "../ui/words";
+import { CaseTable } from "./CaseTable";
+import { lasting } from "./plan";
+import { Plane } from "./Plane";
+import { useSweep } from "./useSweep";
+import "./sweeps.css";
+
+/** One sweep: how far it is, the boundary between safe and not, and its cases. */
+export function SweepView({ scenario, sweep }: { scenario: string; sweep: string }) {
+  const { info, cases, error, reload } = useSweep(sweep);
+  const [opening, setOpening] = useState(false);
+  const open = (name: string): void => {
+    if (opening) return;
+    setOpening(true);
+    sweeps.open(sweep, name).then(
+      (saved) => {
+        tell(`${name} is saved as the scenario ${saved.name}. Run it: its figures are those of the sweep.`);
+        go({ view: "editor", scenario: saved.name });
+      },
+      (reason: unknown) => {
+        setOpening(false);
+        tellError(reason);
+      },
+    );
+  };
+  return (
+    <div className="sweeps-view">
+      <Title order={1} size="h2" mb="xs">
+        Sweep {sweep}
+      </Title>
+      {error && (
+        <Alert color="red" title="The sweep cannot be shown">
+          {error}
+        </Alert>
+      )}
+      {!info && !error && <Loader aria-label="Loading the sweep" />}
+      {info && <Head scenario={scenario} info={info} onChanged={reload} />}
+      {info && info.state !== "running" && !cases && !error && <Loader aria-label="Loading the cases" />}
+      {cases && (
+        <>
+          <Plane table={cases} onOpen={open} />
+          <Title order={2} size="h4" mt="lg" mb="xs">
+            Cases
+          </Title>
+          <Text size="sm" mb="xs">
+            Safe: {cases.limits.join("; ")}. A click on a case opens it in the editor as a scenario of its
+            own, which runs alone with the same figures.
+          </Text>
+          <CaseTable table={cases} onOpen={open} />
+        </>
+      )}
+    </div>
+  );
+}
+
+/** Outcome or progress, and what can be done. */
+function Head({ scenario, info, onChanged }: { scenario: string; info: SweepInfo; onChanged: () => void }) {
+  const [asking, setAsking] = useState(false);
+  const { sweep, state, cases, ended, seconds_left: left, safe, unsafe, error } = info;
+  const ask = (call: Promise<unknown>): void => {
+    call.then(onChanged, tellError);
+  };
+  const remove = (): void => {
+    sweeps.remove(sweep).then(() => go({ view: "sweeps", scenario }), tellError);
+  };
+  return (
+    <>
+      <Text role="status">
+        {count(cases, "case")} of {info.parameters.join(", ")}
+        {state === "done" && `: ${safe ?? 0} safe, ${unsafe ?? 0} not`}
+        {state === "done" &&
+          (safe ?? 0) + (unsafe ?? 0) < cases &&
+          `, ${cases - (safe ?? 0) - (unsafe ?? 0)} not run`}
+        {state !== "done" && `: ${ended} have ended`}
+        {state === "running" && left !== null && `, about ${lasting(left)} left`}
+        {state === "stopped" && ". It was stopped; what is missing can be run at any time"}.
+      </Text>
+      {state === "running" && (
+        <Progress
+          my="xs"
+          size="lg"
+          animated
+          value={(100 * ended) / cases}
+          aria-label="Cases that have ended"
+        />
+      )}
+      {state === "failed" && (
+        <Alert color="red" title="The sweep has failed" my="xs">
+          {error}
+        </Alert>
+      )}
+      <Group my="sm">
+        {state === "running" && (
+          <Button variant="default" onClick={() => ask(sweeps.stop(sweep))}>
+            Stop
+          </Button>
+        )}
+        {(state === "stopped" || state === "failed") && (
+          <Button onClick={() => ask(sweeps.resume(sweep, 2))}>Resume</Button>
+        )}
+        {state === "done" && (
+          <>
+            <Anchor href={sweeps.fileUrl(sweep, "sweep.html")} target="_blank" rel="noreferrer">
+              Whole page, with parallel coordinates
+            </Anchor>
+            <Anchor href={sweeps.fileUrl(sweep, "cases.parquet")}>Table as Parquet</Anchor>
+          </>
+        )}
+        {state !== "running" && (
+          <Button variant="subtle" color="gray" onClick={() => setAsking(true)}>
+            Delete the sweep
+          </Button>
+        )}
+        <Anchor href={hashOf({ view: "sweeps", scenario })}>All sweeps</Anchor>
+      </Group>
+      <Modal opened={asking} onClose={() => setAsking(false)} title={`Delete ${sweep}?`}>
+        <Text size="sm" mb="md">
+          Its {count(ended, "run")} are deleted for good. Scenarios that were made of its cases stay.
+        </Text>
+        <Group justify="flex-end">
+          <Button variant="default" onClick={() => setAsking(false)}>
+            Keep it
+          </Button>
+          <Button color="red" onClick={remove}>
+            Delete
+          </Button>
+        </Group>
+      </Modal>
+    </>
+  );
+}

@@ -1,0 +1,168 @@
+import type { SweepCase, SweepCases, SweepWish, VaryWish } from "../api/sweeps";
+import type { ScenarioDocument } from "../api/types";
+
+type Method = SweepWish["method"] & string;
+
+/** What a parameter does in a sweep, as its form has it. */
+export interface Varied {
+  how: "fixed" | "range" | "set";
+  low: number;
+  high: number;
+  steps: number;
+  /** Of a set: numbers between commas. */
+  values: string;
+}
+
+/** A sweep as its form has it. */
+export interface SweepForm {
+  varied: Readonly<Record<string, Varied>>;
+  method: Method;
+  samples: number;
+  sampleSeed: number;
+  /** Of the runs; null is the scenario's. */
+  seed: number | null;
+  /** Least time to collision of a safe case, seconds; null asks for no collision only. */
+  ttc: number | null;
+  figures: readonly string[];
+  processes: number;
+}
+
+export const METHODS: readonly { value: Method; label: string }[] = [
+  { value: "grid", label: "Grid: all combinations" },
+  { value: "sobol", label: "Samples: Sobol sequence" },
+  { value: "latin", label: "Samples: Latin hypercube" },
+  { value: "random", label: "Samples: random" },
+];
+
+/** What a form begins with: each parameter with bounds takes five values between them. */
+export function newForm({
+  parameters,
+  formulas,
+}: Pick<ScenarioDocument, "parameters" | "formulas">): SweepForm {
+  const varied = Object.entries(parameters).map(([name, { value, min, max }]): [string, Varied] => {
+    const computed = formulas[`parameters/${name}/value`] !== undefined;
+    const bounded = min !== null && max !== null && min < max && !computed;
+    return [
+      name,
+      {
+        how: bounded ? "range" : "fixed",
+        low: min ?? value,
+        high: max ?? value,
+        steps: 5,
+        values: String(value),
+      },
+    ];
+  });
+  return {
+    varied: Object.fromEntries(varied),
+    method: "grid",
+    samples: 32,
+    sampleSeed: 0,
+    seed: null,
+    ttc: 1,
+    figures: [],
+    processes: 2,
+  };
+}
+
+/** Numbers of a set, or null if one is none. */
+export function setOf(text: string): number[] | null {
+  const parts = text.split(/[,;\s]+/).filter(Boolean);
+  const found = parts.map(Number);
+  return found.length > 0 && found.every(Number.isFinite) ? found : null;
+}
+
+/** What is wrong with a form, or null. */
+export function faultOf({ varied }: SweepForm): string | null {
+  const chosen = Object.entries(varied).filter(([, { how }]) => how !== "fixed");
+  if (chosen.length === 0) return "Vary at least one parameter.";
+  for (const [name, { how, low, high, values }] of chosen) {
+    if (how === "set" && setOf(values) === null) return `${name}: write numbers between commas.`;
+    if (how === "range" && low >= high) return `${name}: the range must end above its begin.`;
+  }
+  return null;
+}
+
+/** How many cases a form has. */
+export function countOf({ varied, method, samples }: SweepForm): number {
+  if (method !== "grid") return samples;
+  return Object.values(varied).reduce((product, { how, steps, values }) => {
+    if (how === "fixed") return product;
+    return product * (how === "range" ? steps : (setOf(values)?.length ?? 0));
+  }, 1);
+}
+
+/** A form as the server takes it. */
+export function wishOf(scenario: string, form: SweepForm): SweepWish {
+  const grid = form.method === "grid";
+  const vary = Object.entries(form.varied).flatMap(([parameter, one]): VaryWish[] => {
+    if (one.how === "fixed") return [];
+    if (one.how === "set") return [{ parameter, values: setOf(one.values) ?? [] }];
+    return [{ parameter, low: one.low, high: one.high, ...(grid && { steps: one.steps }) }];
+  });
+  return {
+    scenario,
+    vary,
+    method: form.method,
+    ...(!grid && { samples: form.samples, sample_seed: form.sampleSeed }),
+    safe: form.ttc === null ? [] : [`min_ttc >= ${form.ttc}`],
+    figures: [...form.figures],
+    seed: form.seed,
+    processes: form.processes,
+  };
+}
+
+/** How a case went, as its dot and its row are coloured. */
+export type Verdict = "safe" | "calm" | "unsafe" | "other";
+export const VERDICT_WORD: Record<Verdict, string> = {
+  safe: "safe",
+  calm: "safe, no encounter",
+  unsafe: "not safe",
+  other: "not run",
+};
+
+export function verdictOf({ safe, measures }: SweepCase, columns: SweepCases["columns"]): Verdict {
+  if (safe === null) return "other";
+  if (!safe) return "unsafe";
+  const near = columns.some(
+    ({ name }, n) => (name === "min_ttc" || name === "min_pet") && measures[n] !== null,
+  );
+  return near ? "safe" : "calm";
+}
+
+/** A column by which cases can be sorted: their number, whether safe, a parameter or a measure. */
+export type Column = { kind: "case" } | { kind: "safe" } | { kind: "value" | "measure"; at: number };
+
+const keyOf = (one: SweepCase, column: Column): number | string | null => {
+  if (column.kind === "case") return one.case;
+  if (column.kind === "safe") return one.safe === null ? null : Number(one.safe);
+  return (column.kind === "value" ? one.values : one.measures)[column.at] ?? null;
+};
+
+/** Cases in the order of a column; those that have nothing there come last both ways. */
+export function sorted(cases: readonly SweepCase[], column: Column, down: boolean): SweepCase[] {
+  const sign = down ? -1 : 1;
+  return [...cases].sort((one, other) => {
+    const [a, b] = [keyOf(one, column), keyOf(other, column)];
+    if (a === null || b === null) return Number(a === null) - Number(b === null);
+    return a < b ? -sign : a > b ? sign : one.case < other.case ? -1 : 1;
+  });
+}
+
+/** Round numbers inside a range, about `parts` of them. */
+export function marksOf(low: number, high: number, parts = 6): number[] {
+  if (!(high > low)) return [low];
+  const rough = (high - low) / parts;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((k) => k * power).find((one) => one >= rough * 0.999) ?? 10 * power;
+  const first = Math.ceil(low / step - 1e-9);
+  const last = Math.floor(high / step + 1e-9);
+  return Array.from({ length: last - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));
+}
+
+/** Wall time in words. */
+export function lasting(seconds: number): string {
+  if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;
+  if (seconds < 5400) return `${Math.round(seconds / 60)} min`;
+  return `${(seconds / 3600).toFixed(1)} h`;
+}

@@ -1,0 +1,313 @@
+import "./time.css";
+
+import { Button } from "@mantine/core";
+import { type MouseEvent, type ReactNode, useMemo, useState } from "react";
+
+import type { Incident } from "../api/runs";
+import type { Category } from "../api/types";
+import { MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
+import { MARK_WORD, markKind, sentence } from "../run/incidents";
+import type { Shown } from "../signals/heads";
+import { clock } from "../ui/words";
+import { Axis, Lines } from "./Axis";
+import { type Sight, toTime, toX } from "./sight";
+import { type Band, bandsOf, type History, shownWords } from "./bands";
+import { linePath, pointAt, SEEN, SERIOUS } from "./collision";
+import { firingsOf, GLYPH, isRule, nearestIncident, neighbour, thinnedMarks } from "./fired";
+import type { EgoTtc } from "./useNearest";
+import { useWidth } from "./useWidth";
+
+/** Pixels around a mark that are it. */
+const REACH = 9;
+/** Height of the curve of TTC and of the bands of a light, pixels. */
+const CURVE = 36;
+const BANDS = 34;
+/** Seconds for which an event is shown. */
+const RECENT = 3;
+/** Below this width of the window the bar is closed to begin with. */
+const NARROW = 761;
+
+/** What happened when in a run: rules, incidents, what a light showed, and the ego's time to collision. */
+export function RunBar({
+  end,
+  reached,
+  time,
+  incidents,
+  categories,
+  junction,
+  history,
+  ttc,
+  spacing,
+  onSeek,
+  onShow,
+}: {
+  /** Of the run, also while it is not there yet; seconds. */
+  end: number;
+  /** How far the run has come, or the recording goes. */
+  reached: number;
+  time: number;
+  incidents: readonly Incident[];
+  categories: ReadonlyMap<string, Category>;
+  /** Whose light is shown. */
+  junction: string | null;
+  history: History | null;
+  ttc: EgoTtc;
+  /** Seconds between two moments of the recording. */
+  spacing: number;
+  /** Jumps to an instant; nothing in a live run. */
+  onSeek: ((time: number) => void) | null;
+  onShow: (incident: Incident) => void;
+}) {
+  const [open, setOpen] = useState(() => innerWidth >= NARROW);
+  const [box, width] = useWidth();
+  const seconds = Math.max(end, 1);
+  const sight = useMemo<Sight>(() => ({ begin: 0, seconds, width }), [seconds, width]);
+  const apart = (3 * seconds) / width;
+  const rules = useMemo(() => incidents.filter(isRule), [incidents]);
+  const others = useMemo(() => incidents.filter((one) => !isRule(one)), [incidents]);
+  const firings = useMemo(() => firingsOf(rules), [rules]);
+  const known = history?.times.length ?? 0;
+  // The same list grows in a live run.
+  const bands = useMemo(
+    () => (history ? bandsOf(history, reached) : []),
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+    [history, known, reached],
+  );
+  const gap = Math.max(1, 1.5 * spacing);
+  const now = pointAt(ttc.points, time, gap);
+  const recent = incidents.findLast((one) => one.time <= time + 0.05 && time - one.time < RECENT);
+  const kinds = new Set(incidents.map(markKind));
+  const step = (by: 1 | -1): void => {
+    const one = neighbour(incidents, time, by);
+    if (!one) return;
+    onSeek?.(one.time);
+    onShow(one);
+  };
+  const choose = (event: MouseEvent<HTMLElement>, among: readonly Incident[]): void => {
+    const left = event.currentTarget.querySelector(".time-track")?.getBoundingClientRect().left ?? 0;
+    const at = toTime(sight, event.clientX - left);
+    if (event.clientX < left) return;
+    const one = nearestIncident(among, at, (REACH * seconds) / width);
+    onSeek?.(one ? one.time : Math.min(reached, Math.max(0, at)));
+    if (one) onShow(one);
+  };
+  return (
+    <section className="run-time" aria-label="Time bar" data-live={onSeek === null}>
+      <div className="table-bar">
+        {onSeek && (
+          <span role="group" aria-label="Events" className="time-buttons">
+            <Button
+              size="compact-xs"
+              variant="default"
+              disabled={!neighbour(incidents, time, -1)}
+              onClick={() => step(-1)}
+            >
+              Event before
+            </Button>
+            <Button
+              size="compact-xs"
+              variant="default"
+              disabled={!neighbour(incidents, time, 1)}
+              onClick={() => step(1)}
+            >
+              Next event
+            </Button>
+          </span>
+        )}
+        <span role="status" className="time-status">
+          {recent ? `${clock(recent.time)} ${sentence(recent, categories)}` : ""}
+        </span>
+        <Legend kinds={kinds} signals={bands.length > 0} />
+        <Button size="compact-xs" variant="subtle" aria-expanded={open} onClick={() => setOpen(!open)}>
+          {open ? "Hide the time bar" : "Show the time bar"}
+        </Button>
+      </div>
+      <div className="time" hidden={!open}>
+        <div className="time-inner">
+          <Lines sight={sight} moment={time} />
+          <div className="time-head">
+            <span className="time-label">{clock(Math.min(time, end))}</span>
+            <div className="time-track" ref={box}>
+              <Axis sight={sight} longest={end} moment={time} label={null} onMoment={onSeek} />
+            </div>
+          </div>
+          <Row
+            name="rules"
+            label="Rules"
+            note={rules.length === 0 ? "none fired" : String(firings.length)}
+            onChoose={(event) => choose(event, rules)}
+          >
+            {firings.map(({ begin: from, end: to }, n) => (
+              <i
+                key={n}
+                className="time-span"
+                style={{
+                  left: toX(sight, from),
+                  width: Math.max(0, toX(sight, to ?? reached) - toX(sight, from)),
+                  background: MARK_COLOR.rule,
+                }}
+              />
+            ))}
+            <Marks marks={thinnedMarks(rules, apart)} sight={sight} categories={categories} />
+          </Row>
+          <Row
+            name="incidents"
+            label="Incidents"
+            note={others.length === 0 ? "none" : others.length.toLocaleString("en")}
+            onChoose={(event) => choose(event, others)}
+          >
+            <Marks marks={thinnedMarks(others, apart)} sight={sight} categories={categories} />
+          </Row>
+          <Row
+            name="light"
+            label={junction === null ? "Traffic light" : `Light ${junction}`}
+            note={junction === null ? "none on the map" : shownWords(bands, time)}
+            onChoose={(event) => choose(event, [])}
+          >
+            {bands.length > 0 && <Signals bands={bands} sight={sight} />}
+          </Row>
+          <Row
+            name="ttc"
+            label="Time to collision"
+            note={
+              ttc.ego === null
+                ? "no ego"
+                : now === null
+                  ? `${ttc.ego}: not on the road`
+                  : now.ttc === null
+                    ? `${ttc.ego}: above ${SEEN} s`
+                    : `${ttc.ego}: ${now.ttc.toFixed(1)} s to ${now.other}`
+            }
+            onChoose={(event) => choose(event, [])}
+          >
+            {ttc.ego !== null && (
+              <svg className="time-curve" aria-hidden="true">
+                <line
+                  className="time-serious"
+                  x1={0}
+                  x2={width}
+                  y1={levelOf(SERIOUS)}
+                  y2={levelOf(SERIOUS)}
+                />
+                <text x={2} y={levelOf(SERIOUS) - 3}>
+                  {SERIOUS} s
+                </text>
+                <text x={2} y={10}>
+                  {SEEN} s
+                </text>
+                <path
+                  className="time-ttc"
+                  transform="translate(0 3)"
+                  d={linePath(ttc.points, (at) => toX(sight, at), CURVE, gap)}
+                />
+              </svg>
+            )}
+          </Row>
+        </div>
+      </div>
+    </section>
+  );
+}
+
+const levelOf = (ttc: number): number => 3 + CURVE - (ttc / SEEN) * CURVE;
+
+/** One row of the bar; a click in it chooses an instant, for which there is the slider by keyboard. */
+function Row({
+  name,
+  label,
+  note,
+  onChoose,
+  children,
+}: {
+  name: string;
+  label: string;
+  note: string;
+  onChoose: (event: MouseEvent<HTMLElement>) => void;
+  children: ReactNode;
+}) {
+  return (
+    <div className="time-row" data-row={name} onClick={onChoose}>
+      <span className="time-label" title={`${label}: ${note}`}>
+        <b>{label}</b> <span>{note}</span>
+      </span>
+      <div className="time-track">{children}</div>
+    </div>
+  );
+}
+
+function Marks({
+  marks,
+  sight,
+  categories,
+}: {
+  marks: readonly Incident[];
+  sight: Sight;
+  categories: ReadonlyMap<string, Category>;
+}) {
+  return marks.map((one, n) => (
+    <i
+      key={n}
+      className="time-mark"
+      aria-hidden="true"
+      title={`${clock(one.time)} ${sentence(one, categories)}`}
+      style={{ left: toX(sight, one.time), background: MARK_COLOR[markKind(one)] }}
+    >
+      {GLYPH[markKind(one)]}
+    </i>
+  ));
+}
+
+/** Share of a band's height that a line of it has: what may go is thick, red is thin. */
+const THICK: Record<Shown, number> = { green: 0.9, permissive: 0.5, yellow: 0.7, red: 0.22, off: 0.1 };
+
+function Signals({ bands, sight }: { bands: readonly Band[]; sight: Sight }) {
+  const high = BANDS / bands.length;
+  return (
+    <svg className="time-signal" width={sight.width} height={BANDS} aria-hidden="true">
+      {(Object.keys(THICK) as Shown[]).map((shown) => (
+        <path
+          key={shown}
+          stroke={SIGNAL_COLOR[shown]}
+          strokeWidth={Math.max(1, high * THICK[shown])}
+          d={bands
+            .map(({ spans }, n) =>
+              spans
+                .filter((span) => span.shown === shown)
+                .map(
+                  ({ begin, end }) =>
+                    `M${toX(sight, begin).toFixed(1)} ${((n + 0.5) * high).toFixed(1)}H${toX(sight, end).toFixed(1)}`,
+                )
+                .join(""),
+            )
+            .join("")}
+        />
+      ))}
+    </svg>
+  );
+}
+
+/** What the signs of the bar mean; only those that are in it. */
+function Legend({ kinds, signals }: { kinds: ReadonlySet<ReturnType<typeof markKind>>; signals: boolean }) {
+  return (
+    <ul className="time-legend" aria-label="Signs of the time bar">
+      {[...kinds].map((kind) => (
+        <li key={kind}>
+          <i className="time-mark" style={{ background: MARK_COLOR[kind] }} aria-hidden="true">
+            {GLYPH[kind]}
+          </i>
+          {MARK_WORD[kind]}
+        </li>
+      ))}
+      {signals && (
+        <li>
+          <svg width={34} height={14} aria-hidden="true" style={{ background: "#1b1f24", borderRadius: 3 }}>
+            <path d="M2 7H11" stroke={SIGNAL_COLOR.green} strokeWidth={10} />
+            <path d="M12 7H21" stroke={SIGNAL_COLOR.yellow} strokeWidth={7} />
+            <path d="M22 7H32" stroke={SIGNAL_COLOR.red} strokeWidth={2.5} />
+          </svg>
+          Green, yellow, red
+        </li>
+      )}
+    </ul>
+  );
+}

@@ -1,0 +1,40 @@
+import { expect, test } from "vitest";
+
+import { criteriaNote, criterionWords, partsOf, textOf } from "../../src/editor/criteria";
+
+const MEASURES = {
+  run: [{ name: "mean_delay", label: "mean delay", unit: "s" }],
+  actors: [
+    { name: "arrived", label: "goal reached", unit: "" },
+    { name: "max_speed", label: "highest speed", unit: "m/s" },
+  ],
+};
+
+test.each(["collided == 0", "arrived >= 95 %", "min_ttc(ego) >= 1.5 s", "max_speed(flow.3) <= 50 km/h"])(
+  "%s has parts that make the same text",
+  (text) => {
+    const parts = partsOf(text);
+    expect(parts && textOf(parts)).toBe(text);
+  },
+);
+
+test("what is no criterion has no parts and is shown as it is", () => {
+  expect(partsOf("usable")).toBeNull();
+  expect(criterionWords("usable", MEASURES)).toBe("usable");
+  expect(criterionWords("own_figure == 1", MEASURES)).toBe("own_figure == 1");
+});
+
+test("criteria are sentences with the unit they were written in, or that of the measure", () => {
+  const said = (text: string) => criterionWords(text, MEASURES);
+  expect(said("arrived(ego) == 1")).toBe("ego reaches its goal");
+  expect(said("max_speed(van) <= 50 km/h")).toBe("Highest speed of van: at most 50 km/h");
+  expect(said("mean_delay < 40")).toBe("Mean delay: less than 40 s");
+});
+
+test("the step says how many there are", () => {
+  expect(["", "a", "a b"].map((one) => criteriaNote(one.split(" ").filter(Boolean)))).toEqual([
+    "When has a run passed?",
+    "1 criterion",
+    "2 criteria",
+  ]);
+});

@@ -1,0 +1,1 @@
+"""Scenarios from and to other formats: OpenSCENARIO in, OpenSCENARIO, SUMO and GraphML out."""

@@ -1,0 +1,375 @@
+"""Sweeps that a page has started: one at a time, in a thread that waits for its runs."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import shutil
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from odscen.app.sweeps.sweep_cases import opened_case
+from odscen.app.sweeps.sweep_estimate import PATIENCE, estimate
+from odscen.app.sweeps.sweep_folder import (
+    SWEEP_FILE,
+    SweepSettings,
+    begin_sweep,
+    read_plan,
+    read_sweep,
+    settings_from_dict,
+)
+from odscen.app.sweeps.sweep_runs import refuse_unknown, sweep
+from odscen.app.sweeps.sweep_table import PAGE_FILE, TABLE_FILE, limits_of, read_table
+from odscen.base.atomic_folders import discard
+from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
+from odscen.scenario.sweeps.sweep_plan import plan_from_data
+from odscen.sumo.folder import layout
+from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
+from odscen.workspace.store import check_name
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from odscen.app.sweeps.sweep_table import Sweep
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.sweeps.sweep_plan import SweepPlan
+    from odscen.web.sweeps.sweep_messages import SweepState, SweepWish
+    from odscen.workspace.store import Workspace
+
+_FILES = re.compile(
+    rf"{re.escape(PAGE_FILE)}|{re.escape(TABLE_FILE)}|cases/case-\d+(\.scenario\.json|\.xosc)"
+    rf"|runs/case-\d+/{re.escape(layout.REPORT_FILE)}"
+)
+"""What of a sweep can be downloaded."""
+_END = 10.0
+"""Wall seconds that a sweep has for its end when the server ends."""
+
+
+class _StoppedSweep(Exception):  # noqa: N818 - no error, and never seen outside
+    pass
+
+
+@dataclass(slots=True)
+class GoingSweep:
+    """A sweep of this server.
+
+    Attributes
+    ----------
+    ended, before
+        Cases that have ended, and how many had when it was started or resumed.
+    over
+        Whether it has ended; ``error`` is why, if it was not to its end.
+    """
+
+    began: float
+    before: int = 0
+    ended: int = 0
+    over: bool = False
+    error: str | None = None
+    stop: threading.Event = field(default_factory=threading.Event)
+
+    def check(self) -> None:
+        """Raise if it is to stop."""
+        if self.stop.is_set():
+            raise _StoppedSweep
+
+    def seconds_left(self, cases: int) -> float | None:
+        """Wall seconds of what is missing, from what the cases so far have taken."""
+        new = self.ended - self.before
+        spent = time.monotonic() - self.began
+        return None if new < 1 else spent / new * (cases - self.ended)
+
+
+class Sweeps:
+    """Sweeps in the folder ``sweeps`` of a workspace, going on and finished."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self._folder = workspace.sweeps
+        self._lock = threading.Lock()
+        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="sweep")
+        self._known: dict[str, GoingSweep] = {}
+
+    def plan(self, scenario: Scenario, wish: SweepWish) -> PlannedSweep:
+        """Say what a sweep will take; runs one case of it.
+
+        Raises
+        ------
+        InputError
+            If it is not possible.
+        """
+        plan, settings = plan_from_data(wish.plan), _settings(wish)
+        count, tried = len(plan.cases()), estimate(
+            self._workspace, scenario, plan, settings=settings
+        )  # fmt: skip
+        processes = _at_most(wish.processes)
+        return PlannedSweep(
+            cases=count,
+            tried=tried.case,
+            case_seconds=tried.seconds,
+            seconds=tried.seconds * count / min(processes, count) if tried.whole else None,
+            disk=tried.disk * count,
+            free=shutil.disk_usage(self._workspace.root).free,
+            processes=processes,
+            patience=PATIENCE,
+        )
+
+    def start(self, name: str, scenario: Scenario, wish: SweepWish) -> str:
+        """Start a sweep of a scenario; its id.
+
+        Raises
+        ------
+        InputError
+            If the plan, a limit or a figure is not possible.
+        ConflictError
+            If another sweep is under way.
+        """
+        plan, settings = plan_from_data(wish.plan), _settings(wish)
+        refuse_unknown(plan, scenario)
+        limits_of(settings)
+        plan.cases()
+        with self._lock:
+            self._refuse_more()
+            folder = self._free_folder(name)
+            begin_sweep(folder, scenario, plan, settings)
+            self._submit(folder.name, scenario, plan, settings, wish.processes)
+        return folder.name
+
+    def resume(self, name: str, processes: int) -> None:
+        """Run what is missing of a sweep.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of that name.
+        ConflictError
+            If nothing is missing, or a sweep is under way.
+        """
+        folder = self._of(name)
+        scenario, plan, said = read_sweep(folder)
+        with self._lock:
+            self._refuse_more()
+            if _is_whole(folder):
+                msg = f"sweep {name!r} has all of its cases; there is nothing to resume"
+                raise ConflictError(msg)
+            self._submit(name, scenario, plan, settings_from_dict(said), processes)
+
+    def stop(self, name: str) -> None:
+        """Stop a sweep; cases that are under way are given up, those that have ended are kept.
+
+        Raises
+        ------
+        NotFoundError, ConflictError
+            If there is none of that name, or it is not under way.
+        """
+        self._of(name)
+        going = self._known.get(name)
+        if going is None or going.over:
+            msg = f"sweep {name!r} is not under way"
+            raise ConflictError(msg)
+        going.stop.set()
+
+    def remove(self, name: str) -> None:
+        """Delete a sweep with its runs.
+
+        Raises
+        ------
+        NotFoundError, ConflictError
+            If there is none of that name, or it is under way.
+        """
+        folder = self._of(name)
+        with self._lock:
+            going = self._known.get(name)
+            if going is not None and not going.over:
+                msg = f"sweep {name!r} is under way; stop it first"
+                raise ConflictError(msg)
+            self._known.pop(name, None)
+            discard(folder)
+
+    def info(self, name: str) -> SweepInfo:
+        """How far a sweep is; :class:`NotFoundError` if there is none of that name."""
+        folder = self._of(name)
+        plan, _ = read_plan(folder)
+        cases, state = len(plan.cases()), self._state(name, folder)
+        going = self._known.get(name)
+        live = going if going is not None and not going.over else None
+        ended = _ended(folder) if live is None else max(live.ended, live.before)
+        safe, unsafe = _verdicts(folder) if state == "done" else (None, None)
+        return SweepInfo(
+            sweep=name,
+            scenario=_scenario_of(name),
+            state=state,
+            parameters=list(plan.names),
+            method=plan.method,
+            cases=cases,
+            ended=ended,
+            seconds_left=None if live is None else live.seconds_left(cases),
+            safe=safe,
+            unsafe=unsafe,
+            error=None if going is None else going.error,
+            changed=folder.stat().st_mtime,
+        )
+
+    def rows(self, scenario: str | None = None) -> list[SweepInfo]:
+        """All sweeps, or those of one scenario, the newest last."""
+        folders = self._folder.iterdir() if self._folder.is_dir() else ()
+        found = []
+        for folder in sorted(folders):
+            if (folder / SWEEP_FILE).is_file() and not folder.name.startswith("."):
+                with suppress(InputError, OSError):  # not a name of ours, or just removed
+                    found.append(self.info(folder.name))
+        wanted = [one for one in found if scenario is None or one.scenario == _stem(scenario)]
+        return sorted(wanted, key=lambda one: (one.changed, one.sweep))
+
+    def table(self, name: str) -> tuple[Sweep, Scenario, dict[str, Any]]:
+        """Table of a sweep as far as it is, its scenario, and how it is judged."""
+        folder = self._of(name)
+        scenario, _, settings = read_sweep(folder)
+        return read_table(folder), scenario, settings
+
+    def file(self, name: str, path: str) -> Path:
+        """A file of a sweep.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such sweep, or file, or it is not one for download.
+        """
+        found = self._of(name) / path
+        if not _FILES.fullmatch(path) or not found.is_file():
+            what = f"file of sweep {name!r}"
+            raise NotFoundError(what, path, [])
+        return found
+
+    def case(self, name: str, case: str) -> Scenario:
+        """One case as a scenario of numbers that runs alone as it did in the sweep.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such case, or it is not possible.
+        """
+        return opened_case(self._of(name), case)
+
+    def close(self) -> None:
+        """Stop what is under way; it can be resumed."""
+        for going in self._known.values():
+            going.stop.set()
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        end = time.monotonic() + _END
+        while time.monotonic() < end and not all(one.over for one in self._known.values()):
+            time.sleep(0.02)
+
+    def _submit(
+        self,
+        name: str,
+        scenario: Scenario,
+        plan: SweepPlan,
+        settings: SweepSettings,
+        processes: int,
+    ) -> None:
+        before = _ended(self._folder / name)
+        going = GoingSweep(time.monotonic(), before, before)
+        self._known[name] = going
+        self._pool.submit(self._work, name, going, scenario, plan, settings, _at_most(processes))
+
+    def _work(
+        self,
+        name: str,
+        going: GoingSweep,
+        scenario: Scenario,
+        plan: SweepPlan,
+        settings: SweepSettings,
+        processes: int,
+    ) -> None:
+        def done(ended: int, _count: int) -> None:
+            going.ended = ended
+            going.check()
+
+        try:
+            sweep(
+                self._workspace,
+                scenario,
+                plan,
+                self._folder / name,
+                settings=settings,
+                processes=processes,
+                tell=lambda _words: going.check(),
+                progress=lambda _job, _message: going.check(),
+                done=done,
+            )
+        except _StoppedSweep:
+            pass
+        except OdscenError as error:
+            going.error = str(error)
+        except BaseException as error:
+            going.error = f"{type(error).__name__}: {error}"
+            raise
+        finally:
+            going.over = True
+
+    def _state(self, name: str, folder: Path) -> SweepState:
+        going = self._known.get(name)
+        if going is not None and not going.over:
+            return "running"
+        if _is_whole(folder):
+            return "done"
+        return "stopped" if going is None or going.error is None else "failed"
+
+    def _of(self, name: str) -> Path:
+        folder = self._folder / check_name(name, what="sweep")
+        if not (folder / SWEEP_FILE).is_file():
+            what = "sweep"
+            raise NotFoundError(what, name, [one.sweep for one in self.rows()])
+        return folder
+
+    def _refuse_more(self) -> None:
+        for name, going in self._known.items():
+            if not going.over:
+                msg = f"sweep {name!r} is under way; stop it, or wait for its end"
+                raise ConflictError(msg)
+
+    def _free_folder(self, scenario: str) -> Path:
+        numbers = itertools.count(1)
+        names = (f"{_stem(scenario)}-{number}" for number in numbers)
+        return next(self._folder / name for name in names if not (self._folder / name).exists())
+
+
+def _settings(wish: SweepWish) -> SweepSettings:
+    return SweepSettings(wish.safe, wish.figures, seed=wish.seed)
+
+
+def _at_most(processes: int) -> int:
+    """No more at a time than the machine has cores."""
+    return min(processes, os.cpu_count() or 1)
+
+
+def _stem(scenario: str) -> str:
+    """Beginning of the names of a scenario's sweeps; a number follows."""
+    return scenario[:56]
+
+
+def _scenario_of(sweep: str) -> str:
+    """Name of the scenario of a sweep that a server has started."""
+    return re.sub(r"-[1-9]\d*$", "", sweep)
+
+
+def _is_whole(folder: Path) -> bool:
+    return all((folder / name).is_file() for name in (TABLE_FILE, PAGE_FILE))
+
+
+def _ended(folder: Path) -> int:
+    return sum(1 for _ in folder.glob(f"runs/case-*/{layout.SUMMARY_FILE}"))
+
+
+def _verdicts(folder: Path) -> tuple[int, int]:
+    """How many cases are safe, and how many are not."""
+    import polars as pl
+
+    safe = pl.read_parquet(folder / TABLE_FILE, columns=["safe"])["safe"].to_list()
+    return safe.count(True), safe.count(False)
