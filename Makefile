@@ -11,21 +11,28 @@ DOCS := .venv/docs-ready
 MODULES := frontend/node_modules/.package-lock.json
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test fuzz regression test-page chromium allocator page api check docs hooks format bench golden maps large-town check-maps check-wheel screenshots clean
+.PHONY: demo test test-interchange fuzz regression test-page chromium allocator page api check docs hooks format bench golden maps large-town check-maps check-wheel screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
 	$(BIN)/odscen demo --workspace demo
 
-# Set-up plus the tests, the suite of scenarios on the shipped maps among them.
+# Set-up plus the tests, the suite of scenarios on the shipped maps among them. Of the slow tests
+# each commit runs a part, another the next; `make test SLOW=all` runs all.
+SLOW := part
 test: test-page $(READY) $(QC) $(PAGE) chromium allocator
-	ODSCEN_SLOW=1 $(BIN)/python -m pytest -n 2 --dist loadfile
+	ODSCEN_SLOW=$(SLOW) $(BIN)/python -m pytest -n 2 --dist loadfile
 	$(MAKE) regression
 
 # Scenarios on the shipped maps against their baselines; see docs/regression.md.
 regression: $(READY)
 	$(BIN)/odscen test suites/shipped.toml --jobs 2 --workspace build/regression --junit build/regression/junit.xml --html build/regression/report.html
 	$(BIN)/odscen test suites/netconvert.toml --jobs 2 --workspace build/regression --junit build/regression/junit-netconvert.xml --html build/regression/report-netconvert.html
+
+# Exports of runs read by programs of others, in environments of their own in build/interchange
+# (3 GB); see docs/learning-formats.md. `make test` reads the same with plain readers.
+test-interchange: $(READY)
+	$(BIN)/python -m tools.read_exports $(INTERCHANGE)
 
 # The parts of the page that need no browser.
 test-page: $(MODULES)

@@ -19,7 +19,10 @@ ALL = (
     "signal_timing",
     "assignment",
     "recording",
+    "short_runs",
     "rules",
+    "learning",
+    "osc_import",
     "long_run",
     "live_view",
     "server_load",
@@ -33,6 +36,8 @@ def main() -> None:
     names = sys.argv[1:]
     if len(names) > 1 and names[1].startswith("-"):
         names, sys.argv = names[:1], [f"bench {names[0]}", *names[1:]]
+    else:
+        sys.argv = sys.argv[:1]  # benchmarks that have options read them
     for name in names or ALL:
         print(f"== {name}", flush=True)
         importlib.import_module(f"bench.{name}").main()

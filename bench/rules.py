@@ -1,20 +1,29 @@
 """What rules cost: 20 actors with rules amid 300 vehicles, against the same run without them.
 
-``python -m bench rules``. Both runs are made in turn with steps of 0.1 s; their seconds are
-those of the processor, as others may use the machine, and without what starting costs.
+``python -m bench rules``. Both runs are stepped with steps of 0.1 s, each in a process of its own;
+the processes take turns of a twentieth of a second, so that both meet the same machine. Seconds are
+those of the processor, and of the steps alone: starting is not in them. Vehicles are those that are
+on the road at once, on average.
 """
 
 from __future__ import annotations
 
-import resource
+import itertools
+import shutil
+import signal
 import statistics
+import subprocess
+import sys
 import tempfile
+import time
+import typing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
 from odscen.app.runs import check_run, prepare_run
 from odscen.lanegraph.query import node_id
+from odscen.results.records.run_records import Plan
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.scenario_document import (
     Actor,
@@ -24,8 +33,13 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Simulation,
 )
+from odscen.sumo.folder.layout import CONFIG_FILE
+from odscen.sumo.outputs.output_tables import outputs_to
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_jobs import run_prepared
+from odscen.sumo.worker.session import open_session
+from odscen.sumo.worker.stepping import Stepper
+from odscen.sumo.worker.story.story_run import StoryRun
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
@@ -33,32 +47,34 @@ if TYPE_CHECKING:
     from odscen.sumo.folder.finished_run import Run
 
 MAP = Path(__file__).parents[1] / "maps" / "town_5x5.xodr"
-ACTORS, ROUNDS = 20, 3
-SHORT, LONG = 20.0, 80.0
-"""Seconds of the two runs of which the difference is taken: what starting costs is in both."""
-PER_KM = 24.0
+ACTORS, ROUNDS = 20, 5
+UNTIL = 80.0
+TURN = 0.05
+"""Seconds."""
+PER_KM = 27.5
 """Vehicles per kilometre of lane, which are about 300 on the map."""
 
 
 def main() -> None:
-    """Print the ratio of each round and the medians."""
+    """Print the ratio of each round, and median and spread of all."""
     with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
         root = Path(folder)
         workspace = Workspace.open(root / "workspace")
-        entry = workspace.add_map(MAP)
-        loaded = load_map(entry)
-        ratios = []
+        loaded = load_map(workspace.add_map(MAP))
+        plain, ruled = (_made(workspace, traffic(loaded, rules=r), root / str(r)) for r in (0, 1))
+        mean, ratios = _on_the_road(plain), []
         print(f"{'round':>5} {'without, s':>10} {'with, s':>8} {'ratio':>6} {'vehicles':>8}")
         for number in range(ROUNDS + 1):
-            plain, most = _per_minute(workspace, traffic(loaded, rules=False), root / f"a{number}")
-            ruled, _ = _per_minute(workspace, traffic(loaded, rules=True), root / f"b{number}")
+            seconds = _stepped(plain.folder, ruled.folder)
             if number:  # the first round warms up
-                ratios.append(ruled / plain)
-                print(f"{number:>5} {plain:>10.2f} {ruled:>8.2f} {ratios[-1]:>6.3f} {most:>8}")
-        print(f"median ratio {statistics.median(ratios):.3f}")
+                ratios.append(seconds[1] / seconds[0])
+                line = f"{number:>5} {seconds[0]:>10.2f} {seconds[1]:>8.2f} {ratios[-1]:>6.3f}"
+                print(f"{line} {mean:>8.0f}", flush=True)
+        least, most = min(ratios), max(ratios)
+        print(f"median ratio {statistics.median(ratios):.3f} ({least:.3f} to {most:.3f})")
 
 
-def traffic(loaded: LoadedMap, *, rules: bool) -> Scenario:
+def traffic(loaded: LoadedMap, *, rules: int) -> Scenario:
     """Twenty actors on as many lanes, and background traffic; with or without rules."""
     graph = loaded.sumo.graph
     lanes = graph.lanes.lanes
@@ -81,7 +97,7 @@ def traffic(loaded: LoadedMap, *, rules: bool) -> Scenario:
         roi=tuple(graph.segments.ids),
         actors=actors,
         demand=Demand(background=(Background(id="traffic", per_km=PER_KM),)),
-        simulation=Simulation(duration=LONG, step_length=0.1),
+        simulation=Simulation(duration=UNTIL, step_length=0.1),
         rules=tuple(_rules(len(actors))) if rules else (),
     )
 
@@ -102,37 +118,62 @@ def _rules(count: int) -> list[StoryRule]:
     return [StoryRule.model_validate(one) for one in found]
 
 
-def _per_minute(workspace: Workspace, scenario: Scenario, folder: Path) -> tuple[float, int]:
-    """Processor seconds of the minute by which the longer run is longer, and vehicles in it."""
-    times, most = [], 0
-    for until in (SHORT, LONG):
-        longer = Simulation(duration=until, step_length=0.1)
-        one = scenario.model_copy(update={"simulation": longer})
-        seconds, most = _seconds(workspace, one, folder.with_name(f"{folder.name}-{until:g}"))
-        times.append(seconds)
-    return times[1] - times[0], most
-
-
-def _seconds(workspace: Workspace, scenario: Scenario, folder: Path) -> tuple[float, int]:
-    """Processor seconds of the simulation's process, and how many vehicles there were at most."""
+def _made(workspace: Workspace, scenario: Scenario, folder: Path) -> Run:
     checked = check_run(workspace, scenario, name=folder.name, settings=RunSettings())
-    ready, before = prepare_run(checked), resource.getrusage(resource.RUSAGE_CHILDREN)
-    run = run_prepared(ready, folder)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    run = run_prepared(prepare_run(checked), folder)
     if run.status != "completed":
         raise SystemExit(str(run.summary.get("error")))
-    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return seconds, _most(run)
+    return run
 
 
-def _most(run: Run) -> int:
+def _stepped(*runs: Path) -> list[float]:
+    """Processor seconds of the steps of each run, all made once more, in turns."""
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-m", "bench.rules", str(run)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        )
+        for run in runs
+    ]  # fmt: skip
+    outs = [typing.cast("typing.TextIO", one.stdout) for one in started]
+    for one, out in zip(started, outs, strict=True):
+        out.readline()
+        one.send_signal(signal.SIGSTOP)
+        typing.cast("typing.TextIO", one.stdin).close()
+    for one in itertools.cycle(started):
+        one.send_signal(signal.SIGCONT)
+        time.sleep(TURN)
+        if one.poll() is None:
+            one.send_signal(signal.SIGSTOP)
+        elif all(other.poll() is not None for other in started):
+            break
+    return [float(out.read().split()[-1]) for out in outs]
+
+
+def _step_again(run: Path) -> None:
+    """Make the steps of a run in this process, and print the seconds."""
+    with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
+        copy = Path(shutil.copytree(run, Path(folder) / "run"))
+        plan = Plan.from_json((copy / "plan.json").read_text(encoding="utf-8"))
+        story = copy / "sumo" / "story.json"
+        stepper = Stepper(plan, lambda _: None, None,
+                          StoryRun.in_folder(copy, plan) if story.is_file() else None)  # fmt: skip
+        sumo = copy / "sumo"
+        arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(copy, sumo)]
+        with open_session(arguments) as session:
+            print("ready", flush=True)
+            sys.stdin.read()
+            begin = time.process_time()
+            stepper.run(session, plan.until)
+            print(time.process_time() - begin)
+
+
+def _on_the_road(run: Run) -> float:
+    """Vehicles that are there at once, on average."""
     changes = {"departed": 1, "arrived": -1}
-    here, most = 0, 0
-    for one in run.events().sort("time").iter_rows(named=True):
-        here += changes.get(one["kind"], 0)
-        most = max(most, here)
-    return most
+    rows = run.events().iter_rows(named=True)
+    return sum(changes.get(one["kind"], 0) * (UNTIL - one["time"]) for one in rows) / UNTIL
 
 
 if __name__ == "__main__":
-    main()
+    main() if len(sys.argv) < 2 else _step_again(Path(sys.argv[1]))

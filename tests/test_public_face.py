@@ -84,10 +84,10 @@ def test_whatever_is_not_a_main_noun_is_keyword_only(name: str) -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_every_class_tells_its_fields(name: str) -> None:
     found = getattr(odscen, name)
-    fields = is_dataclass(found) or hasattr(found, "model_fields")
+    fields = is_dataclass(found) or hasattr(found, "model_fields") or hasattr(found, "_fields")
     assert ("Attributes" if fields else "Parameters") in sections(name)
     told = inspect.getdoc(found) or ""
-    names = found.model_fields if hasattr(found, "model_fields") else ()
+    names = found.model_fields if hasattr(found, "model_fields") else getattr(found, "_fields", ())
     names = found.__dataclass_fields__ if is_dataclass(found) else names
     for field in names:
         assert re.search(rf"^(\w+, )*{field}(, \w+)*( :.*)?$", told, re.MULTILINE), field

@@ -178,7 +178,10 @@ def options(trial: Trial) -> str:
         "from": ["report", "done", "--out", out + ".html", "--to", "r1", "--from"],
         "mix": ["demand", "add", scenario, "--out", out + ".json", "--per-km", "1", "--mix"],
         "per-km": ["demand", "add", scenario, "--out", out + ".json", "--per-km"],
-        "trips": ["demand", "weekday", "--map", CROSSING, "--out", out + ".json", "--trips"],
+        "trips": [
+            *("demand", "weekday", "--map", CROSSING, "--no-trial"),
+            *("--out", out + ".json", "--trips"),
+        ],
         "junction": [
             "signals",
             "import",

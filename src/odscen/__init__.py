@@ -38,10 +38,13 @@ if TYPE_CHECKING:
     )
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.regression.compare import RunComparison, compare
-    from odscen.results.measures.expectations import parse_expectation
+    from odscen.results.judging.expectations import parse_expectation
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sampling.generation_settings import GenerationSettings
+    from odscen.scenario.story.action_kinds import ActionKind
+    from odscen.scenario.story.condition_kinds import ConditionKind, Reading
+    from odscen.scenario.story.speed_laws import SpeedLaw
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.recording import Recording
     from odscen.sumo.realize.run_settings import RunSettings
@@ -63,9 +66,13 @@ _HOMES = {
     "write_scenario": "odscen.app.scenarios",
     "check": "odscen.app.scenarios:check_scenario",
     "export": "odscen.app.export",
+    "ConditionKind": "odscen.scenario.story.condition_kinds",
+    "Reading": "odscen.scenario.story.condition_kinds",
+    "ActionKind": "odscen.scenario.story.action_kinds",
+    "SpeedLaw": "odscen.scenario.story.speed_laws",
     "RunSettings": "odscen.sumo.realize.run_settings",
     "Recording": "odscen.sumo.realize.recording",
-    "parse_expectation": "odscen.results.measures.expectations",
+    "parse_expectation": "odscen.results.judging.expectations",
     "run": "odscen.app.runs",
     "run_many": "odscen.app.runs",
     "resume": "odscen.app.resumed_runs",
@@ -91,6 +98,8 @@ _HOMES = {
 """
 
 __all__ = [
+    "ActionKind",
+    "ConditionKind",
     "ConflictError",
     "ConversionSettings",
     "GenerationSettings",
@@ -100,12 +109,14 @@ __all__ = [
     "NotFoundError",
     "OdscenError",
     "Problem",
+    "Reading",
     "Recording",
     "Run",
     "RunComparison",
     "RunSettings",
     "Scenario",
     "ScenarioError",
+    "SpeedLaw",
     "Step",
     "ToolError",
     "WatchedRun",

@@ -44,6 +44,7 @@ def test_what_is_no_share_is_refused(text: str) -> None:
         parse_share(text)
 
 
+@pytest.mark.slow
 def test_seeds_are_added_until_the_interval_is_narrow_enough_or_there_are_too_many(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

@@ -18,6 +18,7 @@ def place(tmp_path: Path) -> Workspace:
     return Workspace.open(tmp_path / "workspace")
 
 
+@pytest.mark.slow
 def test_the_same_trips_run_on_both_networks_and_the_map_stays_as_it_is(place: Workspace) -> None:
     before = place.add_map(MAPS / "signal_crossing.xodr")
     settings = ComparisonSettings(levels=(300.0,), seeds=(1, 2), duration=300.0)

@@ -30,6 +30,7 @@ def sources() -> Iterator[tuple[Path, ast.Module]]:
         yield path.relative_to(ROOT), ast.parse(path.read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_a_step_of_a_run_is_taken_by_app_and_within_sumo_only(step: str) -> None:
     rooms = {
@@ -43,6 +44,7 @@ def test_a_step_of_a_run_is_taken_by_app_and_within_sumo_only(step: str) -> None
     assert rooms - {"sumo"} == STEPS[step]
 
 
+@pytest.mark.slow
 def test_settings_of_a_run_are_handed_on_together() -> None:
     names = {one.name for one in fields(RunSettings)}
     singly = [

@@ -21,9 +21,12 @@ STATUS = {"format": "odscen-status", "version": 1, "scenario": "s", "time": 0, "
 
 @pytest.fixture
 def own(workspace: Workspace, tmp_path: Path) -> Workspace:
+    """A workspace with the maps of all tests, without the scenarios and runs that others made."""
     root = tmp_path / "own"
-    shutil.copytree(workspace.root, root)
-    return Workspace.open(root)
+    shutil.copytree(workspace.root, root, ignore=shutil.ignore_patterns("scenarios", "runs"))
+    own = Workspace.open(root)
+    own.scenarios.mkdir(exist_ok=True)
+    return own
 
 
 def long_run(workspace: Workspace, name: str, *, about: dict[str, str]) -> Path:
@@ -40,8 +43,6 @@ def test_removing_a_map_says_what_was_made_on_it_by_name_or_by_content(
 ) -> None:
     scenario = read_scenario(sampled)
     name, sha256 = scenario.map.name, scenario.map.sha256
-    shutil.rmtree(own.scenarios, ignore_errors=True)
-    own.scenarios.mkdir()
     shutil.copy(sampled, own.scenarios / "one.scenario.json")
     (own.scenarios / "broken.scenario.json").write_text('{"map": [')
     (own.scenarios / "odd.scenario.json").write_text('{"map": {"name": [], "sha256": {}}}')

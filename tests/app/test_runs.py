@@ -8,7 +8,7 @@ import pytest
 from odscen.app.runs import carry_out, check_file, check_run, prepare_run, run_all, run_many
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.base.errors import ScenarioError
-from odscen.results.measures.expectations import parse_expectation
+from odscen.results.judging.expectations import parse_expectation
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
 

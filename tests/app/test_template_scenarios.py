@@ -19,7 +19,7 @@ ROOM = {
     "motorway_weave": {"cut-in", "lead-brakes", "bus-leaves"},
     "rural_hills": {"lead-brakes", "oncoming"},
     "signal_crossing": {"lead-brakes", "hidden-child", "mid-block", "red-light"},
-    "left_hand_crossing": {"mid-block", "red-light"},
+    "left_hand_crossing": {"hidden-child", "mid-block", "red-light"},
 }
 """Templates that each shipped map has room for."""
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import odscen
+from tools.parking_example import TOWN, with_rows
 
 
 @pytest.fixture
@@ -24,6 +25,7 @@ def roads(scenario):
     return sorted(name for name in document["roi"] if name.startswith("r"))
 
 
+@pytest.mark.slow
 def test_tables_are_read_into_the_scenario_and_the_fit_is_printed(workspace, scenario, tmp_path):
     one, other = roads(scenario)[:2]
     junction = "j10001"
@@ -88,6 +90,7 @@ def test_background_traffic_is_added_and_a_scenario_without_counts_has_no_fit(wo
     assert "has no counts" in fit.err
 
 
+@pytest.mark.slow
 def test_a_day_of_a_whole_map_says_what_its_junctions_carry(workspace, tmp_path):
     out = tmp_path / "day.scenario.json"
     done = odscen(
@@ -97,7 +100,28 @@ def test_a_day_of_a_whole_map_says_what_its_junctions_carry(workspace, tmp_path)
     assert done.code == 0, done.err
     assert 0 < done.json["trips"] <= 2000
     assert done.json["volume"] <= 0.71 * done.json["capacity"]
+    assert done.json["trials"][-1]["usable"]
+    assert "its busiest hour is usable with 2 seeds" in done.err
     assert odscen("check", out, "--workspace", workspace).code == 0
+    call = ("demand", "weekday", "--map", "signal_crossing", "--trips", "2000", "--no-trial")
+    proposed = odscen(*call, "-o", out, "--json", "--workspace", workspace)
+    assert "trials" not in proposed.json
+
+
+@pytest.mark.slow
+def test_background_traffic_is_sized_by_runs(workspace, scenario):
+    call = ("demand", "add", scenario, "--trips", "4000", "--sized", "--id", "all")
+    done = odscen(*call, "--json", "--workspace", workspace)
+    assert done.code == 0, done.err
+    assert "not usable: more than 20 % had no room to depart" in done.err
+    (part,) = json.loads(Path(scenario).read_text(encoding="utf-8"))["demand"]["background"]
+    assert 0 < part["trips"] < 4000
+    again = odscen("demand", "size", scenario, "--id", "all", "--json", "--workspace", workspace)
+    assert again.code == 0, again.err
+    assert (again.json["share"], again.json["trips"]) == (1.0, part["trips"])
+    wrong = odscen("demand", "size", scenario, "--id", "none", "--workspace", workspace)
+    assert wrong.code == 2
+    assert "'none'" in wrong.err
 
 
 @pytest.mark.parametrize("trips", ["1e8", "9" * 30])
@@ -189,3 +213,31 @@ def test_how_trips_choose_routes_is_set_and_kept(workspace, scenario):
     wrong = odscen("demand", "routes", scenario, "--by", "beauty", "--workspace", workspace)
     assert wrong.code == 2
     assert "by" in wrong.err
+
+
+def test_parking_is_refused_where_the_map_has_none(workspace, scenario):
+    before = Path(scenario).read_text(encoding="utf-8")
+    refused = odscen("demand", "parking", scenario, "--end", "0.3", "--workspace", workspace)
+    assert refused.code == 2
+    assert "no parking places" in refused.err
+    assert Path(scenario).read_text(encoding="utf-8") == before
+
+
+def test_which_trips_park_is_set_and_kept(tmp_path, workspace):
+    town = tmp_path / "parking_town.xodr"
+    town.write_text(with_rows(TOWN.read_text(encoding="utf-8")), encoding="utf-8")
+    assert odscen("maps", "add", town, "--workspace", workspace).code == 0
+    made = odscen(
+        *("generate", "--map", "parking_town", "--fill", "0.01", "--roi-segments", "500"),
+        *("--out", tmp_path, "--json", "--workspace", workspace),
+    )
+    assert made.code == 0, made.err
+    file = Path(made.json["scenarios"][0]["file"])
+    done = odscen(
+        *("demand", "parking", file, "--begin", "0.1", "--end", "0.3", "--stay", "600"),
+        *("--json", "--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    assert (done.json["parking"]["begin"], done.json["parking"]["end"]) == (0.1, 0.3)
+    document = json.loads(file.read_text(encoding="utf-8"))
+    assert document["demand"]["parking"]["stay"] == 600

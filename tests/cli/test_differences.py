@@ -2,6 +2,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import pytest
+
 from tests.cli.conftest import SHIPPED, odscen
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ def narrowed(folder: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_a_narrowed_lane_is_named_in_words_and_json_and_drawn(tmp_path: Path) -> None:
     after, svg = narrowed(tmp_path), tmp_path / "out" / "diff.svg"
     done = odscen("maps", "diff", CROSSING, after, "--svg", svg, "--exit-code")
@@ -29,6 +32,7 @@ def test_a_narrowed_lane_is_named_in_words_and_json_and_drawn(tmp_path: Path) ->
     assert found["changes"][0]["words"] == line
 
 
+@pytest.mark.slow
 def test_a_map_of_the_workspace_is_compared_with_a_file(workspace: Path) -> None:
     call = ("maps", "diff", "signal_crossing", CROSSING, "--exit-code", "--workspace", workspace)
     assert odscen(*call).code == 0
@@ -37,6 +41,7 @@ def test_a_map_of_the_workspace_is_compared_with_a_file(workspace: Path) -> None
     assert "nowhere" in missing.err
 
 
+@pytest.mark.slow
 def test_two_scenarios_are_compared_field_by_field(tmp_path: Path) -> None:
     before = SHIPPED.parent / "suites" / "scenarios" / "signal_crossing.scenario.json"
     after = tmp_path / "after.scenario.json"

@@ -70,6 +70,7 @@ def assert_resumes(run, workspace, alone):
         assert (run / name).read_bytes() == (alone / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_of_three_simultaneous_runs_into_one_folder_one_runs_and_two_say_who_holds_it(
     scenario, long_run, alone, tmp_path
 ):
@@ -85,6 +86,7 @@ def test_of_three_simultaneous_runs_into_one_folder_one_runs_and_two_say_who_hol
         assert (run_folder(tmp_path, scenario) / name).read_bytes() == (alone / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_sigterm_ends_a_run_as_ctrl_c_does_and_it_resumes(
     workspace, scenario, long_run, alone, tmp_path
 ):
@@ -137,6 +139,7 @@ def small_disk(folder, size):
         subprocess.run(["umount", folder], check=True)
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_named_with_what_to_do_and_the_run_resumes(
     workspace, scenario, long_run, alone, tmp_path
 ):
@@ -168,6 +171,7 @@ def test_a_folder_that_may_not_be_written_is_named_with_what_to_do(workspace, sc
         assert "nothing may be written here; make it writable, or name another folder" in done.err
 
 
+@pytest.mark.slow
 def test_a_run_on_a_read_only_disk_is_not_resumed_and_says_why_and_resumes_later(
     workspace, scenario, long_run, alone, tmp_path
 ):
@@ -207,6 +211,7 @@ def test_a_run_that_ends_before_its_first_step_is_refused(workspace, scenario, t
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_doctor_tells_each_step_and_repairs(workspace, alone, tmp_path):
     run = tmp_path / "run"
     shutil.copytree(alone, run)
@@ -237,6 +242,7 @@ def test_a_signal_after_the_end_of_a_command_shows_nothing_of_python():
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 def test_a_signal_where_python_cannot_raise_ends_a_command_all_the_same():
     script = (
         "import signal, time, weakref\n"

@@ -60,6 +60,7 @@ def test_an_interrupted_run_leaves_nothing(workspace, tmp_path):
     assert list(runs.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a POSIX terminal does")
 def test_a_long_run_that_is_interrupted_says_how_to_go_on_and_does(workspace, tmp_path):
     w = ("--workspace", workspace)

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.cli.conftest import SHIPPED, odscen
 
 CROSSING = SHIPPED / "signal_crossing.xodr"
@@ -25,6 +27,7 @@ def test_a_map_that_netconvert_refuses_ends_with_code_3_and_its_words(tmp_path: 
     assert "Attribute 'type' in definition of signal" in done.json["maps"][0]["error"]["message"]
 
 
+@pytest.mark.slow
 def test_a_network_is_written_and_brought_back(tmp_path: Path) -> None:
     odscen("maps", "add", CROSSING, "--workspace", tmp_path)
     file = tmp_path / "out" / "mine.net.xml"
@@ -40,6 +43,7 @@ def test_a_network_is_written_and_brought_back(tmp_path: Path) -> None:
     assert Path(shown["file"]).read_bytes() == file.read_bytes()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_brought_in_is_refused_with_the_reason(tmp_path: Path) -> None:
     odscen("maps", "add", CROSSING, "--workspace", tmp_path)
     call = ("maps", "network", "signal_crossing", "--workspace", tmp_path, "--from")
@@ -50,6 +54,7 @@ def test_what_cannot_be_brought_in_is_refused_with_the_reason(tmp_path: Path) ->
     assert odscen(*call, tmp_path / "none.net.xml").code == 2
 
 
+@pytest.mark.slow
 def test_compare_prints_both_converters_beside_each_other(workspace: Path) -> None:
     done = odscen("maps", "compare", "t_junction_signs", "--levels", "", "--workspace", workspace)
     assert done.code == 0

@@ -20,6 +20,7 @@ def suite(workspace, tmp_path_factory):
     return file
 
 
+@pytest.mark.slow
 def test_a_suite_writes_page_junit_and_summary_and_ends_with_the_worst_code(
     suite, workspace, tmp_path
 ):
@@ -49,6 +50,7 @@ def test_a_suite_writes_page_junit_and_summary_and_ends_with_the_worst_code(
     assert str(tmp_path / "runs" / "a") in nested.err
 
 
+@pytest.mark.slow
 def test_shards_share_a_suite_out(suite, workspace):
     done = [
         odscen("test", suite, "--shard", f"{part}/2", "--json", "--workspace", workspace)
@@ -68,6 +70,7 @@ def test_options_that_make_no_sense_are_refused(suite, workspace):
         assert (done.code, words in done.err) == (2, True), done.err
 
 
+@pytest.mark.slow
 def test_the_summary_is_added_to_what_github_has_of_the_step(
     suite, workspace, tmp_path, monkeypatch
 ):
@@ -82,6 +85,7 @@ def test_the_summary_is_added_to_what_github_has_of_the_step(
     assert file.read_text().startswith("## :white_check_mark: tiny")
 
 
+@pytest.mark.slow
 def test_several_scenarios_are_checked_at_once(suite, workspace, tmp_path):
     good = suite.parent / "a.scenario.json"
     unreadable, misfit = tmp_path / "x.scenario.json", tmp_path / "y.scenario.json"
@@ -109,12 +113,12 @@ def test_brackets_of_an_extra_are_written_as_they_are(workspace, tmp_path):
     code = (
         "from importlib import metadata\n"
         "import odscen.cli.doctor_command as doctor\n"
-        "found = doctor.version\n"
+        "found = metadata.version\n"
         "def version(name):\n"
         "    if name in doctor.OPTIONAL:\n"
         "        raise metadata.PackageNotFoundError(name)\n"
         "    return found(name)\n"
-        "doctor.version = version\n"
+        "metadata.version = version\n"
         "from odscen.cli import main\n"
         "main()\n"
     )
@@ -132,6 +136,7 @@ def test_the_help_says_what_is_done_without_an_option():
     assert "Folder for the runs. (default: the workspace's runs)" in words
 
 
+@pytest.mark.slow
 def test_the_results_of_parts_are_merged_to_one_verdict(suite, workspace, tmp_path):
     for part in (1, 2):
         file = tmp_path / "parts" / str(part) / "results.json"
@@ -148,6 +153,7 @@ def test_the_results_of_parts_are_merged_to_one_verdict(suite, workspace, tmp_pa
     assert "b: none of the parts has run it" in done.err
 
 
+@pytest.mark.slow
 def test_other_seeds_are_chosen_on_the_command_line(suite, workspace, tmp_path):
     shutil.copytree(suite.parent, tmp_path / "copy")
     copy = tmp_path / "copy" / suite.name

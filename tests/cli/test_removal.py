@@ -17,6 +17,7 @@ def own(workspace, tmp_path):
     return tmp_path / "own"
 
 
+@pytest.mark.slow
 def test_a_removed_map_says_what_is_on_it_and_comes_back(own):
     w = ("--workspace", own)
     assert odscen("generate", "--map", MAP, "--count", 2, *w).code == 0

@@ -35,6 +35,7 @@ def test_a_sampled_scenario_has_nothing_to_remark(workspace, scenario):
     assert done.json["problems"] == []
 
 
+@pytest.mark.slow
 def test_a_report_is_written_anew_along_the_way_asked_for(workspace, finished, tmp_path):
     run, out = Path(finished["files"]["summary"]).parent, tmp_path / "again.html"
     places = json.loads((run / "figures.json").read_text())["movements"]
@@ -51,6 +52,22 @@ def test_a_report_is_written_anew_along_the_way_asked_for(workspace, finished, t
     assert (done.code, "r9999" in done.err) == (2, True)
     done = odscen("report", "nowhere", "--workspace", workspace)
     assert (done.code, "no run named 'nowhere'" in done.err) == (2, True)
+
+
+def test_a_run_without_a_report_has_the_same_records_and_gets_one_later(
+    workspace, scenario, finished, tmp_path
+):
+    options = ("--json", "--workspace", workspace)
+    done = odscen("run", scenario, "--no-report", "--out", tmp_path, *options)
+    assert done.code == 0, done.err
+    run = Path(done.json["folder"])
+    assert "report" not in done.json["files"]
+    assert not (run / "report.html").exists()
+    for name in ("trajectories.parquet", "figures.json", "events.json", "actors.json"):
+        assert (run / name).read_bytes() == Path(finished["folder"], name).read_bytes()
+    assert odscen("report", run, *options).code == 0
+    assert (run / "report.html").is_file()
+    assert odscen("report", run, *options).code == 0, "its checksum is known"
 
 
 def test_a_run_gives_what_scripts_rely_on(finished):
@@ -91,6 +108,7 @@ def test_another_seed_gives_another_scenario(workspace, scenario, tmp_path):
     assert _bytes(other["file"]) != _bytes(scenario)
 
 
+@pytest.mark.slow
 def test_a_failed_expectation_is_exit_code_1(workspace, scenario, tmp_path):
     w = ("--out", tmp_path, "--json", "--workspace", workspace)
     done = odscen("run", scenario, "--expect", "arrived>=0.9", "--expect", "collided>100", *w)
@@ -113,6 +131,7 @@ def test_an_expectation_of_criticality_has_it_measured(workspace, scenario, tmp_
     assert Path(done.json["files"]["conflicts"]).is_file()
 
 
+@pytest.mark.slow
 def test_several_scenarios_give_one_table(workspace, tmp_path):
     w = ("--workspace", workspace)
     odscen("generate", "--map", "t_junction_signs", "--count", 3, "--out", tmp_path / "s", *w)
@@ -137,6 +156,7 @@ def test_exported_files_run_with_plain_sumo_and_give_the_same_trajectories(
     assert plain.equals(ours)
 
 
+@pytest.mark.slow
 def test_the_graph_form_runs_like_the_document(workspace, scenario, finished, tmp_path):
     w = ("--json", "--workspace", workspace)
     graph = odscen("export", scenario, "--to", "graphml", "-o", tmp_path, *w).json["files"][0]
@@ -197,6 +217,7 @@ def _bytes(path):
     return Path(path).read_bytes()
 
 
+@pytest.mark.slow
 def test_emissions_are_recorded_unless_they_are_not_wanted(workspace, scenario, tmp_path):
     options = ("--until", 30, "--workspace", workspace, "--json")
     with_them = odscen("run", scenario, "--out", tmp_path / "with", *options)
@@ -207,6 +228,7 @@ def test_emissions_are_recorded_unless_they_are_not_wanted(workspace, scenario, 
     assert lanes[0].select(lanes[1].columns).equals(lanes[1])
 
 
+@pytest.mark.slow
 def test_a_scenario_runs_with_several_seeds_that_redraw_it(workspace, scenario, tmp_path):
     out = tmp_path / "runs"
     options = ("--until", "60", "--json", "--workspace", workspace)
@@ -245,6 +267,7 @@ def test_seeds_and_redraws_that_are_none_are_refused(workspace, scenario, option
     assert (done.code, words in " ".join(done.err.split())) == (2, True), done.err
 
 
+@pytest.mark.slow
 def test_seeds_that_hardly_vary_are_warned_of(workspace, scenario, tmp_path):
     document = json.loads(Path(scenario).read_text())
     cars = [one for one in document["actors"] if one["category"] == "car"][:1]

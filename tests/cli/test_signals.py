@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import pytest
+
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.workspace.store import Workspace
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
 
+@pytest.mark.slow
 def test_a_program_is_shown_exported_and_imported_again(tmp_path: Path) -> None:
     space = tmp_path / "space"
     entry = Workspace.open(space).add_map(MAP)
@@ -48,6 +51,7 @@ def placed(space: Path, one: Scenario, name: str, file: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_lights_are_timed_after_the_demand(workspace: Path, tmp_path: Path) -> None:
     file = placed(workspace, scenario(None), "signal_crossing", tmp_path / "one.scenario.json")
     out = tmp_path / "timed.scenario.json"
@@ -68,6 +72,7 @@ def test_lights_are_timed_after_the_demand(workspace: Path, tmp_path: Path) -> N
     assert "which lasts 600 s" in wrong.json["error"]["message"]
 
 
+@pytest.mark.slow
 def test_a_corridor_without_two_lights_is_refused(workspace: Path, tmp_path: Path) -> None:
     file = placed(workspace, scenario(None), "signal_crossing", tmp_path / "one.scenario.json")
     command = ("signals", "coordinate", file, "--workspace", workspace, "--json")
@@ -82,6 +87,7 @@ def test_a_corridor_without_two_lights_is_refused(workspace: Path, tmp_path: Pat
         assert message in wrong.json["error"]["message"]
 
 
+@pytest.mark.slow
 def test_programs_are_drawn_into_a_file_or_a_folder(workspace: Path, tmp_path: Path) -> None:
     one = scenario(one_plan(offset=12))
     file = placed(workspace, one, "signal_crossing", tmp_path / "one.scenario.json")

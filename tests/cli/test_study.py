@@ -26,12 +26,14 @@ def ran(workspace: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "one"
 
 
+@pytest.mark.slow
 def test_a_report_has_a_row_for_each_interval_after_the_warm_up(ran: Path, workspace: Path) -> None:
     told = odscen("report", ran, "--workspace", workspace, "--json").json
     rows = told["network"]
     assert [(row["begin"], row["end"]) for row in rows] == [(60, 120), (120, 180), (180, 240)]
 
 
+@pytest.mark.slow
 def test_a_finished_run_can_be_asked_for_other_intervals(
     ran: Path, workspace: Path, tmp_path: Path
 ) -> None:
@@ -45,6 +47,7 @@ def test_a_finished_run_can_be_asked_for_other_intervals(
     assert "multiple" in refused.err
 
 
+@pytest.mark.slow
 def test_seeds_are_added_until_the_interval_is_narrow_or_the_most_are_run(
     ran: Path, workspace: Path, tmp_path: Path
 ) -> None:

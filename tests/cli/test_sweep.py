@@ -27,6 +27,7 @@ def scenario(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_a_sweep_has_a_folder_a_table_and_a_page(
     workspace: Path, scenario: Path, tmp_path: Path
 ) -> None:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from odscen.scenario.templates.template_registry import TEMPLATES
 from tests.cli.conftest import odscen
 
 
+@pytest.mark.slow
 def test_without_a_name_all_templates_are_listed_with_their_numbers() -> None:
     for arguments in (("new",), ("new", "--template"), ("new", "--template", "--json")):
         done = odscen(*arguments)
@@ -22,6 +25,7 @@ def test_without_a_name_all_templates_are_listed_with_their_numbers() -> None:
     assert "UN Regulation No. 157" in listed["cut-in"]["source"]
 
 
+@pytest.mark.slow
 def test_a_template_is_placed_checked_and_run(workspace: Path, tmp_path: Path) -> None:
     options = ("--map", "signal_crossing", "--out", tmp_path, "--workspace", workspace)
     done = odscen("new", "--template", "mid-block", *options, "--set", "ego_speed=8", "--json")
@@ -34,6 +38,7 @@ def test_a_template_is_placed_checked_and_run(workspace: Path, tmp_path: Path) -
     assert run.json["status"] == "completed"
 
 
+@pytest.mark.slow
 def test_what_cannot_be_placed_ends_with_the_reason_and_no_file(
     workspace: Path, tmp_path: Path
 ) -> None:

@@ -3,6 +3,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.scenario import edits
@@ -62,6 +64,7 @@ def test_the_graph_form_keeps_parent_and_edits(workspace: Path, tmp_path: Path) 
     assert read_any(to_graphml(made, graph).encode()).variant == made.variant
 
 
+@pytest.mark.slow
 def test_a_variant_that_cannot_be_names_the_edit_and_writes_nothing(
     workspace: Path, tmp_path: Path
 ) -> None:
@@ -86,6 +89,7 @@ def test_a_variant_that_cannot_be_names_the_edit_and_writes_nothing(
     assert "edits.json: edits[0]" in refused(file)
 
 
+@pytest.mark.slow
 def test_a_comparison_of_parent_and_variant_names_the_edits(
     workspace: Path, tmp_path: Path
 ) -> None:

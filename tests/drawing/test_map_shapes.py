@@ -153,6 +153,20 @@ def test_repeated_parking_spaces_are_drawn_one_by_one():
     assert centres.tolist() == [[10.0, -5.0], [20.0, -6.0], [30.0, -7.0]]
 
 
+def test_repeated_outlines_in_road_coordinates_move_along_the_road():
+    corners = "".join(
+        f'<cornerRoad s="{s}" t="{t}" dz="0" height="0"/>'
+        for s, t in ((0, -6), (5, -6), (5, -4), (0, -4))
+    )
+    space = f"""<objects><object id="1" type="parkingSpace" name="" s="0" t="-4" zOffset="0" hdg="0"
+        orientation="none"><repeat s="20" length="20" distance="10" tStart="-4" tEnd="-4"
+        heightStart="0" heightEnd="0" zOffsetStart="0" zOffsetEnd="0"/>
+        <outline>{corners}</outline></object></objects>"""
+    spaces = draw(maps.document(maps.road(more=space))).parking_spaces
+    centres = spaces.xy.reshape(2, 4, 2).mean(axis=1)
+    assert centres.tolist() == [[22.5, -5.0], [32.5, -5.0]]
+
+
 def test_signs_and_lights_are_where_the_map_puts_them():
     symbols = draw(maps.STREET).symbols
     assert [(symbol.kind, symbol.x, symbol.y, symbol.text) for symbol in symbols] == [

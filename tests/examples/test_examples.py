@@ -42,6 +42,7 @@ def test_every_example_is_tried_here_and_is_short() -> None:
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 60
 
 
+@pytest.mark.slow
 def test_the_sweep_finds_that_delay_grows_with_traffic(workspace: Path) -> None:
     rows = cells(printed("sweep.py", workspace))
     assert [row[0] for row in rows] == ["0.1", "0.3", "0.5"]
@@ -50,6 +51,7 @@ def test_the_sweep_finds_that_delay_grows_with_traffic(workspace: Path) -> None:
     assert delays[0] < delays[1] < delays[2]
 
 
+@pytest.mark.slow
 def test_the_own_figure_is_a_share_for_each_junction_the_worst_first(workspace: Path) -> None:
     rows = cells(printed("own_figure.py", workspace))
     assert len(rows) == 10
@@ -78,6 +80,7 @@ def test_the_watched_run_is_stopped_when_half_have_arrived(workspace: Path) -> N
     assert Path(found[4]).is_file()
 
 
+@pytest.mark.slow
 def test_the_regression_test_passes_and_fails_when_the_bound_is_tighter(tmp_path: Path) -> None:
     text = (EXAMPLES / "test_regression.py").read_text(encoding="utf-8")
     text = text.replace("Path(__file__).parents[1]", f"Path({str(EXAMPLES.parent)!r})")

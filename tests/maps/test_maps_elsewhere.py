@@ -124,6 +124,7 @@ def test_netconvert_makes_one_network_of_it(path, tmp_path):
     assert len(net.getTrafficLights()) == lights
 
 
+@pytest.mark.slow
 @every_map
 def test_asam_checks_find_nothing(path):
     candidates = (

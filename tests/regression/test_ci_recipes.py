@@ -71,6 +71,7 @@ def run_script(project, name, *arguments):
     )
 
 
+@pytest.mark.slow
 def test_the_script_runs_in_a_fresh_clone_and_leaves_what_is_promised(project):
     done = run_script(project, "ci.sh")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -82,6 +83,7 @@ def test_the_script_runs_in_a_fresh_clone_and_leaves_what_is_promised(project):
     assert [path.name for path in (project / "build" / "workspace" / "maps").iterdir()]
 
 
+@pytest.mark.slow
 def test_parts_end_with_their_own_codes_and_are_merged_to_one_page_with_all_reports(project):
     (project / "traffic" / "baselines" / "b.json").unlink()
     codes = [run_script(project, "ci.sh", f"{part}/3").returncode for part in (1, 2, 3)]
@@ -102,6 +104,7 @@ def test_parts_end_with_their_own_codes_and_are_merged_to_one_page_with_all_repo
     assert (out / link).is_file()
 
 
+@pytest.mark.slow
 def test_a_part_that_died_shows_when_the_others_are_merged(project):
     for part in (1, 3):
         assert run_script(project, "ci.sh", f"{part}/3").returncode == 0
@@ -141,6 +144,7 @@ def test_the_options_of_the_scripts_are_those_of_the_command(name, count):
     assert all(option in help_text for option in options)
 
 
+@pytest.mark.slow
 def test_a_suite_runs_with_what_is_left_of_a_smaller_installation(tiny_baseline, tmp_path):
     installed = Path(sysconfig.get_path("purelib"))
     site = tmp_path / "site"

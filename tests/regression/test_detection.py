@@ -77,6 +77,7 @@ def test_the_chosen_seeds_catch_the_change_though_the_pilot_only_estimates_the_s
     assert exact < np.median(chosen) < 2 * exact
 
 
+@pytest.mark.slow
 def test_watching_a_figure_leaves_false_alarms_at_two_in_a_hundred():
     random = np.random.default_rng(3)
     keys = [DELAY, *(FigureKey("run", "", f"figure_{number}") for number in range(29))]

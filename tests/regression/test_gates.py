@@ -1,5 +1,4 @@
 import json
-import os
 import re
 import shutil
 
@@ -33,6 +32,7 @@ def statuses(result):
     return {case.name: case.status.value for case in result.cases}
 
 
+@pytest.mark.slow
 def test_an_unchanged_rerun_passes_and_writes_the_same_baseline(store, suite):
     before = {path.name: path.read_bytes() for path in suite.parent.glob("baselines/*.*")}
     assert len(before) == 2
@@ -59,6 +59,7 @@ def test_a_longer_green_fails_naming_figure_junction_size_and_input(store, suite
     assert delay.difference.difference > 5.0
 
 
+@pytest.mark.slow
 def test_a_lower_speed_limit_fails_naming_the_segment(store, suite):
     path = suite.parent / "maps" / "t_junction_signs.xodr"
     text = path.read_text()
@@ -90,6 +91,7 @@ def test_a_changed_figure_without_a_changed_input_is_a_changed_behaviour(store, 
     assert lines(failed)[-1].endswith("the behaviour has changed")
 
 
+@pytest.mark.slow
 def test_a_tolerance_of_the_suite_lets_it_pass(store, suite):
     edit = {"junction": "10001", "green": [30, 15]}
     edit_scenario(suite, "signal_crossing", signals={"junctions": [edit]})
@@ -132,6 +134,7 @@ def test_expectations_are_held_against_every_seed(store, suite):
     assert headline(case(result, "signal_crossing")).startswith("behaviour: seed 1: expected")
 
 
+@pytest.mark.slow
 def test_a_run_that_is_not_usable_fails_as_its_own_cause_unless_the_suite_says_otherwise(
     store, suite
 ):
@@ -156,6 +159,7 @@ def test_a_run_that_dies_is_an_error_not_a_difference(store, suite):
     assert {case.status for case in result.cases} == {"error"}
 
 
+@pytest.mark.slow
 def test_maps_of_the_same_name_in_the_workspace_are_left_alone(store, suite):
     path = suite.parent / "maps" / "t_junction_signs.xodr"
     run(store, suite)
@@ -390,12 +394,7 @@ def test_a_figure_of_the_suites_own_is_expected_and_held_against_the_baseline(st
     assert "figures.longest_stop: figures.py:wrong returned 'much'" in headline(broken)
 
 
-def number_of_scenarios():
-    slow = pytest.mark.skipif(not os.environ.get("ODSCEN_SLOW"), reason="takes ODSCEN_SLOW=1")
-    return [8, pytest.param(100, marks=slow)]
-
-
-@pytest.mark.parametrize("count", number_of_scenarios())
+@pytest.mark.parametrize("count", [8, pytest.param(100, marks=pytest.mark.slow)])
 def test_a_large_suite_with_everything_in_it_is_reported_whole(store, tiny, count):
     names = [f"s{number:03d}" for number in range(count)]
     suite = tiny(*names)
@@ -427,6 +426,7 @@ def test_a_large_suite_with_everything_in_it_is_reported_whole(store, tiny, coun
     assert f"2 error, 1 missing, 1 new, {count - 4} passed" in suite_summary(result)
 
 
+@pytest.mark.slow
 def test_a_suite_can_test_networks_by_netconvert_with_baselines_of_their_own(store, tmp_path):
     file = copy_suite(tmp_path, "signal_crossing")
     text = file.read_text().replace('name = "small"', 'name = "small"\nconverter = "netconvert"')
@@ -442,6 +442,7 @@ def test_a_suite_can_test_networks_by_netconvert_with_baselines_of_their_own(sto
     assert case_.entry.converter == "odscen"
 
 
+@pytest.mark.slow
 def test_seeds_redraw_placed_traffic_and_their_scatter_decides(store, tiny):
     suite = tiny("one")
     text = suite.read_text().replace("seeds = [1]", 'seeds = 8\nredraw = "traffic"')

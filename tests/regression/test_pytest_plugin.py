@@ -75,6 +75,7 @@ def test_a_missed_expectation_fails_the_file_in_plain_words(project, workspace):
     assert "Traceback" not in done.stdout
 
 
+@pytest.mark.slow
 def test_the_fixture_gives_the_run_and_fails_what_falls_short(project, workspace):
     (project / "test_mine.py").write_text(
         "def test_good(odscen_run):\n"
@@ -110,6 +111,7 @@ def test_seed(crossing):
 """
 
 
+@pytest.mark.slow
 def test_options_stand_in_the_configuration_and_fixtures_of_a_module_run_scenarios(
     project, workspace
 ):
@@ -137,6 +139,7 @@ def test_the_workspace_option_moves_no_root_and_takes_no_tests_away(project, wor
     assert "write --odscen-workspace=DIR" in done.stderr
 
 
+@pytest.mark.slow
 def test_scenarios_and_seeds_are_shared_out_among_processes(project, workspace):
     (project / "pytest.ini").write_text("[pytest]\nodscen_collect = true\nodscen_seeds = 1 2\n")
     option = f"--odscen-workspace={workspace}"
@@ -147,6 +150,7 @@ def test_scenarios_and_seeds_are_shared_out_among_processes(project, workspace):
     assert any("seed-1" in line for line in passed)
 
 
+@pytest.mark.slow
 def test_failures_show_the_line_of_the_test_and_nothing_of_ours(project, workspace):
     (project / "test_mine.py").write_text(
         "def test_delay(odscen_run):\n"

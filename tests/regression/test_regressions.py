@@ -14,7 +14,7 @@ from odscen.regression.suites.suite import read_suite
 from odscen.regression.suites.suite_words import NOWHERE
 from tests.regression.conftest import ROOT
 
-SLOW = bool(os.environ.get("ODSCEN_SLOW"))
+SLOW = os.environ.get("ODSCEN_SLOW") == "all"
 SAMPLED = ("signal_crossing", "motorway_weave")
 NAMES = tuple(sorted(path.stem for path in (ROOT / "maps").glob("*.xodr"))) if SLOW else SAMPLED
 RERUNS = 10 if SLOW else 2

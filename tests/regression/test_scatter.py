@@ -76,6 +76,7 @@ def test_false_alarms_are_shared_out_evenly_half_for_the_run_and_half_for_places
     assert 20 * level.run + 100 * level.place == pytest.approx(FALSE_ALARMS)
 
 
+@pytest.mark.slow
 def test_of_a_thousand_reruns_with_other_seeds_at_most_two_in_a_hundred_fail():
     random = np.random.default_rng(18)
     keys = [FigureKey("run", "", f"figure_{number}") for number in range(30)]

@@ -17,6 +17,8 @@ from odscen.regression.suites.suite_words import headline, seed_words, to_dict
 from odscen.scenario.document.drivers_document import Drivers
 from tests.regression.conftest import ROOT, copy_suite, write_tiny
 
+pytestmark = pytest.mark.slow(together=True)
+
 SEEDS = "seeds = [1, 2]"
 
 

@@ -160,6 +160,7 @@ def run_until_confident(
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
     processes: int = 1,
+    reports: bool = True,
     tell: Callable[[str], None] | None = None,
 ) -> tuple[tuple[Run, ...], Confidence]:
     """Run a scenario with more and more seeds until the interval of a figure is narrow enough.
@@ -174,6 +175,8 @@ def run_until_confident(
         That are run in any case; then come those that follow the largest.
     most
         Seeds in all, at most.
+    reports
+        Whether each run gets its report.
     tell
         Called with how far it is, after each round.
 
@@ -195,7 +198,7 @@ def run_until_confident(
     while True:
         done += run_many(
             workspace, [scenario], settings=settings, seeds=batch, out=out, processes=processes,
-            tell=tell,
+            reports=reports, tell=tell,
         )  # fmt: skip
         found = confidence_of(
             [_value(run, figure) for run in done],

@@ -10,7 +10,7 @@ from odscen.base.markup import join
 from odscen.base.text_files import write_text
 from odscen.results.report.page_templates import html_page, page_head
 from odscen.results.report.report_demand import ShownCount, counts_section
-from odscen.sumo.calibrate.matrix_correction import corrected, pair_passages
+from odscen.sumo.calibrate.matrix_correction import corrected, pair_passages, with_more_trips
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.runner.assignment import assign_routes, wants_assignment
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from odscen.results.records.assignment_steps import AssignmentStep
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.count_fit import CountFits
-    from odscen.sumo.calibrate.matrix_correction import CorrectedMatrix
+    from odscen.sumo.calibrate.matrix_correction import CorrectedMatrix, Pair, PairPassages
     from odscen.workspace.store import Workspace
 
 
@@ -65,11 +65,19 @@ def correct_matrix(
     if not wants_assignment(scenario):
         return corrected(scenario, loaded.sumo, pair_passages(scenario, loaded.sumo), trust=trust)
     net, assets, current = loaded.entry.checked("net"), workspace.assets(), _compared(scenario)
+    passages: dict[Pair, PairPassages] = {}
     for _ in range(rounds):
         found = assign_routes(
-            current, loaded.sumo, net, assets, settings=AS_DESIGNED, on_step=iterated
+            current,
+            loaded.sumo,
+            net,
+            assets,
+            settings=AS_DESIGNED,
+            wider=with_more_trips(current),
+            on_step=iterated,
         )
-        passages = pair_passages(current, loaded.sumo, found.paths)
+        # Of pairs that have no trip any more, those of the round before: the next may have some.
+        passages |= pair_passages(current, loaded.sumo, found.paths)
         result = corrected(scenario, loaded.sumo, passages, trust=trust)
         current = result.scenario
     return result
@@ -87,6 +95,7 @@ def write_fit_page(fits: Sequence[tuple[str, CountFits]], out: Path, *, title: s
             ],
             heading=heading,
             rmse=fit.rmse or 0.0,
+            hours=(sum(one.met for one in fit.hours), len(fit.hours)),
         )
         for heading, fit in fits
     ]

@@ -14,6 +14,7 @@ from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ScenarioError, in_file
 from odscen.base.given_files import read_given_text
 from odscen.scenario import edits
+from odscen.scenario.checks.parking_checks import parking_problems
 from odscen.scenario.demand.day_profiles import DAY
 from odscen.scenario.demand.demand_tables import (
     COLUMNS,
@@ -24,6 +25,7 @@ from odscen.scenario.demand.demand_tables import (
     read_zones,
 )
 from odscen.scenario.demand.entries import entries
+from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import TOWN_MIX, town_day
@@ -163,6 +165,21 @@ def add_input(
 def find_entries(scenario: Scenario, graph: MapGraph) -> tuple[Entry, ...]:
     """Where vehicles can drive into the region of a scenario."""
     return entries(Region.of(graph, scenario.roi))
+
+
+def choose_parking(workspace: Workspace, scenario: Scenario, **fields: Any) -> Scenario:
+    """Say which trips park; ``fields`` are those of ``TripParking``.
+
+    Raises
+    ------
+    ScenarioError
+        If the map, or the region, has no parking places.
+    """
+    sumo = map_of(workspace, scenario).sumo
+    changed = edits.set_parking(scenario, **fields)
+    region = Region.of(sumo.graph, scenario.roi)
+    refuse_errors(parking_problems(changed, region, sumo.parking))
+    return changed
 
 
 def choose_routes(workspace: Workspace, scenario: Scenario, **fields: Any) -> Scenario:

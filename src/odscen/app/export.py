@@ -8,16 +8,27 @@ from __future__ import annotations
 
 import shutil
 from contextlib import nullcontext
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
-from odscen.interchange import graphml_export, openscenario_export, sumo_export
+from odscen.interchange import (
+    commonroad_export,
+    graphml_export,
+    openscenario_export,
+    pyg_export,
+    scenarionet_export,
+    sumo_export,
+    waymo_export,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.interchange.exporter import ExportFiles
+    from odscen.interchange.exporter import Exporter, ExportFiles, ExportSource, WhatHappened
+    from odscen.opendrive.road_model import OpenDrive
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
 
@@ -27,6 +38,10 @@ EXPORTERS = {
         sumo_export.EXPORTER,
         graphml_export.EXPORTER,
         openscenario_export.EXPORTER,
+        pyg_export.EXPORTER,
+        scenarionet_export.EXPORTER,
+        waymo_export.EXPORTER,
+        commonroad_export.EXPORTER,
     )
 }
 """Every format by its name."""
@@ -39,6 +54,7 @@ def export(
     *,
     to: str,
     options: Mapping[str, str] | None = None,
+    name: str | None = None,
 ) -> list[Path]:
     """Write a scenario in another format.
 
@@ -51,9 +67,12 @@ def export(
     out
         Folder for the files; made if need be.
     to
-        Name of the format, one of :data:`EXPORTERS`: ``sumo``, ``graphml``, ``openscenario``.
+        Name of the format, one of :data:`EXPORTERS` that is not of runs only: ``sumo``,
+        ``graphml``, ``openscenario``.
     options
         What the format lets one choose: of ``openscenario`` the ``version``.
+    name
+        Of the files; that of the scenario if not given.
 
     Returns
     -------
@@ -65,40 +84,141 @@ def export(
     NotFoundError
         If there is no such format.
     InputError
-        If the format has no such option, or not with that value.
+        If the format is of runs only, or has no such option, or not with that value.
     ScenarioError
         If the scenario has errors that the format cannot do with.
     WorkspaceError
         If the folder cannot be written.
     """
-    from odscen.app.maps import map_of
     from odscen.app.scenarios import check_scenario, given_scenario, scenario_name
-    from odscen.interchange.exporter import ExportSource
     from odscen.scenario.document.problems import refuse_errors
 
-    if to not in EXPORTERS:
-        what = "format"
-        raise NotFoundError(what, to, list(EXPORTERS))
-    exporter, document = EXPORTERS[to], given_scenario(scenario)
-    for option in options or {}:
-        if option not in exporter.options:
-            msg = f"the format {to} has no {option}"
-            raise InputError(msg)
+    exporter = _exporter(to, options)
+    if exporter.files is None:
+        msg = f"the format {to} says what happened in a run: name the folder of one"
+        raise InputError(msg, file=str(scenario) if isinstance(scenario, Path) else None)
+    document = given_scenario(scenario)
     if exporter.checked:
         with in_file(str(scenario)) if isinstance(scenario, Path) else nullcontext():
             refuse_errors(check_scenario(workspace, document))
+    source = _source(workspace, document, name or scenario_name(scenario), options)
+    return _write(exporter.files(source), out)
+
+
+def export_run(
+    workspace: Workspace,
+    run: Path,
+    out: Path,
+    *,
+    to: str,
+    options: Mapping[str, str] | None = None,
+) -> list[Path]:
+    """Write what happened in a run: where each road user was at each time, and what lights showed.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    run
+        Folder of a run that has ended and whose trajectories were recorded.
+    out
+        As of :func:`export`.
+    to
+        ``openscenario``, ``pyg``, ``scenarionet``, ``waymo`` or ``commonroad``.
+    options
+        As of :func:`export`; of all but ``openscenario`` the part of the run, ``begin`` and
+        ``end``, s.
+
+    Returns
+    -------
+    list of Path
+        The files, sorted.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such format.
+    InputError
+        If the format cannot say what happened or has no such option, no run has ended there, or it
+        has no trajectories or too many.
+    WorkspaceError
+        If the folder cannot be written.
+    """
+    from odscen.app.scenarios import read_scenario
+    from odscen.sumo.folder.layout import SCENARIO_FILE
+
+    exporter = _exporter(to, options)
+    if exporter.runs is None:
+        able = ", ".join(name for name, one in EXPORTERS.items() if one.runs is not None)
+        msg = f"the format {to} cannot say what happened in a run; {able} can"
+        raise InputError(msg)
+    happened = _happened(run)
+    document = read_scenario(run / SCENARIO_FILE)
+    source = _source(workspace, document, run.resolve().name, options, happened)
+    if exporter.needs_roads:
+        source = replace(source, roads=_roads(source.map_file))
+    return _write(exporter.runs(source), out)
+
+
+def _roads(map_file: Path) -> OpenDrive:
+    from odscen.opendrive.parse import parse
+
+    return parse(map_file.read_bytes(), file=map_file.name)
+
+
+def _exporter(to: str, options: Mapping[str, str] | None) -> Exporter:
+    if to not in EXPORTERS:
+        what = "format"
+        raise NotFoundError(what, to, list(EXPORTERS))
+    for option in options or {}:
+        if option not in EXPORTERS[to].options:
+            msg = f"the format {to} has no {option}"
+            raise InputError(msg)
+    return EXPORTERS[to]
+
+
+def _happened(folder: Path) -> WhatHappened:
+    from odscen.interchange.exporter import WhatHappened
+    from odscen.results.records.run_records import Plan
+    from odscen.sumo.folder.finished_run import Run
+    from odscen.sumo.folder.layout import PLAN_FILE
+    from odscen.sumo.folder.recorded import read_light_states
+
+    run = Run.open(folder)
+    rows = run.trajectories()
+    file = folder / PLAN_FILE
+    with in_file(str(file)):
+        plan = Plan.from_json(file.read_text(encoding="utf-8"))
+    times = rows["time"].unique().sort().to_list()
+    step = min((b - a for a, b in pairwise(times)), default=plan.step_length)
+    ended = run.summary["sim_seconds"]
+    until = float(times[-1] if ended is None else ended)
+    if not plan.elevation and "z" in rows.columns:  # SUMO's network is flat, the map is not
+        rows = rows.drop("z")
+    return WhatHappened(plan.actors, rows, read_light_states(folder), until, step)
+
+
+def _source(
+    workspace: Workspace,
+    document: Scenario,
+    name: str,
+    options: Mapping[str, str] | None,
+    happened: WhatHappened | None = None,
+) -> ExportSource:
+    from odscen.app.maps import map_of
+    from odscen.interchange.exporter import ExportSource
+
     loaded = map_of(workspace, document)
-    name, net = scenario_name(scenario), loaded.entry.checked("net")
-    source = ExportSource(
+    return ExportSource(
         name=name,
         scenario=document,
         sumo_map=loaded.sumo,
         map_file=loaded.entry.checked("xodr"),
-        net=net,
+        net=loaded.entry.checked("net"),
         assets=workspace.assets(),
         options=dict(options or {}),
+        happened=happened,
     )
-    return _write(exporter.files(source), out)
 
 
 def _write(files: ExportFiles, out: Path) -> list[Path]:
@@ -109,6 +229,8 @@ def _write(files: ExportFiles, out: Path) -> list[Path]:
             path.parent.mkdir(parents=True, exist_ok=True)
             if isinstance(content, str):
                 path.write_text(content, encoding="utf-8")
+            elif isinstance(content, bytes):
+                path.write_bytes(content)
             else:
                 shutil.copyfile(content, path)
             written.append(path)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from odscen.lanegraph.parking_areas import map_parking
 from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.realize.usable import usable_places
@@ -47,9 +48,16 @@ class LoadedMap:
 @lru_cache(maxsize=4)
 def load_map(entry: MapEntry) -> LoadedMap:
     """Load a map; the last few stay in memory."""
-    sumo = SumoMap.of(entry.graph(), entry.lane_table())
+    graph, drawing = entry.graph(), entry.drawing()
+    strips = [area.rings for area in drawing.areas if area.kind == "parking"]
+    parking = map_parking(
+        graph.lanes,
+        spaces=drawing.parking_spaces.each,
+        strips=[ring for rings in strips for ring in rings.each],
+    )
+    sumo = SumoMap.of(graph, entry.lane_table(), parking=parking)
     lights = scenario_lights(sumo)
-    return LoadedMap(entry, sumo, usable_places(sumo), entry.drawing(), lights)
+    return LoadedMap(entry, sumo, usable_places(sumo), drawing, lights)
 
 
 def map_of(workspace: Workspace, scenario: Scenario) -> LoadedMap:

@@ -37,7 +37,7 @@ from odscen.sumo.folder.recorded import (
 from odscen.sumo.folder.run_status import unfinished
 from odscen.sumo.folder.run_sums import damaged_in, seal_again, whole_summary
 from odscen.sumo.outputs.corridor_traces import corridor_traces
-from odscen.sumo.outputs.measured import read_run_data
+from odscen.sumo.outputs.measured import read_parking, read_run_data
 from odscen.sumo.runner.long_runs import run_lock
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 
     from odscen.app.maps import LoadedMap
     from odscen.results.by_place.corridors import Corridor
+    from odscen.results.by_place.parking_use import ParkingUse
     from odscen.results.by_place.traffic import TrafficFigures
     from odscen.results.measures.figure import RunData
     from odscen.workspace.store import Workspace
@@ -131,8 +132,14 @@ def _page(
         lights=_lights(folder),
         visits=read_visits(folder),
         stations=stations,
+        parking=_parking(folder, summary),
         assignment=_assignment(folder),
     )
+
+
+def _parking(folder: Path, summary: Mapping[str, Any]) -> ParkingUse | None:
+    begin, end = AnalysisTimes.of_summary(summary).warm_up, float(summary.get("sim_seconds") or 0)
+    return read_parking(folder, begin=begin, end=end)
 
 
 def _assignment(folder: Path) -> Assignment | None:

@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
-from odscen.app.reports import write_report
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import in_file
+from odscen.results.judging.criteria import criteria_problems
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.problems import refuse_errors
 from odscen.sumo.realize.run_settings import AS_DESIGNED
@@ -113,7 +113,9 @@ def check_run(
     if entry is None:
         entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
     loaded, assets = load_map(entry), workspace.assets()
-    refuse_errors(check(scenario, loaded.sumo.graph, assets, loaded.lights))
+    parking = loaded.sumo.parking
+    found = check(scenario, loaded.sumo.graph, assets, loaded.lights, parking=parking)
+    refuse_errors((*found, *criteria_problems(scenario)))
     return CheckedRun(name, scenario, entry, assets, (out or workspace.runs) / name, settings)
 
 
@@ -212,7 +214,7 @@ def carry_out(
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
         if ended is not None:
             ended(folder)
-        write_report(folder, summary, loaded=loaded)
+        _report(folder, summary, loaded)
 
     return run_prepared(
         prepared, run.folder, progress=progress, finish=finish, live=live, simulate=simulate
@@ -327,6 +329,7 @@ def run_many(
     seeds: Sequence[int] | None = None,
     out: Path | None = None,
     processes: int = 1,
+    reports: bool = True,
     progress: Callable[[RunJob, Progress], None] | None = None,
     done: Callable[[RunJob, Run], None] | None = None,
     tell: Callable[[str], None] | None = None,
@@ -347,6 +350,8 @@ def run_many(
         Folder that gets one folder per scenario; the workspace's ``runs`` if not given.
     processes
         How many run at a time.
+    reports
+        Whether reports are written; :func:`odscen.app.reports.renew_report` writes one later.
     progress, done
         Called from the threads that wait for the runs, ``done`` in the order in which they end.
     tell
@@ -373,7 +378,9 @@ def run_many(
         own = _own_name(scenario_name(scenario), names)
         checked = check_given(workspace, scenario, name=own, out=out, settings=settings)
         runs += [checked] if seeds is None else [_with_seed(checked, seed) for seed in seeds]
-    return run_all(runs, processes=processes, progress=progress, done=done, tell=tell)
+    return run_all(
+        runs, processes=processes, reports=reports, progress=progress, done=done, tell=tell
+    )
 
 
 def _job(run: CheckedRun, *, report: bool, tell: Callable[[str], None] | None) -> RunJob:
@@ -388,9 +395,16 @@ def _job(run: CheckedRun, *, report: bool, tell: Callable[[str], None] | None) -
             tell(f"{run.name}: {step.words}")
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        write_report(folder, summary, loaded=kept.pop())
+        _report(folder, summary, kept.pop())
 
     return RunJob(run.name, get_ready, run.folder, finish if report else None)
+
+
+def _report(folder: Path, summary: Mapping[str, Any], loaded: LoadedMap) -> None:
+    """Write the report; a run without one does not wait for its imports."""
+    from odscen.app.reports import write_report
+
+    write_report(folder, summary, loaded=loaded)
 
 
 def _with_seed(run: CheckedRun, seed: int) -> CheckedRun:

@@ -5,16 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from odscen.app.generators import Placer, open_generator
 from odscen.app.maps import load_map, map_of
 from odscen.base.errors import InputError
 from odscen.base.given_files import read_given, read_given_text
 from odscen.base.text_files import write_text
+from odscen.results.judging.criteria import criteria_problems
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
 from odscen.scenario.sampling.sampler import choose_map, sample_scenario
+from odscen.sumo.realize.signals_ahead import lights_at_start
 from odscen.sumo.runner.network_fit import place_fit, route_fit
 from odscen.workspace.store import plain_name
 from odscen.workspace.wastebasket import SCENARIO_SUFFIX
@@ -22,6 +25,8 @@ from odscen.workspace.wastebasket import SCENARIO_SUFFIX
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from odscen.app.generators import GeneratorDoor
+    from odscen.learning.fill_check import CheckedFill
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
@@ -145,8 +150,14 @@ def check_scenario(workspace: Workspace, scenario: Scenario | Path) -> tuple[Pro
     """
     scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
-    problems = check(scenario, loaded.sumo.graph, workspace.assets(), loaded.lights)
-    problems += tuple(place_fit(scenario, loaded.sumo))
+    problems = check(
+        scenario,
+        loaded.sumo.graph,
+        workspace.assets(),
+        loaded.lights,
+        parking=loaded.sumo.parking,
+    )
+    problems += (*criteria_problems(scenario), *place_fit(scenario, loaded.sumo))
     if not any(problem.severity == "error" for problem in problems):
         problems += tuple(route_fit(scenario, loaded.sumo))
     return problems
@@ -172,6 +183,8 @@ def generate(
     *,
     settings: GenerationSettings = ONE_SCENARIO,
     out: Path | None = None,
+    generator: GeneratorDoor | None = None,
+    filled: Callable[[str, CheckedFill], None] | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> list[Path]:
     """Sample scenarios and write one file each.
@@ -184,6 +197,10 @@ def generate(
         Which scenarios.
     out
         Folder; the workspace's ``scenarios`` if not given.
+    generator
+        Places the actors; they are placed at random if not given.
+    filled
+        Called with the name of each scenario and what was made of the generator's fill.
     progress
         Called with the name of each scenario and the share (0 to 1) that is done.
 
@@ -197,10 +214,11 @@ def generate(
     NotFoundError
         If there is no such map.
     InputError
-        If there is no map at all.
+        If there is no map at all, or the generator does not give a fill.
     ScenarioError
         If the configuration cannot be met.
     """
+    placer = None if generator is None else Placer(open_generator(generator))
     config, map_name = settings.sampling, settings.map_name
     if map_name is not None:
         workspace.map(map_name)
@@ -216,9 +234,19 @@ def generate(
         title = f"{name}-{seed:04d}"
         if progress is not None:
             progress(title, number / settings.count)
+        usable = loaded.usable
         scenario = sample_scenario(
-            loaded.sumo.graph, config, seed=seed, name=title, usable=loaded.usable
+            loaded.sumo.graph,
+            config,
+            seed=seed,
+            name=title,
+            usable=usable,
+            place=None
+            if placer is None
+            else placer.for_scenario(usable.bodies, seed, lights=lights_at_start(loaded.sumo)),
         )
+        if filled is not None and placer is not None and placer.checked is not None:
+            filled(title, placer.checked)
         file = (out or workspace.scenarios) / f"{title}{SUFFIX}"
         paths.append(write_scenario(scenario, file))
     return paths

@@ -19,11 +19,13 @@ from odscen.base.version import __version__
 from odscen.cli.asset_commands import app as assets
 from odscen.cli.console import report_error, report_usage
 from odscen.cli.cosim_commands import cosim
-from odscen.cli.count_commands import correct, fit, routes
+from odscen.cli.count_commands import correct, fit, parking, routes
 from odscen.cli.demand_commands import app as demand
 from odscen.cli.demo_command import demo
 from odscen.cli.difference_commands import diff_maps, diff_scenarios
 from odscen.cli.doctor_command import doctor
+from odscen.cli.import_command import import_
+from odscen.cli.learn_command import app as learn
 from odscen.cli.map_commands import app as maps
 from odscen.cli.network_commands import compare_networks, network
 from odscen.cli.pull_command import pull
@@ -59,17 +61,20 @@ maps.command("remove")(remove_map)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
 demand.command()(routes)
+demand.command()(parking)
 demand.command()(fit)
 demand.command()(correct)
 app.add_typer(demand, name="demand")
 app.add_typer(signals, name="signals")
 app.add_typer(transit, name="transit")
 app.add_typer(trash, name="trash")
+app.add_typer(learn, name="learn")
 app.command()(generate)
 app.command()(variant)
 app.command(cls=NewCommand)(new)
 app.command()(check)
 app.command()(export)
+app.command("import")(import_)
 app.command()(replay)
 app.command()(run)
 app.command()(resume)

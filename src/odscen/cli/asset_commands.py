@@ -70,9 +70,9 @@ def update(
     import json
 
     from odscen.base.text_files import write_text
-    from odscen.carla.carla_server import Server
-    from odscen.carla.client import Address
-    from odscen.carla.server_models import SOURCE, fetch_models
+    from odscen.carla.server.carla_server import Server
+    from odscen.carla.server.client import Address
+    from odscen.carla.server.server_models import SOURCE, fetch_models
     from odscen.workspace.asset_catalogue import BLUEPRINTS_FILE, blueprint_row
     from odscen.workspace.store import Workspace
 

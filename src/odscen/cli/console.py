@@ -105,6 +105,7 @@ IntervalOption = Annotated[
         "(default: the scenario's)",
     ),
 ]
+JobsOption = Annotated[int, typer.Option(min=1, help="How many run at a time.")]
 SeedsOption = Annotated[
     Any,
     typer.Option(

@@ -9,12 +9,16 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from odscen.base.errors import InputError
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.cli.cosim_selfcheck import run_selfcheck
 from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
-    from odscen.carla.cosim import CosimReport
-    from odscen.carla.native_run import NativeOptions
+    from odscen.carla.mirror.cosim_report import CosimReport
+    from odscen.carla.mirror.foreign_actors import ForeignRoles
+    from odscen.carla.native.native_run import NativeOptions
+    from odscen.carla.sensors.sensor_file import SensorWish
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.worker.protocol import Progress
@@ -27,8 +31,18 @@ class Ego(StrEnum):
     EXTERNAL = "external"
 
 
+class SignalsBy(StrEnum):
+    """Who switches the traffic lights."""
+
+    SUMO = "sumo"
+    CARLA = "carla"
+
+
 def cosim(
-    scenario: Annotated[Path, typer.Argument(help="The scenario.")],
+    context: typer.Context,
+    scenario: Annotated[
+        Path | None, typer.Argument(help="The scenario; not needed with --selfcheck.")
+    ] = None,
     carla: Annotated[
         str, typer.Option(help="Where the CARLA server is.", metavar="HOST:PORT")
     ] = "127.0.0.1:2000",
@@ -60,8 +74,34 @@ def cosim(
     ] = None,
     ego: Annotated[
         Ego,
-        typer.Option(help="Driver of the ego: SUMO, or the owner of CARLA's role 'hero'."),
+        typer.Option(help="Driver of the ego: SUMO, or the owner of CARLA's role hero."),
     ] = Ego.SUMO,
+    foreign: Annotated[
+        str,
+        typer.Option(
+            help="Who else on the server SUMO's traffic sees: all, none, or roles with commas.",
+            metavar="ROLES",
+        ),
+    ] = "all",
+    signals: Annotated[
+        SignalsBy,
+        typer.Option(help="Whose programs the traffic lights run; the other one follows."),
+    ] = SignalsBy.SUMO,
+    follow: Annotated[
+        bool,
+        typer.Option("--follow", help="Let another client tick: go by the server's clock."),
+    ] = False,
+    sensor: Annotated[
+        Path | None,
+        typer.Option(help="File of sensors to attach to the ego; recorded into the run's folder."),
+    ] = None,
+    hook: Annotated[
+        str | None,
+        typer.Option(
+            help="Function that gets the world and the actors after each tick.",
+            metavar="MODULE:FUNCTION",
+        ),
+    ] = None,
     load_map: Annotated[
         bool,
         typer.Option("--load-map/--keep-map", help="Whether CARLA may load the scenario's map."),
@@ -91,35 +131,75 @@ def cosim(
     parity: Annotated[
         bool, typer.Option("--parity/--no-parity", help="Compare both worlds, step by step.")
     ] = True,
+    sensed_speed: Annotated[
+        bool,
+        typer.Option(
+            "--sensed-speed", help="Let sensors see speeds: vehicles keep physics, without gravity."
+        ),
+    ] = False,
     weather: Annotated[
         bool, typer.Option("--weather/--no-weather", help="Whether weather acts on driving.")
     ] = True,
+    record_protocol: Annotated[
+        Path | None,
+        typer.Option(
+            help="File that gets all that is said with the server, for a replay in tests; "
+            "compressed if it ends in .gz.",
+        ),
+    ] = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--selfcheck",
+            help="Run nothing: measure on the server what the mirror relies on, as one page.",
+        ),
+    ] = False,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a scenario in SUMO and show it, actor for actor, on a CARLA server.
 
-    Exit code 0: completed; 2: bad input; 3: the run or the server failed; 130: interrupted.
+    Exit code 0: completed; 1: --selfcheck found differences; 2: bad input; 3: the run or the
+    server failed; 130: interrupted.
     """
-    from odscen.carla.client import Address
-    from odscen.carla.cosim import cosim as run_cosim
-    from odscen.carla.cosim_options import CosimOptions
-    from odscen.carla.native_run import NativeOptions
-    from odscen.carla.nearby import Nearby
-    from odscen.carla.pictures import Wish
+    from odscen.carla.mirror.cosim import cosim as run_cosim
+    from odscen.carla.mirror.cosim_options import CosimOptions
+    from odscen.carla.mirror.nearby import Nearby
+    from odscen.carla.mirror.tick_hook import load_hook
+    from odscen.carla.native.native_run import NativeOptions
+    from odscen.carla.sensors.pictures import Wish
+    from odscen.carla.server.client import Address
+    from odscen.carla.server.protocol_recording import recorded_protocol
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.workspace.store import Workspace
 
+    address = Address.parse(carla, timeout=timeout)
+    if scenario is None and not check:
+        msg = "no scenario is named: name its file, or ask for --selfcheck"
+        raise InputError(msg)
+    if record_protocol is not None:
+        address = context.with_resource(recorded_protocol(address, record_protocol))
+    if check or scenario is None:
+        run_selfcheck(address, scenario, out=out, workspace=workspace, as_json=as_json)
     settings = RunSettings(seed=seed, until=until, step_length=step_length, weather=weather)
     options = CosimOptions(
-        address=Address.parse(carla, timeout=timeout),
+        address=address,
         tick=tick,
         nearby=Nearby(radius, most),
         external_ego=ego is Ego.EXTERNAL,
+        foreign=_foreign_roles(foreign),
+        carla_signals=signals is SignalsBy.CARLA,
+        follow=follow,
         load_map=load_map,
         parity=parity,
+        sensed_speed=sensed_speed,
+        sensors=_sensors(sensor),
+        hook=None if hook is None else load_hook(hook),
         pictures=Wish(frames, video, picture_rate),
     )
+    if native and follow:
+        msg = "--native drives with the Traffic Manager, which has to tick: leave --follow out"
+        raise InputError(msg)
     if native:
         _run_native(
             scenario,
@@ -138,7 +218,7 @@ def cosim(
         )
     with progress("mirroring") as step:
 
-        def follow(message: Progress) -> None:
+        def show(message: Progress) -> None:
             step(f"{message.time:.0f} s, {message.running} on the road", message.share)
 
         result, report = run_cosim(
@@ -147,10 +227,32 @@ def cosim(
             options,
             settings=settings,
             out=out,
-            progress=follow,
+            progress=show,
         )
     _show(result, report, as_json=as_json)
     raise typer.Exit(_exit_code(result, report))
+
+
+def _sensors(file: Path | None) -> tuple[SensorWish, ...]:
+    from odscen.carla.sensors.sensor_file import parse_sensors
+
+    if file is None:
+        return ()
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        problem = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+        raise InputError(problem, file=str(file)) from error
+    return parse_sensors(text, file=str(file))
+
+
+def _foreign_roles(words: str) -> ForeignRoles | None:
+    from odscen.carla.mirror.foreign_actors import ForeignRoles
+
+    if words == "none":
+        return None
+    names = tuple(filter(None, (name.strip() for name in words.split(","))))
+    return ForeignRoles(None if names == ("all",) else names)
 
 
 def _run_native(
@@ -162,8 +264,8 @@ def _run_native(
     workspace: Path | None,
     as_json: bool,
 ) -> NoReturn:
-    from odscen.carla.cosim import INTERRUPTED
-    from odscen.carla.native_run import run_native
+    from odscen.carla.native.native_run import run_native
+    from odscen.carla.server.interruption import INTERRUPTED
     from odscen.workspace.store import Workspace
 
     with progress("driving in CARLA") as step:
@@ -196,7 +298,7 @@ def _run_native(
 
 
 def _exit_code(result: Run, report: CosimReport) -> int:
-    from odscen.carla.cosim import INTERRUPTED
+    from odscen.carla.server.interruption import INTERRUPTED
 
     if result.status is RunStatus.FAILED or report.error or report.left_behind:
         return 3
@@ -226,12 +328,19 @@ def _show(result: Run, report: CosimReport, *, as_json: bool) -> None:
         )
     for refused in report.refused:
         log(f"not taken by CARLA: {refused['actor']} ({refused['tries']}x): {refused['reason']}")
+    if report.pictures_dropped:
+        log(
+            f"{report.pictures_dropped} of {report.pictures} pictures were given up: "
+            "writing them took longer than the run"
+        )
     if report.signals_missing:
         missing = ", ".join(report.signals_missing)
         log(f"signals without a light in CARLA: {missing}")
-    for words in (report.error, *report.left_behind, result.summary["error"]):
+    for words in dict.fromkeys((*report.warnings, report.error, result.summary["error"])):
         if words:
             log(words)
+    for words in report.left_behind:
+        log(words)
     if report.interrupted:
         log("Interrupted; what SUMO did so far is kept.")
     log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")

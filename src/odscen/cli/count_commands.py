@@ -91,6 +91,39 @@ def routes(
         print_json({"file": str(path), "routes": chosen})
 
 
+def parking(
+    scenario: ScenarioArgument,
+    begin: Annotated[
+        float | None,
+        typer.Option(min=0, max=1, help="Share of cars that begin in a parking place."),
+    ] = None,
+    end: Annotated[
+        float | None, typer.Option(min=0, max=1, help="Share of cars that end in one.")
+    ] = None,
+    stay: Annotated[
+        float | None, typer.Option(min=1, help="Seconds that a place is taken before and after.")
+    ] = None,
+    within: Annotated[
+        float | None, typer.Option(help="Metres from a zone to its places, at most.")
+    ] = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say which trips of the demand park; what is not given stays as it is."""
+    from odscen.app import demands, scenarios
+    from odscen.workspace.store import Workspace
+
+    given = {"begin": begin, "end": end, "stay": stay, "within": within}
+    fields = {name: value for name, value in given.items() if value is not None}
+    document = scenarios.read_scenario(scenario)
+    document = demands.choose_parking(Workspace.open(workspace), document, **fields)
+    path = scenarios.write_scenario(document, out or scenario)
+    log(f"Wrote {path}")
+    if as_json:
+        print_json({"file": str(path), "parking": document.demand.parking.model_dump(mode="json")})
+
+
 def correct(
     scenario: ScenarioArgument,
     trust: Annotated[
@@ -156,6 +189,9 @@ def show_fit(found: CountFits, *, every: bool) -> None:
     for message in found.contradictions:
         log(f"contradictory: {message}")
     met = sum(row.met for row in found.rows)
+    if found.hours_met is not None:
+        good = sum(one.met for one in found.hours)
+        log(f"{good} of {len(found.hours)} hours within GEH 5 ({found.hours_met:.1%})")
     log(
         f"{met} of {len(found.rows)} counts within GEH 5 ({found.share_met or 0:.1%}); RMSE "
         f"{found.rmse or 0:.2f} vehicles; {found.vehicles} vehicles ({found.source}), "

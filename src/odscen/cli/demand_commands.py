@@ -32,6 +32,13 @@ DayOption = Annotated[
     typer.Option("--day", help="Day profile: weekday, weekend, or one of the scenario's own."),
 ]
 
+TrialOption = Annotated[
+    bool,
+    typer.Option(
+        "--trial/--no-trial", help="Run the busiest hour, and have as many trips as it carries."
+    ),
+]
+
 
 @app.command("import")
 def import_(
@@ -108,6 +115,10 @@ def add(
         float | None, typer.Option(min=0, help="Vehicles per kilometre of lane.")
     ] = None,
     trips: Annotated[float | None, typer.Option(min=0, help="Trips until the end.")] = None,
+    sized: Annotated[
+        bool,
+        typer.Option("--sized", help="As many trips as the network carries, tried by runs."),
+    ] = False,
     name: NameOption = None,
     mix: MixOption = None,
     day: DayOption = None,
@@ -118,9 +129,10 @@ def add(
     """Add background traffic: vehicles that come and go anywhere in the region.
 
     One of --fill, --per-km and --trips says how many; the first two say how many are to be on the
-    road at a time.
+    road at a time. With --sized, that is how many at most, and without one of them what the
+    capacities of the junctions propose.
     """
-    from odscen.app import demands, scenarios
+    from odscen.app import demands, scenarios, sized_demand
     from odscen.workspace.store import Workspace
 
     amounts = {"fill": fill, "per_km": per_km, "trips": trips}
@@ -131,7 +143,14 @@ def add(
         fields["profile"] = day
     store = Workspace.open(workspace)
     document = scenarios.read_scenario(scenario)
-    document = demands.add_background(store, document, name=name or "background", **fields)
+    name = name or "background"
+    if sized and not amounts.keys() & fields.keys():
+        fields["trips"] = sized_demand.proposed_background(store, document, **fields)
+        log(f"Proposed by the capacities of the junctions: {fields['trips']:,.0f} trips")
+    document = demands.add_background(store, document, name=name, **fields)
+    if sized:
+        document, found = sized_demand.sized(store, document, only=name, tell=log)
+        log(found.words)
     path = scenarios.write_scenario(document, out or scenario)
     _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
 
@@ -211,6 +230,7 @@ def weekday(
     ] = 51_000,
     day: Annotated[str, typer.Option(help="Day profile: weekday or weekend.")] = "weekday",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scenario.")] = 0,
+    trial: TrialOption = True,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="File. (default: in the workspace)")
     ] = None,
@@ -220,24 +240,59 @@ def weekday(
     """Make a day of traffic on a whole map, 24 hours from midnight on.
 
     Trips start and end anywhere, fewer of them where junctions would be too busy; what that is
-    based on is printed. If the junctions do not carry as many as asked for, there are fewer.
+    based on is printed. If the junctions do not carry as many as asked for, there are fewer. Then
+    the busiest hour is run, and there are as many trips as it carries.
     """
-    from odscen.app import demands, scenarios
+    from odscen.app import demands, scenarios, sized_demand
     from odscen.workspace.store import Workspace
 
     store = Workspace.open(workspace)
     document, load = demands.whole_day(store, map_name, trips=trips, day=day, seed=seed)
-    path = scenarios.write_scenario(
-        document, out or store.scenarios / f"{map_name}-{day}{scenarios.SUFFIX}"
-    )
     log(
         f"{load.trips:,.0f} trips, {load.peak_trips:,.0f} in the busiest hour; then the busiest "
         f"junction approach, {load.place}, gets {load.volume:,.0f} of the {load.capacity:,.0f} "
         f"vehicles that it carries ({load.volume / load.capacity:.0%})"
     )
+    sizing = None
+    if trial:
+        document, sizing = sized_demand.sized(store, document, tell=log)
+        log(sizing.words)
+    path = scenarios.write_scenario(
+        document, out or store.scenarios / f"{map_name}-{day}{scenarios.SUFFIX}"
+    )
     log(f"Wrote {path}")
     if as_json:
-        print_json({"file": str(path), **load._asdict()})
+        found = load if sizing is None else load.times(sizing.share)
+        more = {} if sizing is None else sizing.to_dict()
+        print_json({"file": str(path), **found._asdict(), **more})
+
+
+@app.command()
+def size(
+    scenario: ScenarioArgument,
+    name: Annotated[
+        str | None,
+        typer.Option("--id", help="One of them. (default: all matrices and background traffic)"),
+    ] = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make matrices and background traffic as few as the network carries, tried by runs.
+
+    The busiest hour is run with a tenth more than what is written; the largest amount is taken with
+    which the verdict is usable. What fits stays as it is.
+    """
+    from odscen.app import scenarios, sized_demand
+    from odscen.workspace.store import Workspace
+
+    document = scenarios.read_scenario(scenario)
+    document, sizing = sized_demand.sized(Workspace.open(workspace), document, only=name, tell=log)
+    path = scenarios.write_scenario(document, out or scenario)
+    log(sizing.words)
+    log(f"Wrote {path}")
+    if as_json:
+        print_json({"file": str(path), "trips": sizing.trips, **sizing.to_dict()})
 
 
 def parse_mix(text: str) -> dict[str, float]:

@@ -31,8 +31,8 @@ def pull(
     everything on it; the map it showed is loaded again at the end.
     """
     from odscen.base.errors import NotFoundError
-    from odscen.carla.carla_server import Server
-    from odscen.carla.client import Address
+    from odscen.carla.server.carla_server import Server
+    from odscen.carla.server.client import Address
     from odscen.workspace.store import Workspace
 
     store = Workspace.open(workspace)

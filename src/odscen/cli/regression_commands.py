@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from odscen.cli.console import (
+    JobsOption,
     JsonOption,
     SeedsOption,
     WorkspaceOption,
@@ -64,7 +65,7 @@ def gate(
             metavar="PATH",
         ),
     ] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
+    jobs: JobsOption = 1,
     out: Annotated[
         Path | None, typer.Option(help="Keep the runs in this folder; they are deleted without.")
     ] = None,

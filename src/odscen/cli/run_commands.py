@@ -13,6 +13,7 @@ from odscen.base.durations import clock, parse_duration
 from odscen.base.shown import visible
 from odscen.cli.console import (
     IntervalOption,
+    JobsOption,
     JsonOption,
     SeedsOption,
     WarmUpOption,
@@ -23,7 +24,6 @@ from odscen.cli.console import (
     print_table,
     progress,
 )
-from odscen.results.measures.usability import UsabilityLevel
 from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def run(
         list[str] | None,
         typer.Option(help='Expectation, for example "arrived>=0.95"; repeatable.'),
     ] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
+    jobs: JobsOption = 1,
     time_limit: Annotated[
         float | None, typer.Option(min=1, help="Wall seconds after which a run has failed.")
     ] = None,
@@ -134,6 +134,14 @@ def run(
     ] = False,
     warm_up: WarmUpOption = None,
     interval: IntervalOption = None,
+    reports: Annotated[
+        bool,
+        typer.Option(
+            "--report/--no-report",
+            help="Whether each run gets its report, which takes as long as a short run itself; "
+            "odscen report writes it later, from the same records.",
+        ),
+    ] = True,
     until_confident: Annotated[
         str | None,
         typer.Option(
@@ -154,13 +162,16 @@ def run(
     """Run scenarios in SUMO, without a window; write records, events, figures and a report.
 
     The first line of each run says whether its figures can be used; --expect usable fails one
-    that is not. Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input, or
-    the folder is in the hands of another process; 3: a run failed, or the machine lacks room,
-    memory or handles.
+    that is not, --expect criteria one that misses a criterion of its scenario. Exit code 0:
+    completed; 1: completed, but an expectation failed; 2: bad input, or the folder is in the hands
+    of another process; 3: a run failed, or the machine lacks room, memory or handles.
     """
+    from odscen.sumo.runner.forked_worker import get_ready
+
+    get_ready()  # its imports take as long as ours, and are done meanwhile
     from odscen.app import runs
     from odscen.app.scenarios import scenario_files
-    from odscen.results.measures.expectations import parse_expectation
+    from odscen.results.judging.expectations import parse_expectation
     from odscen.sumo.realize.recording import Recording, parse_recording
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.workspace.store import Workspace
@@ -192,7 +203,8 @@ def run(
             raise typer.BadParameter("it takes several seeds, not --seed", param_hint="--seed")
         _run_until_confident(
             store, paths, settings=settings, seeds=seeds, out=out, processes=jobs,
-            share=until_confident, figure=confident_of, most=most_seeds, as_json=as_json,
+            share=until_confident, figure=confident_of, most=most_seeds, reports=reports,
+            as_json=as_json,
         )  # fmt: skip
         return
     with _hint(out or store.runs), progress("running") as step:
@@ -203,6 +215,7 @@ def run(
             seeds=seeds,
             out=out,
             processes=jobs,
+            reports=reports,
             progress=_follow(step, len(paths) * len(seeds or (None,))),
             tell=log,
         )
@@ -223,6 +236,7 @@ def _run_until_confident(
     share: str,
     figure: str,
     most: int,
+    reports: bool,
     as_json: bool,
 ) -> None:
     """Run each scenario with as many seeds as its interval needs, and print all of it."""
@@ -235,7 +249,7 @@ def _run_until_confident(
         runs, found = run_until_confident(
             store, path, share=wanted, figure=figure, most=most, settings=settings, out=out,
             seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds, processes=processes,
-            tell=log,
+            reports=reports, tell=log,
         )  # fmt: skip
         results += runs
         intervals.append(found)
@@ -294,6 +308,8 @@ def resume(
 
 def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> None:
     """Print finished runs: a table for people, JSON for scripts."""
+    from odscen.results.measures.usability import UsabilityLevel
+
     if as_json:
         runs = [result.to_dict() for result in results]
         print_json({"runs": runs} if several else runs[0])
@@ -312,17 +328,27 @@ def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> Non
             rows.append((result.folder.name, verdict, *(counts[key] for key in keys)))
         print_table("", ("run", "status", *keys), rows)
     for result in results:
-        for verdict in result.summary["expectations"]:
-            if not verdict["passed"]:
-                own = (
-                    result.usability.get("headline") if verdict["expectation"] == "usable" else None
-                )
-                has = f"{verdict['expectation']} (is {own or verdict['value']})"
-                log(f"{result.folder.name}: failed: {has}")
+        _say_verdicts(result)
         if result.status is RunStatus.FAILED:
             log(f"{result.folder.name}: {result.summary['error']}")
         else:
             log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
+
+
+def _say_verdicts(result: Run) -> None:
+    """Say of each criterion whether it is met, and which expectations are not."""
+    from odscen.results.judging.criteria import missed_words
+    from odscen.results.judging.expectations import CRITERIA, USABLE
+
+    for row in result.summary.get("criteria") or ():
+        met = f"met: {row['words']}" if row["passed"] else f"not met: {missed_words(row)}"
+        log(visible(f"{result.folder.name}: {met}"))
+    for verdict in result.summary["expectations"]:
+        if verdict["passed"] or verdict["expectation"] == CRITERIA.text:
+            continue
+        own = result.usability.get("headline") if verdict["expectation"] == USABLE.text else None
+        has = f"{verdict['expectation']} (is {own or verdict['value']})"
+        log(f"{result.folder.name}: failed: {has}")
 
 
 def _follow(step: Callable[[str, float], None], total: int) -> Callable[[RunJob, Progress], None]:

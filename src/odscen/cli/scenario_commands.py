@@ -20,7 +20,11 @@ from odscen.cli.console import (
 )
 
 if TYPE_CHECKING:
+    from odscen.learning.fill_check import CheckedFill
     from odscen.workspace.store import Workspace
+
+_MOST_REMARKS = 10
+"""Repairs of a fill that are printed."""
 
 ScenarioArgument = Annotated[
     Path, typer.Argument(help="Scenario, as JSON or GraphML.", metavar="SCENARIO")
@@ -50,6 +54,23 @@ def generate(
     config: Annotated[
         Path | None, typer.Option(help="Sampling configuration, TOML or JSON.", dir_okay=False)
     ] = None,
+    generator: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Places the actors: package.module:Class, or a name of an installed package.",
+        ),
+    ] = None,
+    generator_cmd: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COMMAND",
+            help='Another program that places them: "program {in}.npz {out}.npz".',
+        ),
+    ] = None,
+    generator_timeout: Annotated[
+        float, typer.Option(min=1, metavar="SECONDS", help="Time that it may take for a scenario.")
+    ] = 600.0,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write to. (default: the workspace's scenarios)")
     ] = None,
@@ -58,6 +79,7 @@ def generate(
 ) -> None:
     """Sample scenarios on a map: region, weather, actors, goals. The same seed, the same bytes."""
     from odscen.app import scenarios
+    from odscen.app.generators import GeneratorDoor
     from odscen.scenario.sampling.generation_settings import GenerationSettings
     from odscen.workspace.store import Workspace
 
@@ -69,19 +91,47 @@ def generate(
         roi_segments=roi_segments,
         config=scenarios.read_config(config),
     )
+    door = None
+    if generator is not None or generator_cmd is not None:
+        door = GeneratorDoor(generator, generator_cmd, generator_timeout)
+    fills: dict[str, CheckedFill] = {}
     with progress("generating") as step:
         paths = scenarios.generate(
-            Workspace.open(workspace), settings=settings, out=out, progress=step
+            Workspace.open(workspace),
+            settings=settings,
+            out=out,
+            generator=door,
+            filled=fills.__setitem__,
+            progress=step,
         )
     rows = [
         {"file": str(path), "name": scenario.name, "map": scenario.map.name, "seed": scenario.seed}
         | {"segments": len(scenario.roi), "actors": len(scenario.actors)}
+        | ({"fill": _fill_row(fills[scenario.name])} if scenario.name in fills else {})
         for path, scenario in ((path, scenarios.read_scenario(path)) for path in paths)
     ]
     for row in rows:
         log(f"{row['file']}: {row['actors']} actors on {row['segments']} segments of {row['map']}")
+        if (checked := fills.get(str(row["name"]))) is not None:
+            _show_remarks(checked)
     if as_json:
         print_json({"scenarios": rows})
+
+
+def _show_remarks(checked: CheckedFill) -> None:
+    """Say what was repaired of a fill."""
+    for row, what, column, why in checked.remarks[:_MOST_REMARKS]:
+        log(f"  road user {row} {what}: {column}: {why}")
+    if len(checked.remarks) > _MOST_REMARKS:
+        log(f"  and {len(checked.remarks) - _MOST_REMARKS} more; --json has all")
+
+
+def _fill_row(checked: CheckedFill) -> dict[str, Any]:
+    return {
+        "given": checked.given,
+        "kept": len(checked.actors),
+        "remarks": [one._asdict() for one in checked.remarks],
+    }
 
 
 def check(
@@ -173,7 +223,14 @@ def replay(
 
 
 def export(
-    scenario: ScenarioArgument,
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            help="Scenario, as JSON or GraphML; for formats of runs and with --as-run the folder "
+            "of a run.",
+            metavar="SCENARIO",
+        ),
+    ],
     to: Annotated[
         str,
         typer.Option(
@@ -187,17 +244,37 @@ def export(
         str | None,
         typer.Option(help="Of OpenSCENARIO: 1.0 to 1.3. (default: 1.2)", metavar="VERSION"),
     ] = None,
+    as_run: Annotated[
+        bool,
+        typer.Option(
+            "--as-run",
+            help="Write what happened in a run: each road user as a trajectory, and what "
+            "lights showed. (openscenario; the formats of runs need no word)",
+        ),
+    ] = False,
+    begin: Annotated[
+        str | None,
+        typer.Option(help="Of a run: from this second on.", metavar="SECONDS"),
+    ] = None,
+    end: Annotated[
+        str | None,
+        typer.Option(help="Of a run: up to this second.", metavar="SECONDS"),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a scenario in another format.
+    """Write a scenario, or a run, in another format.
 
     What a format cannot say is listed in a file NAME.export.json beside it.
     """
-    from odscen.app.export import export as write
+    from odscen.app.export import export as as_scenario
+    from odscen.app.export import export_run
     from odscen.workspace.store import Workspace
 
-    options = {} if version is None else {"version": version}
+    given = {"version": version, "begin": begin, "end": end}
+    options = {name: value for name, value in given.items() if value is not None}
+    of_runs = EXPORTERS[to].files is None and scenario.is_dir()
+    write = export_run if as_run or of_runs else as_scenario
     files = write(Workspace.open(workspace), scenario, out, to=to, options=options)
     for file in files:
         log(f"Wrote {file}")

@@ -40,7 +40,7 @@ def serve(
     The link that is printed has a token, which opens the page. What is on a command line can
     be seen by all users of the machine: give a token of your own as $ODSCEN_TOKEN.
     """
-    from odscen.carla.client import Address
+    from odscen.carla.server.client import Address
     from odscen.web.http_server import serve as run_server
     from odscen.workspace.store import Workspace
 

@@ -12,6 +12,7 @@ import typer
 from odscen.base.errors import InputError, in_file
 from odscen.base.given_files import read_given_text
 from odscen.cli.console import (
+    JobsOption,
     JsonOption,
     WorkspaceOption,
     log,
@@ -24,7 +25,7 @@ from odscen.cli.scenario_commands import ScenarioArgument
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from odscen.app.sweep_runs import Sweep
+    from odscen.app.sweeps.sweep_table import Sweep
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import Method, SweepPlan
     from odscen.sumo.folder.finished_run import Run
@@ -78,8 +79,15 @@ def sweep(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Of every run, instead of the scenario's.")
     ] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
+    jobs: JobsOption = 1,
     reports: Annotated[bool, typer.Option("--reports", help="Write a report of each run.")] = False,
+    openscenario: Annotated[
+        str | None,
+        typer.Option(
+            help="Write each case as OpenSCENARIO too: 1.0 to 1.3.",
+            metavar="VERSION",
+        ),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say which cases there are, and run none.")
     ] = False,
@@ -92,7 +100,9 @@ def sweep(
     post-encroachment time. The same command after an interruption runs what is missing. Exit code
     0, whether cases are safe or not; 2: bad input; 3: a run failed.
     """
-    from odscen.app import scenarios, sweep_runs
+    from odscen.app import scenarios
+    from odscen.app.sweeps.sweep_folder import SweepSettings
+    from odscen.app.sweeps.sweep_runs import sweep as run_sweep
     from odscen.workspace.store import Workspace
 
     document = scenarios.read_scenario(scenario)
@@ -101,10 +111,10 @@ def sweep(
         _show_plan(planned, as_json=as_json)
         return
     own, named = _figures(figure or [])
-    settings = sweep_runs.SweepSettings(tuple(safe or ()), named, own, seed, reports)
+    settings = SweepSettings(tuple(safe or ()), named, own, seed, reports, openscenario)
     folder = out or Path(f"{scenarios.scenario_name(scenario)}-sweep")
     with progress("sweeping") as step:
-        found = sweep_runs.sweep(
+        found = run_sweep(
             Workspace.open(workspace),
             document,
             planned,

@@ -121,8 +121,24 @@ def _copies(item: RoadObject) -> list[RoadObject]:
         for k in range(min(max(n, 1), _MOST_COPIES)):
             share = k * repeat.distance / repeat.length if repeat.length > 0.0 else 0.0
             t = repeat.t_start + share * (repeat.t_end - repeat.t_start)
-            copies.append(replace(item, s=repeat.s + k * repeat.distance, t=t))
+            copies.append(_moved(item, repeat.s + k * repeat.distance, t))
     return copies or [item]
+
+
+def _moved(item: RoadObject, s: float, t: float) -> RoadObject:
+    """Copy of an object at another place; corners in road coordinates move with it."""
+    outlines = tuple(
+        outline._replace(
+            corners=tuple(
+                corner
+                if corner.local
+                else corner._replace(a=corner.a + s - item.s, b=corner.b + t - item.t)
+                for corner in outline.corners
+            )
+        )
+        for outline in item.outlines
+    )
+    return replace(item, s=s, t=t, outlines=outlines)
 
 
 def symbols(odr: OpenDrive, table: RoadTable) -> tuple[Symbol, ...]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from odscen.base.arrays import Bounds, FloatArray, IntArray, offsets, ranges
-from odscen.base.stored_files import documents, read_document
+from odscen.base.stored_files import stored_document
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,6 +41,11 @@ class Lines(NamedTuple):
     def total(self) -> int:
         """How many lines there are."""
         return len(self.start) - 1
+
+    @property
+    def each(self) -> list[FloatArray]:
+        """The lines one by one, shape ``(n, 2)`` each."""
+        return np.split(self.xy, self.start[1:-1]) if self.total else []
 
     def take(self, keep: NDArray[Any]) -> Lines:
         """Keep the lines chosen by a mask or by their numbers."""
@@ -176,9 +181,7 @@ class MapDrawing:
         InputError
             If it is not a drawing, or one of another version.
         """
-        what = "a map drawing"
-        document = read_document(text, form=FORMAT, version=VERSION, what=what)
-        with documents(what):
+        with stored_document(text, form=FORMAT, version=VERSION, what="a map drawing") as document:
             return cls._from_document(document)
 
     @classmethod

@@ -22,6 +22,7 @@ _LABELS = {
     "scenario.signals": "signals",
     "scenario.measures": "measures",
     "scenario.rules": "rules",
+    "scenario.criteria": "criteria",
     "scenario.actors": "actors",
     "scenario.flows": "demand",
     "scenario.demand": "demand",

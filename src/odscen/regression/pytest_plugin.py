@@ -142,7 +142,7 @@ def odscen_run(
 def _settings(
     *, seed: int | None, until: float | None = None, expect: Sequence[str]
 ) -> RunSettings:
-    from odscen.results.measures.expectations import parse_expectation
+    from odscen.results.judging.expectations import parse_expectation
     from odscen.sumo.realize.run_settings import RunSettings
 
     expectations = tuple(parse_expectation(text) for text in expect)
@@ -171,6 +171,7 @@ def _run(
 
 
 def _shortcomings(result: Run) -> list[str]:
+    from odscen.results.judging.criteria import missed_rows, missed_words
     from odscen.results.records.outcomes import RunStatus
 
     if result.status is RunStatus.FAILED:
@@ -178,7 +179,11 @@ def _shortcomings(result: Run) -> list[str]:
     return [
         f"expected {verdict['expectation']}, but it is {_plain(verdict['value'])}"
         for verdict in result.summary["expectations"]
-        if not verdict["passed"]
+        if not verdict["passed"] and verdict["expectation"] != "criteria"
+    ] + [
+        missed_words(row)
+        for row in missed_rows(result.summary)
+        if any(one["expectation"] == "criteria" for one in result.summary["expectations"])
     ]
 
 

@@ -32,6 +32,11 @@ LARGE_MEMORY_PER_BYTE = 36
 LARGE_SECONDS_PER_MEGABYTE = 4.0
 """The same for a scenario that is checked, shown and written, too; 30 MB with 200,000 actors and as
 many problems need 1.1 of 1.5 GB and 18 of 130 s."""
+IMPORT_MEMORY = 900_000_000
+IMPORT_MEMORY_PER_BYTE = 60
+IMPORT_SECONDS = 30.0
+IMPORT_SECONDS_PER_MEGABYTE = 30.0
+"""The same for a file of OpenSCENARIO, with the map that it plays on."""
 _FILE_SHARE = 4
 """A file that is written may have this part of the memory."""
 _PATIENCE = 6.0
@@ -159,6 +164,14 @@ def for_document(size: int) -> Allowance:
     return Allowance(
         min(MOST_MEMORY, DOCUMENT_MEMORY + DOCUMENT_MEMORY_PER_BYTE * size),
         DOCUMENT_SECONDS + DOCUMENT_SECONDS_PER_MEGABYTE * size / 1e6,
+    )
+
+
+def for_import(size: int) -> Allowance:
+    """What reading an OpenSCENARIO file and its catalogs, of so many bytes, may use."""
+    return Allowance(
+        min(MOST_MEMORY, IMPORT_MEMORY + IMPORT_MEMORY_PER_BYTE * size),
+        IMPORT_SECONDS + IMPORT_SECONDS_PER_MEGABYTE * size / 1e6,
     )
 
 

@@ -77,7 +77,7 @@ def plain_name(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
-    """A folder with ``maps/``, ``scenarios/`` and ``runs/``, perhaps ``assets/``.
+    """A folder with ``maps/``, ``scenarios/`` and ``runs/``, perhaps ``sweeps/`` and ``assets/``.
 
     Attributes
     ----------
@@ -135,6 +135,11 @@ class Workspace:
     def runs(self) -> Path:
         """Folder that runs are written to by default."""
         return self.root / "runs"
+
+    @property
+    def sweeps(self) -> Path:
+        """Folder of sweeps that were started in the page."""
+        return self.root / "sweeps"
 
     def map_names(self) -> list[str]:
         """Names of all maps, sorted; some may be broken, see :meth:`catalogue`."""

@@ -76,6 +76,19 @@ class Coordination:
     back: Band
     before: tuple[float, float]
 
+    def to_words(self) -> tuple[str, ...]:
+        """What has come of it, in sentences."""
+        offsets = ", ".join(f"{', '.join(one.junctions)}: {one.offset:g} s" for one in self.lights)
+        bands = zip(("along", "back"), (self.out, self.back), self.before, strict=True)
+        return (
+            f"All {len(self.lights)} lights have a cycle of {self.cycle:g} s; offsets: {offsets}.",
+            *(
+                f"Band {name}: {band.seconds:.0f} s, {100.0 * band.seconds / self.cycle:.0f} % of "
+                f"the cycle (was {before:.0f} s)."
+                for name, band, before in bands
+            ),
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """All of it but the scenario, as data; bandwidths in seconds and as share of the cycle."""
         return {

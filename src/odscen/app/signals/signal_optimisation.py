@@ -64,6 +64,24 @@ class TimedSignals:
             ", ".join(light.times.junctions) for light in self.lights if light.oversaturated
         )
 
+    def to_words(self) -> tuple[str, ...]:
+        """What has come of it, a sentence for each light."""
+        found = [
+            f"Junction {', '.join(one.times.junctions)}: cycle {one.times.cycle:g} s "
+            f"(was {one.before.cycle:g} s), green "
+            f"{', '.join(f'{green:g}' for green in one.times.green)} s "
+            f"(was {', '.join(f'{green:g}' for green in one.before.green)} s)."
+            for one in self.lights
+        ]
+        found += [
+            f"Junction {name}: no vehicle comes; it keeps its times." for name in self.without
+        ]
+        found += [
+            f"Junction {name} is oversaturated: more vehicles come than its greens carry."
+            for name in self.oversaturated
+        ]
+        return (*found, f"The demand is that of {self.begin:g} to {self.end:g} s.")
+
     def to_dict(self) -> dict[str, Any]:
         """All of it but the scenario, as data."""
         return {

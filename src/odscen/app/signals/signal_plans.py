@@ -107,13 +107,35 @@ def import_signals(
     ScenarioError
         If greens conflict or intergreens are too short, with the movements and times.
     """
+    return take_signals(
+        workspace,
+        given_scenario(scenario),
+        read_given(file),
+        file=str(file),
+        junctions=junctions,
+    )
+
+
+def take_signals(
+    workspace: Workspace,
+    scenario: Scenario,
+    content: bytes,
+    *,
+    file: str,
+    junctions: Sequence[str] = (),
+) -> tuple[Scenario, tuple[str, ...]]:
+    """Take programs over from the content of a file; see :func:`import_signals`.
+
+    Parameters
+    ----------
+    file
+        Name of the file, for messages.
+    """
     from odscen.interchange.tll_file import parse_signal_file
     from odscen.interchange.tll_loops import taken_loops
     from odscen.interchange.tll_program import taken_timing
 
-    scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
-    content = read_given(file)
     views = {light.id: view for light, view in zip(loaded.sumo.lights, loaded.lights, strict=True)}
     wanted = {light for light, view in views.items() if {light, *view.names} & set(junctions)}
     for name in junctions:
@@ -122,7 +144,7 @@ def import_signals(
             raise NotFoundError(what, name, [n for view in views.values() for n in view.names])
     timings = {timing.junction: timing for timing in scenario.signals.junctions}
     notes: list[str] = []
-    with in_file(str(file)):
+    with in_file(file):
         parsed = parse_signal_file(content)
         found = {program.light for program in parsed.programs} & (wanted or views.keys())
         if missing := sorted(wanted - found) or (not found and sorted(views)):

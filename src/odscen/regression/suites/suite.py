@@ -23,7 +23,7 @@ from odscen.regression.detection import DetectEntry, detection_of
 from odscen.regression.own_figures import FigureEntry, FigureName, declared, refuse_tolerances
 from odscen.regression.scatter import FEWEST_SEEDS
 from odscen.regression.tolerance import Tolerances, parse_tolerance
-from odscen.results.measures.expectations import USABLE, parse_expectation
+from odscen.results.judging.expectations import CRITERIA, USABLE, parse_expectation
 from odscen.results.measures.registry import ALL_FIGURES
 from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.validation import validation_problems
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.regression.detection import Detection
     from odscen.regression.tolerance import Tolerance
-    from odscen.results.measures.expectations import Expectation
+    from odscen.results.judging.expectations import Expectation
     from odscen.results.measures.figure import Figure
 
 MOST_SEEDS = 1000
@@ -90,6 +90,7 @@ class _Settings(Part):
     redraw: Redraw | None = None
     expect: tuple[Annotated[str, AfterValidator(_expectation)], ...] = ()
     usable: bool | None = None
+    criteria: bool | None = None
     tolerance: Annotated[ToleranceTable, AfterValidator(_tolerance_table)] = Field(
         default_factory=dict
     )
@@ -307,6 +308,8 @@ def _case(
         _refuse_in_vain(detect, tolerances, folder)
     if wanted is not False:
         expect = {USABLE.text: None, **expect}
+    if (document.criteria if entry.criteria is None else entry.criteria) is not False:
+        expect = {**expect, CRITERIA.text: None}
     return Case(
         name=name,
         file=path,

@@ -15,7 +15,7 @@ from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ToolError, in_file
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.regression.baseline import fingerprint, read_baseline
-from odscen.results.measures.expectations import needs_criticality
+from odscen.results.judging.expectations import needs_criticality
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.asset_catalogue import shipped_assets

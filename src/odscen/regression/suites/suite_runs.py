@@ -12,8 +12,10 @@ from odscen.base.errors import in_file
 from odscen.regression.case_results import SeedResult
 from odscen.regression.measure import measure
 from odscen.regression.own_figures import own_values
-from odscen.results.measures.expectations import USABLE, evaluate
+from odscen.results.judging.criteria import missed_rows, missed_words
+from odscen.results.judging.expectations import CRITERIA, USABLE, evaluate
 from odscen.results.records.outcomes import RunStatus
+from odscen.sumo.folder.judged import read_judged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -116,7 +118,8 @@ def _seed_result(
     with in_file(str(suite.file)):
         own = own_values(suite.figures, result, beside=suite.file.parent)
     summary = {**summary, "figures": {**summary["figures"], **own}}
-    failed = [row for row in evaluate(loaded.case.expectations, summary) if not row.passed]
+    verdicts = evaluate(loaded.case.expectations, summary, read_judged(result.folder))
+    failed = [row for row in verdicts if not row.passed]
     unusable = None
     if USABLE.text in [row.expectation for row in failed]:
         unusable = f"seed {seed}: {result.usability.get('headline', 'not judged')}"
@@ -124,8 +127,10 @@ def _seed_result(
         f"seed {seed}: expected {verdict.expectation}, but it is "
         f"{'nothing' if verdict.value is None else f'{verdict.value:g}'}"
         for verdict in failed
-        if verdict.expectation != USABLE.text
+        if verdict.expectation not in (USABLE.text, CRITERIA.text)
     ]
+    if CRITERIA.text in [row.expectation for row in failed]:
+        missed += [f"seed {seed}: {missed_words(row)}" for row in missed_rows(summary)]
     return SeedResult(
         seed,
         seconds,

@@ -1,0 +1,223 @@
+"""Read exports with independent readers: ``python -m tools.read_exports [FORMAT ...]``.
+
+Each reader has an environment of its own in ``build/interchange``, made once, with pinned versions.
+Runs of three maps are exported in each format, read there, and compared with what the runs
+recorded: each track, each position, all lanes. ``--maps FOLDER`` takes all maps of a folder instead
+of three that ship. The table goes to ``build/interchange/results.json`` as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import subprocess
+import sys
+import venv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from odscen.app.export import export_run
+from odscen.app.runs import run_many
+from odscen.app.scenarios import generate
+from odscen.scenario.sampling.generation_settings import GenerationSettings
+from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+
+ROOT = Path(__file__).parents[1]
+BUILD = ROOT / "build" / "interchange"
+SHIPPED = ("signal_crossing", "town_5x5", "rural_hills")
+FARTHEST = 0.05
+"""Metres that a position may be off."""
+STEP = 0.1
+
+
+@dataclass(frozen=True)
+class Reader:
+    """What is installed for a format, as lists of arguments of pip, and the end of its files.
+
+    ``{site}`` is the folder of the environment's packages.
+    """
+
+    ending: str
+    packages: tuple[tuple[str, ...], ...]
+
+
+READERS = {
+    # Its packages ask for Python 3.10 and TensorFlow; its messages need neither.
+    "waymo": Reader(
+        ".tfrecord",
+        (
+            ("protobuf==3.20.3",),
+            (
+                "--no-deps", "--only-binary=:all:", "--python-version=3.10", "--target={site}",
+                "waymo-open-dataset-tf-2-12-0==1.6.7",
+            ),
+        ),
+    ),
+    "commonroad": Reader(
+        ".xml", (("commonroad-io==2024.3", "commonroad-drivability-checker==2025.4.0"),)
+    ),
+    # From PyPI torch brings 6 GB for graphics cards: name PyTorch's index of CPU builds to pip, by
+    # PIP_INDEX_URL, when this environment is made.
+    "pyg": Reader(
+        ".npz",
+        (
+            ("torch==2.13.0",),
+            ("numpy==2.4.6", "torch-geometric==2.8.0"),
+        ),
+    ),
+    "scenarionet": Reader("", (("metadrive-simulator==0.4.3",),)),
+}  # fmt: skip
+
+
+def environment(name: str) -> Path:
+    """Python of a reader's environment; it is made if it is not there."""
+    folder = BUILD / name
+    python, ready = folder / "bin" / "python", folder / "ready"
+    wanted = json.dumps(READERS[name].packages)
+    if not ready.is_file() or ready.read_text() != wanted:
+        print(f"Setting up the reader of {name} in {folder} ...", file=sys.stderr)
+        venv.create(folder, with_pip=True, clear=True)
+        site = folder / "lib" / f"python3.{sys.version_info[1]}" / "site-packages"
+        for packages in READERS[name].packages:
+            words = [word.format(site=site) for word in packages]
+            quiet = ["--quiet", "--disable-pip-version-check"]
+            subprocess.run([python, "-m", "pip", "install", *quiet, *words], check=True)
+        ready.write_text(wanted)
+    return python
+
+
+def recorded_runs(maps: list[Path], *, seconds: float, fill: float) -> list[tuple[Workspace, Run]]:
+    """A run of each map with a step of 0.1 s."""
+    workspace = Workspace.open(BUILD / "workspace")
+    settings = RunSettings(until=seconds, step_length=STEP)
+    runs = []
+    for file in maps:
+        name = f"{file.parent.name}-{file.stem}" if file.parent.name != "maps" else file.stem
+        if name not in {entry.name for entry in workspace.maps()}:
+            workspace.add_map(file, name=name)
+        sampled = GenerationSettings(map_name=name, seed=7, fill=fill, roi_segments=40)
+        paths = generate(workspace, settings=sampled)
+        made = run_many(workspace, paths, settings=settings, reports=False)
+        runs += [(workspace, run) for run in made]
+    return runs
+
+
+def read(name: str, workspace: Workspace, run: Run) -> dict[str, Any]:
+    """Export a run, read it, and compare; counts and the largest error."""
+    out = BUILD / "exports" / name / run.folder.name
+    files = export_run(workspace, run.folder, out, to=name)
+    ending = READERS[name].ending
+    file = next(one for one in files if one.name.endswith(ending)) if ending else out
+    script = ROOT / "tools" / "readers" / f"{name}_reader.py"
+    rows_file = out / "read.json"
+    done = subprocess.run(
+        [environment(name), script, file, rows_file],
+        check=False,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={"PYTHONPATH": str(ROOT / "src"), "HOME": str(BUILD), "PATH": "/usr/bin:/bin"},
+    )
+    if done.returncode:
+        msg = f"{name} cannot read {file}"
+        raise SystemExit(msg)
+    counts = json.loads(done.stdout.splitlines()[-1])
+    graph = workspace.map_for(run.summary["map"], run.summary["map_sha256"]).graph()
+    counts["expected_lanes"] = len(graph.lanes.lanes.keys)
+    rows = json.loads(rows_file.read_text())
+    rows_file.unlink()
+    notes = next((json.loads(one.read_text()) for one in files if "export" in one.name), {})
+    return {"format": name, "run": run.folder.name, **counts, **compare(run, name, rows, notes)}
+
+
+def compare(run: Run, name: str, rows: list[list[Any]], notes: dict[str, Any]) -> dict[str, Any]:
+    """How far what was read is from what was recorded."""
+    table = run.trajectories()
+    begin = float(table["time"].min())  # type: ignore[arg-type]
+    columns = (table[one].to_list() for one in ("id", "time", "x", "y", "hdg"))
+    truth = {
+        (one, round((time - begin) / STEP)): (x, y, hdg)
+        for one, time, x, y, hdg in zip(*columns, strict=True)
+    }
+    found = dict(_named(name, rows, notes, begin))
+    missing = truth.keys() - found.keys()
+    extra = found.keys() - truth.keys()
+    farthest, turned = 0.0, 0.0
+    for key in truth.keys() & found.keys():
+        (x, y, hdg), (x2, y2, hdg2) = truth[key], found[key]
+        farthest = max(farthest, ((x - x2) ** 2 + (y - y2) ** 2) ** 0.5)
+        turned = max(turned, abs(math.remainder(hdg - hdg2, math.tau)))
+    return {
+        "recorded_tracks": len({one for one, _ in truth}),
+        "recorded_states": len(truth),
+        "read_tracks": len({one for one, _ in found}),
+        "missing_states": len(missing),
+        "extra_states": len(extra),
+        "max_error_m": round(farthest, 6),
+        "max_error_rad": round(turned, 6),
+    }
+
+
+def _named(name: str, rows: list[list[Any]], notes: dict[str, Any], begin: float) -> Any:
+    """Poses by road user and instant of the run."""
+    if name == "waymo":
+        names = {number: one for one, number in notes["ids"].items()}
+        first = {
+            one["scenario_id"]: round((one["begin"] - begin) / STEP) for one in notes["scenarios"]
+        }
+        for scenario, number, step, *pose in rows:
+            yield (names[number], first[scenario] + step), pose
+    elif name == "commonroad":
+        obstacles = {one["id"]: one for one in notes["obstacles"]}
+        for number, step, *pose in rows:
+            one = obstacles[number]
+            if one["first_step"] <= step <= one["last_step"]:
+                yield (one["road_user"], step), pose
+    else:
+        for road_user, step, *pose in rows:
+            yield (road_user, step), pose
+
+
+def check(result: dict[str, Any]) -> list[str]:
+    """What is wrong with a result."""
+    never = ("missing_states", "extra_states", "states_missed_by_checker")
+    wrong = [f"{one} {result[one]}" for one in never if result.get(one)]
+    if result["read_tracks"] != result["recorded_tracks"]:
+        wrong.append(f"{result['read_tracks']} of {result['recorded_tracks']} tracks")
+    lanes = result.get("lanes", result.get("lanelets"))
+    for count in lanes if isinstance(lanes, list) else [lanes]:
+        walks = result.get("crosswalks", 0)
+        if count - walks != result["expected_lanes"]:
+            wrong.append(f"{count - walks} of {result['expected_lanes']} lanes")
+    if result["max_error_m"] > FARTHEST:
+        wrong.append(f"{result['max_error_m']} m off")
+    return wrong
+
+
+def main() -> int:
+    """Read all; 1 if something is wrong."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("formats", nargs="*", choices=[[], *READERS], metavar="FORMAT")
+    parser.add_argument("--maps", type=Path, nargs="+", help="OpenDRIVE files")
+    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--fill", type=float, default=0.1)
+    given = parser.parse_args()
+    maps = given.maps or [ROOT / "maps" / f"{name}.xodr" for name in SHIPPED]
+    runs = recorded_runs(maps, seconds=given.seconds, fill=given.fill)
+    results, failed = [], False
+    for name in given.formats or READERS:
+        for workspace, run in runs:
+            result = read(name, workspace, run)
+            wrong = check(result)
+            failed |= bool(wrong)
+            print(f"{name} {result['run']}: {'; '.join(wrong) or 'ok'}", json.dumps(result))
+            results.append(result)
+    (BUILD / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
