@@ -13,7 +13,7 @@ from odscen.app.maps import load_map
 from odscen.scenario.demand.count_stations import place_points
 from odscen.scenario.document.json_form import loads
 from odscen.workspace.store import Workspace
-from tests.web.conftest import CROSSING, finished
+from tests.web.conftest import CROSSING, finished, job, wait_for
 
 
 @pytest.fixture
@@ -90,10 +90,10 @@ def test_a_whole_day_keeps_who_is_there_and_is_one_step_for_undo(
     client: TestClient, state: dict[str, Any], workspace: Workspace
 ) -> None:
     wish = {"version": state["version"], "trips": 400}
-    answer = client.post("/api/scenarios/mine/demand/day", json=wish)
-    assert answer.status_code == 200, answer.text
-    made = answer.json()
-    document = made["scenario"]["document"]
+    ended = job(client, client.post("/api/scenarios/mine/demand/day", json=wish))
+    assert (ended["state"], ended["result"]) == ("done", "mine"), ended["error"]
+    made, scenario = ended["day"], client.get("/api/scenarios/mine").json()
+    document = scenario["document"]
     ids = load_map(workspace.map(CROSSING)).sumo.graph.segments.ids
     assert set(document["roi"]) == set(ids)
     assert document["simulation"]["duration"] == 86_400
@@ -102,12 +102,27 @@ def test_a_whole_day_keeps_who_is_there_and_is_one_step_for_undo(
     assert sum(row[2] for row in matrix["trips"]) == pytest.approx(made["trips"], rel=0.02)
     assert made["volume"] < made["capacity"]
     assert "busiest hour is usable with 2 seeds" in made["found"]
-    assert not [one for one in made["scenario"]["problems"] if one["severity"] == "error"]
-    again = client.post("/api/scenarios/mine/demand/day", json=wish)
-    assert again.status_code == 409
-    body = {"version": made["scenario"]["version"]}
+    assert not [one for one in scenario["problems"] if one["severity"] == "error"]
+    again = job(client, client.post("/api/scenarios/mine/demand/day", json=wish))
+    assert (again["state"], again["error"]["kind"]) == ("failed", "ConflictError")
+    body = {"version": scenario["version"]}
     undone = client.post("/api/scenarios/mine/undo", json=body).json()
     assert undone["document"] == state["document"]
+
+
+def test_a_day_that_is_being_tried_is_cancelled_within_a_second_and_changes_nothing(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    wish = {"version": state["version"], "trips": 40_000}
+    begun = client.post("/api/scenarios/mine/demand/day", json=wish).json()["job"]
+    path = f"/api/jobs/{begun}"
+    wait_for(lambda: client.get(path).json()["step"] == "trying the busiest hour")
+    other = client.post("/api/scenarios/mine/demand/day", json=wish)
+    assert other.status_code == 409
+    assert begun in other.json()["error"]["message"]
+    assert client.delete(path).status_code == 202
+    wait_for(lambda: client.get(path).json()["state"] == "cancelled", seconds=5.0)
+    assert client.get("/api/scenarios/mine").json() == state
 
 
 def test_the_fit_of_a_run_is_that_of_its_trajectories_with_places_on_the_map(

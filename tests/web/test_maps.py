@@ -194,7 +194,7 @@ def test_a_map_that_takes_long_does_not_delay_another_and_can_be_cancelled(
     slow = upload(client, motorway(), "slow.xodr").json()["job"]
     again = upload(client, motorway(), "slow.xodr")
     assert (again.status_code, again.json()["error"]["kind"]) == (409, "ConflictError")
-    assert "map 'slow' is being added" in again.json()["error"]["message"]
+    assert "map 'slow' is being worked on" in again.json()["error"]["message"]
     small = (SHIPPED / "t_junction_signs.xodr").read_bytes()
     assert job(client, upload(client, small, "small.xodr"))["state"] == "done"
     assert client.get("/api/health").status_code == 200

@@ -1,5 +1,7 @@
 import { call, form } from "./client";
+import { followJob } from "./maps";
 import type { components } from "./schema";
+import type { Job } from "./types";
 
 type Schemas = components["schemas"];
 
@@ -30,6 +32,15 @@ export const demand = {
     return call("post", "/api/scenarios/{name}/demand/table", { path: { name }, body: form(fields) });
   },
   entries: (name: string) => call("get", "/api/scenarios/{name}/demand/entries", { path: { name } }),
-  day: (name: string, version: number, wish: Omit<Schemas["WholeDay"], "version">) =>
-    call("post", "/api/scenarios/{name}/demand/day", { path: { name }, body: { version, ...wish } }),
+  /** Makes a day of traffic, which takes minutes with a trial; null if it was cancelled. */
+  day: async (
+    name: string,
+    version: number,
+    wish: Omit<Schemas["WholeDay"], "version">,
+    onStep: (job: Job) => void,
+  ): Promise<Schemas["DayMade"] | null> => {
+    const body = { version, ...wish };
+    const { job } = await call("post", "/api/scenarios/{name}/demand/day", { path: { name }, body });
+    return (await followJob(job, onStep))?.day ?? null;
+  },
 };

@@ -1,4 +1,4 @@
-import { address, api, call } from "./client";
+import { address, api, ApiError, call } from "./client";
 import type { ConversionReport, Job } from "./types";
 
 const PAUSE = 300;
@@ -19,8 +19,13 @@ export async function followJob(id: string, onStep: (job: Job) => void): Promise
     const job = await api.job(id);
     if (job.state === "done") return job;
     if (job.state === "cancelled") return null;
-    if (job.state === "failed") throw new Error(job.error?.message ?? "The map could not be read.");
+    if (job.state === "failed") throw failureOf(job);
     onStep(job);
     await new Promise((done) => setTimeout(done, PAUSE));
   }
+}
+
+function failureOf({ error }: Job): Error {
+  if (!error) return new Error("The work has failed.");
+  return error.kind === "ConflictError" ? new ApiError(409, error) : new Error(error.message);
 }

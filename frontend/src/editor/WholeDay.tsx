@@ -1,6 +1,7 @@
-import { Alert, Button, Checkbox, NumberInput, SegmentedControl, Text } from "@mantine/core";
+import { Alert, Button, Checkbox, Group, NumberInput, SegmentedControl, Text } from "@mantine/core";
 import { useState } from "react";
 
+import { api } from "../api/client";
 import { demand } from "../api/demand";
 import { isKey } from "../lists";
 import { tell } from "../ui/notices";
@@ -16,13 +17,19 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
   const [day, setDay] = useState<keyof typeof DAYS>("weekday");
   const [trips, setTrips] = useState(51_000);
   const [trial, setTrial] = useState(true);
-  const [busy, setBusy] = useState(false);
+  const [busy, setBusy] = useState<{ job?: string; step: string } | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   const make = (): void => {
-    setBusy(true);
+    setBusy({ step: "Starting" });
+    let done = true;
     setFailure(null);
     take(async (version) => {
-      const made = await demand.day(name, version, { day, trips, trial });
+      const wish = { day, trips, trial };
+      const made = await demand.day(name, version, wish, ({ id, step }) => setBusy({ job: id, step }));
+      if (made === null) {
+        done = false;
+        return api.scenario(name);
+      }
       const load = Math.round((100 * made.volume) / made.capacity);
       const peak = Math.round(made.peak_trips).toLocaleString("en");
       tell(
@@ -31,10 +38,13 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
           (made.trips < trips ? " More trips would have exceeded the capacity of the junctions." : "") +
           (made.found === null ? "" : ` ${made.found}.`),
       );
-      return made.scenario;
+      return api.scenario(name);
     })
-      .then(onDone, (error: unknown) => setFailure(reasonOf(error)))
-      .finally(() => setBusy(false));
+      .then(
+        () => done && onDone(),
+        (error: unknown) => setFailure(reasonOf(error)),
+      )
+      .finally(() => setBusy(null));
   };
   return (
     <div className="fold">
@@ -72,9 +82,24 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
           {failure}
         </Alert>
       )}
-      <Button variant="light" loading={busy} onClick={make}>
+      <Button variant="light" loading={busy !== null} onClick={make}>
         Generate the day
       </Button>
+      {busy && (
+        <Group justify="space-between" wrap="nowrap" gap="xs">
+          <Text size="sm" c="dimmed" role="status">
+            {busy.step}
+          </Text>
+          <Button
+            size="compact-sm"
+            variant="default"
+            disabled={!busy.job}
+            onClick={() => busy.job && void api.cancelJob(busy.job).catch(() => undefined)}
+          >
+            Cancel
+          </Button>
+        </Group>
+      )}
     </div>
   );
 }

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from fastapi import APIRouter, File, Form, UploadFile
 
 from odscen.app import demands
-from odscen.app.sized_demand import sized
 from odscen.base.errors import InputError
 from odscen.scenario.document.document_parts import Identifier
 from odscen.scenario.document.scenario_document import Scenario
+from odscen.web.jobs import JobResult
 from odscen.web.large.large_documents import LargeDocumentRoute
-from odscen.web.messages import DayMade, EntryPlace, ScenarioState, Version, WholeDay
+from odscen.web.messages import EntryPlace, JobStarted, ScenarioState, Version, WholeDay
 from odscen.web.scenario_routes import state_of
 from odscen.web.services import Shared
+from odscen.web.whole_days import make_day
+
+if TYPE_CHECKING:
+    from odscen.workspace.store import ProgressCallback
 
 router = APIRouter(prefix="/api/scenarios/{name}/demand", route_class=LargeDocumentRoute)
+days = APIRouter(prefix="/api/scenarios/{name}/demand")
 
 _WORDS = {
     "od": "trips",
@@ -67,18 +72,16 @@ def entries(name: str, shared: Shared) -> list[EntryPlace]:
     ]
 
 
-@router.post("/day")
-def day(name: str, wish: WholeDay, shared: Shared) -> DayMade:
-    """Give a scenario 24 hours of traffic on its whole map; takes seconds, with a trial minutes."""
-    scenario = shared.drafts.get(name).scenario
-    # Made before the drafts are locked; a change meanwhile is another version, and refused.
-    made, load = demands.with_whole_day(
-        shared.map_of(scenario), scenario, trips=wish.trips, day=wish.day
-    )
-    found = None
-    if wish.trial:
-        made, sizing = sized(shared.workspace, made, only=wish.day)
-        load, found = load.times(sizing.share), sizing.words
-    label = f"A {wish.day} of the whole town"
-    draft = shared.drafts.change(name, wish.version, label, lambda _: made)
-    return DayMade(scenario=state_of(shared, draft), found=found, **load._asdict())
+@days.post("/day", status_code=202)
+def day(name: str, wish: WholeDay, shared: Shared) -> JobStarted:
+    """Give a scenario 24 hours of traffic on its whole map, in the background.
+
+    It takes seconds, with a trial minutes; the job tells what was found.
+    """
+    row = shared.drafts.row(name)  # of one that is not there nothing is started
+
+    def work(progress: ProgressCallback) -> JobResult:
+        progress("starting", 0.0)
+        return make_day(shared, row.name, wish, progress=progress)
+
+    return JobStarted(job=shared.jobs.start(work, subject=f"the demand of scenario {name!r}"))

@@ -147,7 +147,7 @@ class Drafts:
             If the edit is refused.
         """
         with self._lock, disk_errors("scenarios"):
-            old = self._of_version(name, version)
+            old = self.of_version(name, version)
             scenario = edit(old.scenario)
             text = dumps(scenario)
             if scenario.formulas:  # one whose number was set to another is no formula any more
@@ -217,7 +217,7 @@ class Drafts:
 
     def _move(self, name: str, version: int, step: int) -> Draft:
         with self._lock, disk_errors("scenarios"):
-            old = self._of_version(name, version)
+            old = self.of_version(name, version)
             if (old.history.undo if step < 0 else old.history.redo) is None:
                 msg = f"there is nothing to {'undo' if step < 0 else 'redo'}"
                 raise ConflictError(msg, current=version)
@@ -230,7 +230,8 @@ class Drafts:
         self._open[draft.name] = draft
         return draft
 
-    def _of_version(self, name: str, version: int) -> Draft:
+    def of_version(self, name: str, version: int) -> Draft:
+        """One scenario, that has to be at ``version``; :class:`ConflictError` if it is not."""
         draft = self.get(name)
         current = draft.history.version
         if version != current:

@@ -6,11 +6,11 @@ import itertools
 import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import ConflictError, NotFoundError, OdscenError
 from odscen.web.error_answers import error_info
-from odscen.web.messages import ErrorInfo, JobInfo
+from odscen.web.messages import DayMade, ErrorInfo, JobInfo
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,6 +24,13 @@ _LIVE = ("queued", "running")
 
 class _CancelledJob(Exception):  # noqa: N818 - no error, and never seen outside
     pass
+
+
+class JobResult(NamedTuple):
+    """What a job has made: the name of it, and what there is to say of a day of traffic."""
+
+    name: str
+    day: DayMade | None = None
 
 
 class Jobs:
@@ -41,8 +48,8 @@ class Jobs:
         self._subjects: dict[str, str] = {}
         self._cancelled: set[str] = set()
 
-    def start(self, work: Callable[[ProgressCallback], str], *, subject: str) -> str:
-        """Take on work that tells its progress and returns the name of what it made.
+    def start(self, work: Callable[[ProgressCallback], JobResult], *, subject: str) -> str:
+        """Take on work that tells its progress and returns what it made.
 
         Parameters
         ----------
@@ -59,7 +66,7 @@ class Jobs:
         with self._lock:
             other = self._subjects.get(subject)
             if other is not None:
-                msg = f"{subject} is being added (job {other}); wait for its end, or cancel it"
+                msg = f"{subject} is being worked on (job {other}); wait for its end, or cancel it"
                 raise ConflictError(msg)
             name = f"job-{next(self._numbers)}"
             self._subjects[subject] = name
@@ -108,7 +115,7 @@ class Jobs:
             raise NotFoundError(what, name, [])
         return self._jobs[name]
 
-    def _run(self, name: str, work: Callable[[ProgressCallback], str], subject: str) -> None:
+    def _run(self, name: str, work: Callable[[ProgressCallback], JobResult], subject: str) -> None:
         def progress(step: str, share: float) -> None:
             with self._lock:
                 if name in self._cancelled:
@@ -118,7 +125,9 @@ class Jobs:
         ended = JobInfo(id=name, state="failed", step="failed", share=0.0)
         try:
             result = work(progress)
-            ended = JobInfo(id=name, state="done", step="done", share=1.0, result=result)
+            ended = JobInfo(
+                id=name, state="done", step="done", share=1.0, result=result.name, day=result.day
+            )
         except _CancelledJob:
             ended = ended.model_copy(update={"state": "cancelled", "step": "cancelled"})
         except OdscenError as error:

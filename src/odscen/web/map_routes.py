@@ -16,6 +16,7 @@ from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import ConflictError, DamagedError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.scenario.demand.day_profiles import BUILT_IN
+from odscen.web.jobs import JobResult
 from odscen.web.messages import (
     AssetsInfo,
     BlueprintInfo,
@@ -130,18 +131,19 @@ def add_map(
         shutil.copyfileobj(file.file, kept)
         _refuse_other(shared, name, kept)
 
-        def work(progress: ProgressCallback) -> str:
+        def work(progress: ProgressCallback) -> JobResult:
             with kept:
                 progress("starting", 0.0)
                 kept.seek(0)
                 settings = ConversionSettings(converter=converter)
-                return shared.workspace.add_map_content(
+                added = shared.workspace.add_map_content(
                     kept.read(),
                     file=f"{name_from_file(given)}.xodr",
                     name=name,
                     settings=settings,
                     progress=progress,
-                ).name
+                )
+                return JobResult(added.name)
 
         return JobStarted(job=shared.jobs.start(work, subject=f"map {name!r}"))
     except BaseException:
@@ -153,7 +155,7 @@ def add_map(
 def add_shipped_maps(shared: Shared) -> JobStarted:
     """Add the maps that ship with odscen."""
 
-    def work(progress: ProgressCallback) -> str:
+    def work(progress: ProgressCallback) -> JobResult:
         progress("starting", 0.0)
         paths = shipped_maps()
         for number, path in enumerate(paths):
@@ -162,7 +164,7 @@ def add_shipped_maps(shared: Shared) -> JobStarted:
                 progress(f"{path.stem}: {what}", (number + share) / len(paths))
 
             shared.workspace.add_map(path, progress=step)
-        return ", ".join(path.stem for path in paths)
+        return JobResult(", ".join(path.stem for path in paths))
 
     return JobStarted(job=shared.jobs.start(work, subject="the set of example maps"))
 

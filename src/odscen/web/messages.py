@@ -60,8 +60,26 @@ class JobStarted(Answer):
     job: str
 
 
+class DayMade(Answer):
+    """A day of traffic that a scenario was given, and what it asks of the busiest junction.
+
+    ``volume`` and ``capacity`` are vehicles per hour at ``place`` in the busiest hour, in which
+    ``peak_trips`` depart. ``found`` says what was tried by runs, and is null without a trial.
+    """
+
+    trips: float
+    peak_trips: float
+    place: str
+    volume: float
+    capacity: float
+    found: str | None
+
+
 class JobInfo(Answer):
-    """How far a job is; ``share`` from 0 to 1. ``result`` is the name of what was made."""
+    """How far a job is; ``share`` from 0 to 1. ``result`` is the name of what was made.
+
+    ``day`` is told of a day of traffic alone.
+    """
 
     id: str
     state: Literal["queued", "running", "done", "failed", "cancelled"]
@@ -69,6 +87,7 @@ class JobInfo(Answer):
     share: float
     error: ErrorInfo | None = None
     result: str | None = None
+    day: DayMade | None = None
 
 
 class BlueprintInfo(Answer):
@@ -234,22 +253,6 @@ class EntryPlace(Answer):
     segment: str
     direction: Literal["forward", "backward"]
     lanes: list[int]
-
-
-class DayMade(Answer):
-    """A scenario that was given a day of traffic, and what that asks of the busiest junction.
-
-    ``volume`` and ``capacity`` are vehicles per hour at ``place`` in the busiest hour, in which
-    ``peak_trips`` depart. ``found`` says what was tried by runs, and is null without a trial.
-    """
-
-    scenario: ScenarioState
-    trips: float
-    peak_trips: float
-    place: str
-    volume: float
-    capacity: float
-    found: str | None
 
 
 class WholeDay(RequestBody):

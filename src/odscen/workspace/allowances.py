@@ -37,6 +37,8 @@ IMPORT_MEMORY_PER_BYTE = 60
 IMPORT_SECONDS = 30.0
 IMPORT_SECONDS_PER_MEGABYTE = 30.0
 """The same for a file of OpenSCENARIO, with the map that it plays on."""
+TRIAL_MEMORY = 8_000_000_000
+TRIAL_SECONDS = 7200.0
 _FILE_SHARE = 4
 """A file that is written may have this part of the memory."""
 _PATIENCE = 6.0
@@ -181,6 +183,11 @@ def for_large_document(size: int) -> Allowance:
         DOCUMENT_MEMORY + LARGE_MEMORY_PER_BYTE * size,
         DOCUMENT_SECONDS + LARGE_SECONDS_PER_MEGABYTE * size / 1e6,
     )
+
+
+def for_trial_runs() -> Allowance:
+    """What a demand that is tried by runs may use: as much as runs that a user starts himself."""
+    return Allowance(TRIAL_MEMORY, TRIAL_SECONDS)
 
 
 def _from_environment(name: str) -> float | None:

@@ -12,6 +12,7 @@ from odscen.app.exchange.sent_scenarios import SentFile, read_sent_scenario
 from odscen.app.exchange.zipped_exports import exported
 from odscen.base.errors import NotFoundError
 from odscen.web.exchange.exchange_messages import ExportInfo, ImportInfo
+from odscen.web.jobs import JobResult
 from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import JobStarted
 from odscen.web.services import Services, Shared
@@ -40,7 +41,7 @@ def import_openscenario(
     """Make a scenario of an OpenSCENARIO file, in the background; the result is its name."""
     sent = [SentFile(one.filename or "file", one.file.read()) for one in files]
 
-    def work(progress: ProgressCallback) -> str:
+    def work(progress: ProgressCallback) -> JobResult:
         progress("starting", 0.0)
         read = read_sent_scenario(shared.workspace, sent, ego=ego, progress=progress)
         draft = shared.drafts.create(read.scenario, None, stem=read.stem, label="Import")
@@ -48,7 +49,7 @@ def import_openscenario(
         shared.drafts.keep(draft.name, _REPORT, json.dumps(about))
         if read.plan is not None:
             shared.drafts.keep(draft.name, _PLAN, read.plan)
-        return draft.name
+        return JobResult(draft.name)
 
     subject = f"the import of {', '.join(sorted(one.name for one in sent))}"
     return JobStarted(job=shared.jobs.start(work, subject=subject))

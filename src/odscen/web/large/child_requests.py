@@ -1,4 +1,4 @@
-"""What a child does for the server: requests about large scenarios, by the same routes."""
+"""What a child does for the server: requests about large scenarios, and days of traffic."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from starlette.requests import Request
 
 from odscen.web.application import create_app
 from odscen.web.large.large_documents import ANSWER, BODY, HEAD, REQUEST
+from odscen.web.messages import WholeDay
+from odscen.web.whole_days import day_made
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
@@ -36,8 +38,28 @@ def scenario_row(
 ) -> dict[str, Any]:
     """What the list of scenarios says of one; a job of a child."""
     progress("reading the scenario", 0.0)
+    return services_in_child(workspace).drafts.row(scenario).model_dump(mode="json")
+
+
+def whole_day(
+    *,
+    workspace: str,
+    name: str,
+    wish: dict[str, Any],
+    made: str | None,
+    progress: Callable[[str, float], None],
+) -> dict[str, Any]:
+    """Make a day of traffic for a scenario; a job of a child."""
+    file = None if made is None else Path(made)
+    asked = WholeDay.model_validate(wish)
+    day = day_made(services_in_child(workspace), name, asked, made=file, progress=progress)
+    return day.model_dump(mode="json")
+
+
+def services_in_child(workspace: str) -> Services:
+    """Services of a child, which has the large documents to itself."""
     services: Services = _application(workspace).state.services
-    return services.drafts.row(scenario).model_dump(mode="json")
+    return services
 
 
 @lru_cache(maxsize=1)
