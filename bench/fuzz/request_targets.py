@@ -216,7 +216,7 @@ def _await(trial: Trial, served: Served, said: bytes) -> None:
 
 
 _BODIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
-    ("POST", "/api/scenarios", {"map": CROSSING, "name": "new", "seed": 1, "fill": 0.2}),
+    ("POST", "/api/scenarios", {"map": CROSSING, "name": "new"}),
     ("POST", "/api/scenarios/done/edits", {"version": 0, "edit": {"kind": "set_seed", "seed": 4}}),
     ("POST", "/api/scenarios/done/copy", {"name": "copied"}),
     ("PUT", "/api/scenarios/full/name", {"name": "renamed"}),

@@ -1,4 +1,5 @@
 import type { ConversionReport, ElementOutcome } from "../api/types";
+import { sentence } from "../ui/words";
 
 /** Entries with the same reason for several elements. */
 export interface Finding {
@@ -63,7 +64,7 @@ export function plainFinding(reason: string): string {
     if (match) return text.replace("$1", match[1] ?? "");
   }
   const words = reason.replace(/\bSUMO('s)?( network)?/g, "the simulation$1");
-  return words.charAt(0).toUpperCase() + words.slice(1);
+  return sentence(words);
 }
 
 /** What became of a map, what matters most first; elements of which the same is said are together. */

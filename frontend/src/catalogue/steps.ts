@@ -1,3 +1,5 @@
+import { sentence } from "../ui/words";
+
 /** What the server does with a map, in its words and in ours. */
 const STEPS: [said: string, words: string][] = [
   ["reading the map", "reading the file"],
@@ -13,5 +15,5 @@ export function stepWords(step: string): string {
   const words = known
     ? `step ${STEPS.indexOf(known) + 1} of ${STEPS.length}: ${known[1]}`
     : said.replaceAll("SUMO", "simulation");
-  return name ? `${name}, ${words}` : words.charAt(0).toUpperCase() + words.slice(1);
+  return name ? `${name}, ${words}` : sentence(words);
 }

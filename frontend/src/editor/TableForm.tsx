@@ -8,6 +8,7 @@ import { tell } from "../ui/notices";
 import { reasonOf } from "../ui/reason";
 import { exampleTable } from "./demand";
 import type { EditorStore } from "./store";
+import { sentence } from "../ui/words";
 
 const KINDS: Record<TableKind, { label: string; stem: string | null; text: string }> = {
   od: {
@@ -157,7 +158,5 @@ export function TableForm({
 /** All reasons for a refusal; each begins with a capital letter. */
 function problemsOf(error: unknown): string[] {
   const reported = error instanceof ApiError ? error.body.problems : [];
-  return (reported.length > 0 ? reported : [reasonOf(error)]).map(
-    (text) => text.charAt(0).toUpperCase() + text.slice(1),
-  );
+  return (reported.length > 0 ? reported : [reasonOf(error)]).map(sentence);
 }

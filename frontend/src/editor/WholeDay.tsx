@@ -6,7 +6,7 @@ import { demand } from "../api/demand";
 import { isKey } from "../lists";
 import { tell } from "../ui/notices";
 import { reasonOf } from "../ui/reason";
-import { count } from "../ui/words";
+import { count, sentence } from "../ui/words";
 import type { EditorStore } from "./store";
 
 const DAYS = { weekday: "Weekday", weekend: "Weekend" };
@@ -88,7 +88,7 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
       {busy && (
         <Group justify="space-between" wrap="nowrap" gap="xs">
           <Text size="sm" c="dimmed" role="status">
-            {busy.step}
+            {sentence(busy.step)}
           </Text>
           <Button
             size="compact-sm"

@@ -1,4 +1,5 @@
 import type { ActorMeasureInfo, FigureInfo } from "../api/figures";
+import { sentence } from "../ui/words";
 
 /** Operators of criteria, in the words of the reports. */
 export const OPERATORS: [op: string, words: string][] = [
@@ -63,7 +64,7 @@ export function criterionWords(
   const about = parts.actor === WHOLE_RUN ? measure.label : `${measure.label} of ${parts.actor}`;
   const op = OPERATORS.find(([sign]) => sign === parts.op)?.[1] ?? parts.op;
   const unit = parts.unit || measure.unit;
-  return `${about.charAt(0).toUpperCase()}${about.slice(1)}: ${op} ${parts.bound}${unit ? ` ${unit}` : ""}`;
+  return `${sentence(about)}: ${op} ${parts.bound}${unit ? ` ${unit}` : ""}`;
 }
 
 /** What the head of the step says. */

@@ -7,7 +7,7 @@ import { ApiError } from "../api/client";
 import { exchange, type ExportNote, type ExportNotes } from "../api/exchange";
 import { IconDown } from "../ui/icons";
 import { useLoaded } from "../ui/useLoaded";
-import { count } from "../ui/words";
+import { count, sentence } from "../ui/words";
 import { type Format, FORMATS, VERSIONS } from "./formats";
 
 /** Notes that are shown at once. */
@@ -122,7 +122,7 @@ function List({ title, notes }: { title: string; notes: readonly ExportNote[] })
       <ul className="import-reasons" style={{ maxHeight: 260, overflow: "auto" }} tabIndex={0}>
         {[...reasons].slice(0, SHOWN).map(([reason, places]) => (
           <li key={reason}>
-            <Text size="sm">{reason.charAt(0).toUpperCase() + reason.slice(1)}</Text>
+            <Text size="sm">{sentence(reason)}</Text>
             <Text size="xs" c="dimmed">
               {places.slice(0, 12).join(", ")}
               {places.length > 12 && ` and ${places.length - 12} more`}

@@ -1,6 +1,7 @@
 import type { ImportReport, ImportRow } from "../api/exchange";
 import type { Bounds } from "../api/types";
 import type { ScenePin } from "../map/scene";
+import { sentence } from "../ui/words";
 
 /** What may have become of an element, what matters most first. */
 export const VERDICTS = ["refused", "approximated", "ignored", "taken"] as const;
@@ -39,7 +40,7 @@ export interface Reason {
 export function elementWord(xpath: string): string {
   const tag = (xpath.split("/").at(-1) ?? "").replace(/\[\d+\]$/, "");
   const words = tag.replace(/(?<=[a-z])(?=[A-Z])/g, " ").toLowerCase();
-  return words.charAt(0).toUpperCase() + words.slice(1);
+  return sentence(words);
 }
 
 const PLAIN: [RegExp, string][] = [
@@ -54,7 +55,7 @@ export function plainReason(reason: string): string {
   if (!reason) return "";
   for (const [pattern, text] of PLAIN) if (pattern.test(reason)) return text;
   const words = reason.replace(/^left out: /, "").replace(PATH, "$1 in line $2");
-  return words.charAt(0).toUpperCase() + words.slice(1);
+  return sentence(words);
 }
 
 /** Rows of one list by their reason, the commonest first; what lies in another row of it is counted there. */

@@ -4,6 +4,7 @@ import { api } from "../api/client";
 import { exchange } from "../api/exchange";
 import { go } from "../ui/address";
 import { reasonOf } from "../ui/reason";
+import { sentence } from "../ui/words";
 
 /** An import that is running, or that was refused; its files can be sent again with others. */
 export interface ImportState {
@@ -31,7 +32,7 @@ export function useImport(): Import {
     busy.current = true;
     setState({ files, step: "Sending the files", job: null, refusal: null });
     exchange
-      .bring(files, ({ id, step }) => setState({ files, step: stepOf(step), job: id, refusal: null }))
+      .bring(files, ({ id, step }) => setState({ files, step: sentence(step), job: id, refusal: null }))
       .then(
         (name) => {
           setState(null);
@@ -49,5 +50,3 @@ export function useImport(): Import {
     close: () => setState(null),
   };
 }
-
-const stepOf = (step: string): string => step.charAt(0).toUpperCase() + step.slice(1);

@@ -1,4 +1,4 @@
-import { longClock } from "../ui/words";
+import { longClock, sentence } from "../ui/words";
 import type { FigureInfo } from "../api/figures";
 import type { RunState, Summary } from "../api/runs";
 
@@ -36,7 +36,7 @@ const say = (n: number, { display }: FigureInfo): string =>
   display.clock ? longClock(n, n) : plain(n, display);
 const words = ({ name, label, definition }: FigureInfo) => ({
   name,
-  label: label.charAt(0).toUpperCase() + label.slice(1),
+  label: sentence(label),
   definition,
 });
 

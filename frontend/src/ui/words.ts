@@ -1,6 +1,9 @@
 import type { Category, DrivingStyle, MapStatistics, NetworkOrigin, WeatherPreset } from "../api/types";
 import { isKey } from "../lists";
 
+/** The same words, as they begin a sentence. */
+export const sentence = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
+
 /** Words of the page: plain sentences with the terms of traffic engineers; see the help for those. */
 export const CATEGORY_WORD: Record<Category, string> = {
   car: "Car",

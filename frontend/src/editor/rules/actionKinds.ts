@@ -15,6 +15,7 @@ import {
   TO,
   type Values,
 } from "./fields";
+import { sentence } from "../../ui/words";
 
 type Action = ScenarioDocument["rules"][number]["then"][number];
 export type ActionKind = Exclude<keyof Action, "together">;
@@ -34,8 +35,6 @@ const LIGHTS: Record<string, string> = {
   fog: "fog lights",
   emergency: "emergency lights",
 };
-const sentenceCase = (word: string): string => word.charAt(0).toUpperCase() + word.slice(1);
-
 function lightWords(values: Values): string {
   const on = Object.entries(LIGHTS).flatMap(([name, word]) => (values[name] === true ? [word] : []));
   if (given(values.indicator) && values.indicator !== "off")
@@ -232,7 +231,7 @@ export const ACTION_KINDS: Record<ActionKind, Kind> = {
       ...Object.entries(LIGHTS).map(([name, word]) => ({
         is: "choice" as const,
         name,
-        label: sentenceCase(word),
+        label: sentence(word),
         choices: { true: "On", false: "Off" },
         optional: true,
       })),
