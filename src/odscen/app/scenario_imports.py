@@ -122,7 +122,8 @@ def read_files(
     loaded = load_map(entry).sumo
     source = XoscSource(
         told.root, told.values, told.report, loaded.graph, entry.name, entry.sha256,
-        _road_points(entry), partial(movement_of, loaded), told.parameters, told.varied is not None,
+        _road_points(entry), partial(movement_of, loaded), workspace.assets().weather,
+        told.parameters, told.varied is not None,
     )  # fmt: skip
     scenario = read_openscenario(source, name=name, ego=ego)
     plan = None

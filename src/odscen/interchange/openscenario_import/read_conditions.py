@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.interchange.openscenario_import.import_report import RefusedError
 from odscen.interchange.openscenario_import.own_files import without_repeats
+from odscen.interchange.openscenario_import.read_environment import clock_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -15,13 +16,16 @@ if TYPE_CHECKING:
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
     from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.read_environment import ReadEnvironment
     from odscen.interchange.openscenario_import.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.read_signals import SignalReader
 
 Made = dict[str, Any]
 ALWAYS: Final[Made] = {"time": {"after": 0.0}}
 NEVER: Final[Made] = {"not": ALWAYS}
 _CLOSE: Final = 0.1
 """What counts as equal, in the unit of the value."""
+_TRUTH: Final = {"true": "1", "false": "0"}
 _ROAD_END: Final = 10.0
 _FAR: Final = 100_000.0
 """Metres."""
@@ -43,8 +47,13 @@ class ConditionReader:
         Parameters and variables of the file, as declared.
     state
         Condition that an element of the storyboard has reached a state.
-    movement
-        Light and movement of a signal of the map.
+    signals
+        Reads what is about signals.
+    changes
+        What sets a parameter or variable in the story: its value then, and the condition that this
+        has happened.
+    environment
+        Time of day at the start.
     own
         Whether odscen wrote the file.
     """
@@ -54,7 +63,9 @@ class ConditionReader:
     entities: Mapping[str, ReadEntity]
     values: Mapping[str, str]
     state: Callable[[_Element], Made]
-    movement: Callable[[str], tuple[str, str] | None]
+    signals: SignalReader
+    changes: Callable[[_Element, str], list[tuple[str, Made]]]
+    environment: ReadEnvironment
     own: bool = False
 
     def trigger(self, trigger: _Element | None) -> Made:
@@ -101,43 +112,47 @@ class ConditionReader:
             return {"not": after} if kind.get("rule", "").startswith("less") else after
         if kind.tag == "StoryboardElementStateCondition":
             return self.state(kind)
-        if kind.tag == "TrafficSignalCondition":
-            return self._signal(kind)
+        if kind.tag in ("TrafficSignalCondition", "TrafficSignalControllerCondition"):
+            return self.signals.condition(kind)
         if kind.tag in ("ParameterCondition", "VariableCondition"):
-            self.report.mark(kind, "approximated", "held against the declared value, once")
-            return ALWAYS if self._holds(kind) else NEVER
+            return self._value(kind)
+        if kind.tag == "TimeOfDayCondition":
+            return self._time_of_day(kind)
         raise RefusedError(kind, f"odscen has no {kind.tag}")
 
-    def _signal(self, kind: _Element) -> Made:
-        name, state = self.report.word(kind, "name"), kind.get("state", "").lower()
-        found = self.movement(name)
-        if found is None:
-            raise RefusedError(kind, f"signal {name!r} is over no movement of a light of the map")
-        if state not in ("red", "yellow", "green"):
-            raise RefusedError(kind, f"the state {state!r} of a signal")
-        light, movement = found
-        return {"signal": {"light": light, "movement": movement, "shows": state}}
+    def _time_of_day(self, kind: _Element) -> Made:
+        start = self.environment
+        if start.clock is None:
+            raise RefusedError(kind, "a time of day, of which the file has none at first")
+        clock, day = clock_of(self.report, kind)
+        seconds = (day - start.day) * 86_400.0 + clock - start.clock
+        if not start.runs:
+            seconds = 0.0 if seconds <= 0 else 1e6
+        before = kind.get("rule", "").startswith("less")
+        if seconds <= 0 or seconds > 1e5:
+            return NEVER if before == (seconds <= 0) else ALWAYS
+        after: Made = {"time": {"after": seconds}}
+        return {"not": after} if before else after
 
-    def _holds(self, kind: _Element) -> bool:
-        name = kind.get("parameterRef") or kind.get("variableRef") or ""
-        have, want, rule = (
-            self.values.get(name.lstrip("$")),
-            kind.get("value", ""),
-            kind.get("rule"),
-        )
+    def _value(self, kind: _Element) -> Made:
+        """Whether a value is as it should be: at first, and after what sets it in the story."""
+        name = (kind.get("parameterRef") or kind.get("variableRef") or "").lstrip("$")
+        have = self.values.get(name)
         if have is None:
             raise RefusedError(kind, f"{name!r} is not declared")
-        try:
-            one, other = float(have), float(want)
-        except ValueError:
-            return (have == want) == (rule != "notEqualTo")
-        return {
-            "greaterThan": one > other,
-            "greaterOrEqual": one >= other,
-            "lessThan": one < other,
-            "lessOrEqual": one <= other,
-            "notEqualTo": one != other,
-        }.get(str(rule), one == other)
+        first, changes = _holds(kind, have), self.changes(kind, name)
+        if not changes:
+            self.report.mark(kind, "approximated", "held against the declared value, once")
+            return ALWAYS if first else NEVER
+        words = f"from when an event sets {name!r}, as far as its trigger still holds"
+        self.report.mark(kind, "approximated", words)
+        sets = [when for value, when in changes if _holds(kind, value)]
+        if not first:
+            return joined("any", sets) if sets else NEVER
+        unsets = [when for value, when in changes if not _holds(kind, value)]
+        if not unsets:
+            return ALWAYS
+        return joined("any", [{"not": joined("any", unsets)}, *sets])
 
     def _by_entity(self, element: _Element) -> Made:
         who = self.report.child(element, "TriggeringEntities")
@@ -203,6 +218,22 @@ class ConditionReader:
         point = self.positions.point(position)
         node = self.positions.name_at(point) if self.own and _headed(position) else None
         return node or [round(point.x, 4), round(point.y, 4)]
+
+
+def _holds(kind: _Element, have: str) -> bool:
+    """Whether a value is to the one of a condition as its rule says."""
+    want, rule = kind.get("value", ""), kind.get("rule")
+    try:
+        one, other = float(_TRUTH.get(have, have)), float(_TRUTH.get(want, want))
+    except ValueError:
+        return (have == want) == (rule != "notEqualTo")
+    return {
+        "greaterThan": one > other,
+        "greaterOrEqual": one >= other,
+        "lessThan": one < other,
+        "lessOrEqual": one <= other,
+        "notEqualTo": one != other,
+    }.get(str(rule), one == other)
 
 
 def _headed(position: _Element) -> bool:

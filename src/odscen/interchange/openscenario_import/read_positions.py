@@ -69,6 +69,8 @@ class PositionReader:
         Whether points on straight lanes stay formulas of parameters, for a sweep.
     moving
         Names of entities that are not where they start once the story runs.
+    on_trajectory
+        Point of a ``TrajectoryPosition``.
     """
 
     report: ImportReport
@@ -78,6 +80,7 @@ class PositionReader:
     starts: dict[str, MapPoint] = field(default_factory=dict)
     varied: bool = False
     moving: set[str] = field(default_factory=set)
+    on_trajectory: Callable[[PositionReader, _Element], MapPoint] | None = None
     _modes: dict[str, bool] = field(default_factory=dict)
 
     @contextmanager
@@ -111,6 +114,7 @@ class PositionReader:
             "RelativeWorldPosition": self._relative_world,
             "RelativeObjectPosition": self._relative_object,
             "RoutePosition": self._route,
+            "TrajectoryPosition": self._trajectory,
         }.get(str(kind.tag))
         if read is None:
             raise RefusedError(kind, f"a place given as {kind.tag}")
@@ -317,6 +321,11 @@ class PositionReader:
     def _relative_object(self, kind: _Element) -> MapPoint:
         dx, dy = (self.report.number(kind, name, 0.0) for name in ("dx", "dy"))
         return self.of_entity(kind)._replace(node=None).moved(dx, self.side * dy)
+
+    def _trajectory(self, kind: _Element) -> MapPoint:
+        if self.on_trajectory is None:
+            raise RefusedError(kind, "a place on a trajectory")
+        return self.on_trajectory(self, kind)
 
     def _route(self, kind: _Element) -> MapPoint:
         inside = next(kind.iter("FromLaneCoordinates"), None)
