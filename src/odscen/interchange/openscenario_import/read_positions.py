@@ -61,6 +61,8 @@ class PositionReader:
     ----------
     road_point
         x, y and heading of a point with growing s at s and t of a road; ``None`` if there is none.
+    lane_t
+        t of the middle of a lane of any type at s; ``None`` if there is none.
     side
         1 where y and what lies left are positive, -1 in the left-handed frame of CARLA.
     starts
@@ -76,6 +78,7 @@ class PositionReader:
     report: ImportReport
     graph: MapGraph
     road_point: Callable[[str, float, float], tuple[float, float, float] | None]
+    lane_t: Callable[[str, int, float], float | None]
     side: float = 1.0
     starts: dict[str, MapPoint] = field(default_factory=dict)
     varied: bool = False
@@ -252,8 +255,19 @@ class PositionReader:
         if walk is not None:
             return walk.moved(0.0, offset if lane < 0 else -offset)
         if node is None:
-            raise RefusedError(kind, f"road {road!r} has no lane {lane:g} to drive or walk on")
+            return self._on_any_lane(kind, road, int(lane), s, offset)
         return self._at(node, s, offset)
+
+    def _on_any_lane(
+        self, kind: _Element, road: str, lane: int, s: float, offset: float
+    ) -> MapPoint:
+        """Middle of a lane that is neither to drive nor to walk on, such as a shoulder."""
+        t = self.lane_t(road, lane, float(s))
+        found = None if t is None else self.road_point(road, float(s), t + float(offset))
+        if found is None:
+            raise RefusedError(kind, f"road {road!r} has no lane {lane}")
+        point = MapPoint(*found)
+        return point if lane <= 0 else point._replace(hdg=point.hdg + math.pi)
 
     def _on_foot(self, road: str, lane: int, s: float) -> MapPoint | None:
         """Centre of a lane for walking; right lanes lead with growing s, left ones against it."""

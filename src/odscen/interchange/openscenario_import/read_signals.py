@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from odscen.interchange.openscenario_import.import_report import RefusedError
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from odscen.interchange.openscenario_import.import_report import ImportReport
 
 Made = dict[str, Any]
+_LAMPS: Final = ("red", "yellow", "green")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class SignalReader:
             light, movement = self._green_in_phase(kind, "trafficSignalControllerRef")
             self.report.mark(kind, "approximated", f"while {movement!r} of {light!r} has green")
             return {"signal": {"light": light, "movement": movement, "shows": "green"}}
-        state = kind.get("state", "").lower()
+        state = _colour(kind.get("state", ""))
         light, movement = self._over(kind)
         if state not in ("red", "yellow", "green"):
             raise RefusedError(kind, f"the state {state!r} of a signal")
@@ -69,7 +70,7 @@ class SignalReader:
             words = f"the program of {light!r} jumps to where {movement!r} has green"
             self.report.mark(kind, "approximated", words)
             return {"signal": {"light": light, "shows": "green", "movement": movement}}
-        state = kind.get("state", "").lower()
+        state = _colour(kind.get("state", ""))
         light, movement = self._over(kind)
         if state in ("off", ""):
             return {"signal": {"light": light, "shows": "off"}}
@@ -101,6 +102,18 @@ class SignalReader:
                 if above is None or above.get("name") != phase:
                     continue
                 found = self.movement(state.get("trafficSignalId", ""))
-                if state.get("state", "").lower() == "green" and found is not None:
+                if _colour(state.get("state", "")) == "green" and found is not None:
                     return found
         raise RefusedError(kind, f"phase {phase!r} of {name!r} gives no signal of the map green")
+
+
+def _colour(state: str) -> str:
+    """Colour of a state, given by its name or as the lamps that are on, from the top: ``off;on``.
+
+    Red and yellow together are red: who waits has to wait on.
+    """
+    lamps = [one.strip().lower() for one in state.split(";")]
+    if not lamps or any(one not in ("on", "off") for one in lamps) or len(lamps) == 1:
+        return state.strip().lower()
+    lit = [colour for colour, one in zip(_LAMPS, lamps, strict=False) if one == "on"]
+    return lit[0] if lit else "off"

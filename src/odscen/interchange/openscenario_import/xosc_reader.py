@@ -54,8 +54,8 @@ class XoscSource:
         Its tree, its parameters, and the marks of its elements so far.
     graph, map_name, sha256
         The map.
-    road_point
-        x, y and heading at s and t of a road.
+    road_point, lane_t
+        x, y and heading at s and t of a road; t of the middle of a lane at s.
     parameters
         Declarations of those parameters that are numbers, by name.
     varied
@@ -73,6 +73,7 @@ class XoscSource:
     map_name: str
     sha256: str
     road_point: Callable[[str, float, float], tuple[float, float, float] | None]
+    lane_t: Callable[[str, int, float], float | None]
     movement: Callable[[str], tuple[str, str] | None]
     weather: Callable[[str], Mapping[str, float] | None]
     parameters: Mapping[str, _Element] = field(default_factory=dict)
@@ -101,7 +102,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
     # How ScenarioRunner tells files in CARLA's frame, whose y and headings are those of Unreal.
     side = -1.0 if _title(root).startswith("CARLA:") else 1.0
     positions = PositionReader(
-        report, source.graph, source.road_point, side, varied=source.varied,
+        report, source.graph, source.road_point, source.lane_t, side, varied=source.varied,
         on_trajectory=trajectory_place,
     )  # fmt: skip
     driven = frozenset(one.id for one in entities.values() if one.ego and ego != "story")
