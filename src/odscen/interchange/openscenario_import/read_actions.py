@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from odscen.interchange.openscenario_import.read_conditions import ConditionReader
     from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.read_positions import MapPoint
 
 Made = dict[str, Any]
 _SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}
@@ -287,12 +288,17 @@ def _teleport(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report, positions = read.conditions.report, read.conditions.positions
     with positions.exactly():
         centre = positions.point(report.only(kind)).moved(entity.ahead)
-    after = centre.moved(_JUMP * read.speeds.get(entity.id, 0.0))
+    report.mark(kind, "approximated", f"it is led there for {_JUMP:g} s, and drives on")
+    return put_there(centre, read.speeds.get(entity.id, 0.0))
+
+
+def put_there(centre: MapPoint, speed: float) -> Made:
+    """Recording that puts the centre of an actor at a place, with its heading there."""
+    after = centre.moved(_JUMP * speed)
     rows = [
-        [time, round(at.x, 4), round(at.y, 4), round(at.hdg, 6)]
+        [time, round(float(at.x), 4), round(float(at.y), 4), round(float(at.hdg), 6)]
         for time, at in ((0.0, centre), (_JUMP, after))
     ]
-    report.mark(kind, "approximated", f"it is led there for {_JUMP:g} s, and drives on")
     return {"replay": {"rows": rows}}
 
 
@@ -328,17 +334,20 @@ def _goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
     return {"goal": {"to": str(node_id(positions.graph, node))}}
 
 
-def _arrive(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+def _arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report = read.conditions.report
     name = kind.get("masterEntityRef", "")
     if name not in read.conditions.entities:
         raise RefusedError(kind, f"entity {name!r} is not among the actors")
     found = {}
-    for field_name, tag in (("when_at", "TargetPositionMaster"), ("at", "TargetPosition")):
+    for field_name, tag, who in (
+        ("when_at", "TargetPositionMaster", read.conditions.entities[name]),
+        ("at", "TargetPosition", entity),
+    ):
         place = report.child(kind, tag)
         if place is None:
             raise RefusedError(kind, f"{kind.tag} without {tag}")
-        found[field_name] = read.conditions.point_or_node(place)
+        found[field_name] = read.conditions.point_or_node(place, ahead=who.ahead)
     if kind.find("FinalSpeed") is not None:
         report.mark(kind, "approximated", "the speed on arrival is not settled")
     return {"arrive": {**found, "to": read.conditions.entities[name].id}}

@@ -194,8 +194,10 @@ class ConditionReader:
         ]
         return {"not": {"all": near}} if rule == "notEqualTo" else {"all": near}
 
-    def place(self, kind: _Element) -> list[float] | str:
+    def place(self, kind: _Element, of: str = "") -> list[float] | str:
         """X and y of the position in an element, metres; of a file of odscen's perhaps a node.
+
+        With ``of`` it is where the centre of that actor is when its reference point is there.
 
         Raises
         ------
@@ -205,10 +207,14 @@ class ConditionReader:
         position = self.report.child(kind, "Position")
         if position is None:
             raise RefusedError(kind, f"{kind.tag} without a position")
-        return self.point_or_node(position)
+        ahead = next((one.ahead for one in self.entities.values() if one.id == of), 0.0)
+        return self.point_or_node(position, ahead=ahead)
 
-    def point_or_node(self, position: _Element) -> list[float] | str:
+    def point_or_node(self, position: _Element, *, ahead: float = 0.0) -> list[float] | str:
         """X and y of a position, metres; of a file of odscen's perhaps a node.
+
+        ``ahead`` is from the reference point of who is to be there to its centre, metres; odscen
+        writes places of centres.
 
         Raises
         ------
@@ -216,6 +222,8 @@ class ConditionReader:
             If it cannot be found on the map.
         """
         point = self.positions.point(position)
+        if not self.own:
+            point = point.moved(ahead)
         node = self.positions.name_at(point) if self.own and _headed(position) else None
         return node or [round(point.x, 4), round(point.y, 4)]
 
@@ -271,7 +279,7 @@ def _stopped(read: ConditionReader, kind: _Element, of: str) -> Made:
 
 def _reaches(read: ConditionReader, kind: _Element, of: str) -> Made:
     within = min(max(read.report.number(kind, "tolerance"), 0.01), 1000.0)
-    return {"reaches": {"of": of, "place": read.place(kind), "within": within}}
+    return {"reaches": {"of": of, "place": read.place(kind, of), "within": within}}
 
 
 def _headway(read: ConditionReader, kind: _Element, of: str) -> Made:
@@ -306,7 +314,9 @@ def _relative_distance(read: ConditionReader, kind: _Element, of: str) -> Made:
 
 
 def _distance(read: ConditionReader, kind: _Element, of: str) -> Made:
-    part = {"of": of, "place": read.place(kind), **_measure(read, kind, "euclidianDistance")}
+    centre = "" if kind.get("freespace") == "true" else of
+    place = read.place(kind, centre)
+    part = {"of": of, "place": place, **_measure(read, kind, "euclidianDistance")}
     if kind.get("alongRoute") == "true":
         part["along"] = "lane"
     return read.bounded(kind, "distance", part)

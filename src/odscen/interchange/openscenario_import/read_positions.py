@@ -27,6 +27,7 @@ _EXACT = 1e-5
 """Metres and radians that the rounding of a file makes."""
 
 
+_IN_ROUTE: Final = ("FromLaneCoordinates", "FromRoadCoordinates", "FromCurrentEntity")
 _STRAIGHT: Final = 1e-4
 """Radians between the headings of a lane that counts as straight."""
 
@@ -342,13 +343,22 @@ class PositionReader:
         return self.on_trajectory(self, kind)
 
     def _route(self, kind: _Element) -> MapPoint:
-        inside = next(kind.iter("FromLaneCoordinates"), None)
+        inside = next(kind.iter(*_IN_ROUTE), None)
         places = kind.findall(".//Waypoint/Position")
+        if inside is not None and inside.tag == "FromCurrentEntity":
+            self.report.mark(inside, "approximated", "where that entity starts")
+            return self.of_entity(inside)
         if inside is None or not places:
-            raise RefusedError(kind, "a place on a route that is not by lanes")
+            raise RefusedError(kind, "a place on a route without the route, or without a place")
         for one in kind.iter("*"):
             self.report.mark(one, "approximated", "taken along the lane of the first waypoint")
         base = self.point(places[0])
         node = self.node_near(base) if base.node is None else base.node
         metres = self.report.number(inside, "pathS")
-        return self._at(self.along(node, metres))
+        there = self.along(node, metres)
+        if inside.tag == "FromLaneCoordinates":
+            return self._at(there)
+        lanes = self.graph.lanes
+        key = lanes.lanes.keys[int(lanes.lane[there])]
+        t = self.side * self.report.number(inside, "t", 0.0)
+        return self._on_road(kind, key.road, float(lanes.s[there]), t)

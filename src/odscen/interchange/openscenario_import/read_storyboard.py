@@ -327,7 +327,7 @@ class StoryReader:
     def at_once(self, actor: str, then: list[Made]) -> None:
         """Add what an actor does from the start, or as soon as it has appeared."""
         first, rest = then[:1], then[1:]
-        if rest and "appear" in first[0]:
+        if rest and ("appear" in first[0] or "replay" in first[0]):
             groups = [[*first, *(rest if len(rest) == 1 else [{"together": rest}])]]
         else:
             groups = [[one] for one in then]

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 _STEP: Final = 1.0
 """Metres between the points of a curve at most."""
 _MOST: Final = 5000
+_SAME: Final = 1e-6
 _BEYOND: Final = 0.5
 """Metres by which a place may be before or behind a trajectory without a word."""
 
@@ -107,11 +108,25 @@ def _from(points: list[TrajectoryPoint], metres: float) -> list[TrajectoryPoint]
 def _polyline(
     report: ImportReport, positions: PositionReader, shape: _Element
 ) -> list[TrajectoryPoint]:
-    found = []
+    found: list[TrajectoryPoint] = []
+    turned: list[bool] = []
     for vertex in report.children(shape, "Vertex"):
-        at = positions.point(_position(report, vertex, "Position"))
+        place = _position(report, vertex, "Position")
+        at = positions.point(place)
+        turned.append(place.find("*/Orientation") is not None or place.find("*[@h]") is not None)
         found.append(TrajectoryPoint(report.number(vertex, "time", 0.0), at))
-    return found
+    return [
+        one if own else one._replace(at=one.at._replace(hdg=_direction(found, row)))
+        for row, (one, own) in enumerate(zip(found, turned, strict=True))
+    ]
+
+
+def _direction(points: list[TrajectoryPoint], row: int) -> float:
+    """Direction in which a line leads through one of its points."""
+    before, after = points[max(row - 1, 0)].at, points[min(row + 1, len(points) - 1)].at
+    if before.away(after) < _SAME:
+        return float(points[row].at.hdg)
+    return math.atan2(after.y - before.y, after.x - before.x)
 
 
 def _clothoid(

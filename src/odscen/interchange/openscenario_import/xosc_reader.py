@@ -22,7 +22,6 @@ from odscen.interchange.openscenario_import.read_positions import MapPoint, Posi
 from odscen.interchange.openscenario_import.read_signals import SignalReader
 from odscen.interchange.openscenario_import.read_storyboard import StoryReader
 from odscen.interchange.openscenario_import.read_trajectories import trajectory_place
-from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.interchange.openscenario_import.value_changes import first_values
 from odscen.lanegraph.query import largest_part
 from odscen.scenario.document.scenario_document import Scenario
@@ -346,14 +345,7 @@ class _Init:
             then = [one for one in then if "goal" not in one]
             if not speeds:
                 then.append({"speed": {"to": 0.0, "shape": "step"}})
-            if left:
-                made["lateral_offset"] = 0.0
-                then.insert(0, {"offset": {"to": round(left, 3), "over": 0.1}})
-            if isinstance(centre.x, TracedNumber) or isinstance(centre.y, TracedNumber):
-                lanes = self._source.graph.lanes
-                hdg = float(lanes.hdg[self._positions.node_near(centre)])
-                at = [centre.x, centre.y, hdg]  # SUMO turns vehicles along their lanes
-                then = [{"appear": {"at": at, "speed": speed}}, *then]
+            then = self._places.at_first(centre, left, then, made)
         if entity.ego:
             made["ego"] = True
         if speed > 0:

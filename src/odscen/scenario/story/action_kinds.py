@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
-from odscen.scenario.story.arrivals import arrive, synchronise
+from odscen.scenario.story.arrivals import arrive, end_of_arrival, synchronise
 from odscen.scenario.story.asked_actions import (
     Wanted,
     ask_to_appear,
@@ -301,7 +301,7 @@ ACTIONS = {
             "arrive", "be `at` a place at the instant at which `to` is `when_at` another; the "
             "speed is settled once that of `to` is steady", "",
             "`setSpeed` or `person.moveToXY`", "SynchronizeAction", _MIRRORED, arrive,
-            synchronise, _stand,
+            synchronise, end_of_arrival,
         ),
         ActionKind(
             "appear", "be on the road from now on, where it is placed or `at` x, y and heading of "
