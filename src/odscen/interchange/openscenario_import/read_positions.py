@@ -160,7 +160,11 @@ class PositionReader:
 
     def beside_lane(self, point: MapPoint) -> float:
         """Metres that a point is to the left of the lane nearest to it."""
-        lanes, node = self.graph.lanes, self.node_near(point)
+        return self.left_of(self.node_near(point), point)
+
+    def left_of(self, node: int, point: MapPoint) -> float:
+        """Metres that a point is to the left of the lane of a node."""
+        lanes = self.graph.lanes
         dx, dy = point.x - float(lanes.x[node]), point.y - float(lanes.y[node])
         hdg = float(lanes.hdg[node])
         return dy * math.cos(hdg) - dx * math.sin(hdg)

@@ -43,6 +43,7 @@ from odscen.scenario.story.side_actions import (
     cut_in,
     cut_in_further,
     lane_lasts,
+    leave_aside,
     leave_line,
     move_aside,
 )
@@ -266,7 +267,7 @@ ACTIONS = {
         ActionKind(
             "offset", "move the front to `to` metres left of the lane's centre, `over` so many "
             "seconds on a half-cosine", "m, s", "`moveToXY`", "LaneOffsetAction", _MIRRORED,
-            move_aside, lane_lasts, leave_line, vehicles_only=True,
+            move_aside, lane_lasts, leave_aside, vehicles_only=True,
         ),
         ActionKind(
             "keep_gap", "follow `to`, or drive `ahead` of it, at a free gap of `metres`, or of "
