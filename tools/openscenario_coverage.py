@@ -60,7 +60,7 @@ REMARKS: Final = {
     "TrafficSignalController": ("ignored", "lights have the program of the map"),
     "Phase": ("ignored", "but for its first green, where it is named"),
     "TrafficSignalState": ("ignored", "but for its first green, where it is named"),
-    "TrafficSignalStateAction": ("approximated", "green and off; the program goes on from there"),
+    "TrafficSignalStateAction": ("approximated", "green and off; the program resumes from there"),
     "TrafficSignalControllerAction": ("approximated", "to the first green of the phase"),
     "TrafficSignalControllerCondition": ("approximated", "while the first green of the phase is"),
     "VariableAction": ("approximated", "in conditions, as the trigger of its event"),

@@ -76,7 +76,7 @@ class SignalReader:
             return {"signal": {"light": light, "shows": "off"}}
         if state != "green":
             raise RefusedError(kind, f"a signal that is set to {state!r}: rules give green only")
-        words = f"the program of {light!r} jumps to where {movement!r} has green, and goes on"
+        words = f"the program of {light!r} jumps to where {movement!r} has green, and resumes"
         self.report.mark(kind, "approximated", words)
         return {"signal": {"light": light, "shows": "green", "movement": movement}}
 

@@ -109,6 +109,8 @@ class StoryReader:
         ------
         RefusedError
             If it is of a state or an element that rules do not have.
+        LaterError
+            If that element is none that has been read so far.
         """
         state, name = kind.get("state", ""), kind.get("storyboardElementRef", "")
         has = {
