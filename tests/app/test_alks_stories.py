@@ -208,3 +208,18 @@ def test_a_target_is_in_range_ahead_of_the_ego(folder: Path) -> None:
     motions = story(folder, "4_6_1_forward_detection_range")
     assert motions["TargetBlocking"].x[0] - motions["Ego"].x[0] > 400
     assert motions["TargetBlocking"].y[0] == pytest.approx(LANE - 5.25, abs=0.05)
+
+
+def test_a_motorcycle_beside_all_lanes_comes_into_the_lane_of_the_ego(folder: Path) -> None:
+    motions = story(folder, "4_6_2_lateral_detection_range", until=28)
+    side, ego = motions["SideVehicle"], motions["Ego"]
+    settled = side.time > 0.25
+    assert np.abs(side.x - ego.x)[settled].max() < 2.5  # abreast, by up to a space between nodes
+    first, last = side.at(9.9)[1], side.at(28.0)[1]
+    assert first - LANE == pytest.approx(-7.0, abs=0.05)
+    assert last - LANE == pytest.approx(-1.75, abs=0.05)
+    moving = side.time[settled & (np.abs(np.gradient(side.y, side.time)) > 0.01)]
+    # 5.25 m on a half-cosine with 0.1 m/s^2 at most: pi sqrt(5.25 / 0.2) s
+    assert moving[0] == pytest.approx(10.0, abs=0.4)
+    assert moving[-1] - moving[0] == pytest.approx(np.pi * np.sqrt(5.25 / 0.2), abs=0.6)
+    assert ego.speed == pytest.approx(np.full(len(ego.speed), SPEED), abs=0.01)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from odscen.app.template_scenarios import template_scenario
 from odscen.changes.acting_differences import acting_differences
 from odscen.interchange.openscenario.dialect import VERSIONS
 from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.document.scenario_document import Environment
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from tests.sumo.story_case import document, entry, node_at, workspace
 
@@ -111,7 +113,29 @@ def test_sampled_scenarios_come_back_but_for_what_the_export_lists(tmp_path: Pat
         assert len(after.actors) == len(before.actors) > 3
         assert not after.rules
         places = {one.place[0] for one in acting_differences(before, after)}
-        assert places <= {"seed", "roi", "environment"}
+        assert places <= {"seed", "roi"}
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.3"])
+def test_weather_and_time_come_back_unless_the_file_is_changed(
+    version: str, tmp_path: Path
+) -> None:
+    entry("motorway_weave")
+    scene = template_scenario(workspace(), "cut-in", "motorway_weave")
+    sky = Environment(preset="MidRainSunset", parameters={"fog_density": 40.0})
+    demand = scene.demand.model_copy(update={"clock": 6.5 * 3600})
+    before = scene.model_copy(update={"environment": sky, "demand": demand})
+    after, _ = there_and_back(before, tmp_path, version)
+    assert (after.environment, after.demand.clock) == (sky, 6.5 * 3600)
+    (file,) = tmp_path.glob("*.xosc")
+    text = file.read_text()
+    sight = re.search(r'visualRange="([0-9.]+)"', text)
+    assert sight is not None
+    file.write_text(text.replace(sight[0], 'visualRange="500"'))
+    changed = import_scenario(workspace(), file).scenario.environment
+    assert changed.preset == "ClearNoon"
+    # 10 km (50 m / 10 km)^d = 500 m
+    assert changed.parameters["fog_density"] == pytest.approx(56.542, abs=0.01)
 
 
 def test_who_departs_later_and_what_begins_with_another_rule_come_back(tmp_path: Path) -> None:

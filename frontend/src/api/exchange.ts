@@ -27,4 +27,6 @@ export const exchange = {
     call("get", "/api/scenarios/{name}/export/notes", { path: { name }, query: { to, version } }),
   exportUrl: (name: string, to: string, version: string | null) =>
     address("/api/scenarios/{name}/export", { path: { name }, query: { to, version } }),
+  runUrl: (run: string, to: string, version: string) =>
+    address("/api/runs/{run}/export", { path: { run }, query: { to, version } }),
 };

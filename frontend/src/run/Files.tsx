@@ -1,7 +1,9 @@
-import { Alert, Anchor, Loader, Text } from "@mantine/core";
+import { Alert, Anchor, Button, Group, Loader, Select, Text } from "@mantine/core";
 import { useCallback, useState } from "react";
 
+import { exchange } from "../api/exchange";
 import { runs } from "../api/runs";
+import { VERSIONS } from "../exchange/formats";
 import { useLoaded } from "../ui/useLoaded";
 import { bytes } from "../ui/words";
 import { fileGroups } from "./files";
@@ -30,7 +32,51 @@ function Listed({ run }: { run: string }) {
       </Alert>
     );
   if (!value) return <Loader aria-label="Loading the list of files" />;
-  return fileGroups(value).map(({ title, text, files }) => (
+  const recorded = value.some(({ name }) => name === "trajectories.parquet");
+  return (
+    <>
+      {recorded && <AsRun run={run} />}
+      <Groups run={run} files={value} />
+    </>
+  );
+}
+
+/** What happened, for players of OpenSCENARIO. */
+function AsRun({ run }: { run: string }) {
+  const [version, setVersion] = useState("1.2");
+  return (
+    <div>
+      <Text fw={600} size="sm" mt="sm">
+        OpenSCENARIO, as it happened
+      </Text>
+      <Text size="xs" c="dimmed" mb={6}>
+        Each road user follows the trajectory that it had, and signals change as they did; nothing reacts.
+      </Text>
+      <Group gap="sm" align="end">
+        <Select
+          size="xs"
+          label="Version"
+          data={VERSIONS}
+          value={version}
+          allowDeselect={false}
+          onChange={(chosen) => setVersion(chosen ?? version)}
+        />
+        <Button
+          size="xs"
+          component="a"
+          variant="default"
+          href={exchange.runUrl(run, "openscenario", version)}
+          download
+        >
+          Download (ZIP)
+        </Button>
+      </Group>
+    </div>
+  );
+}
+
+function Groups({ run, files: all }: { run: string; files: Parameters<typeof fileGroups>[0] }) {
+  return fileGroups(all).map(({ title, text, files }) => (
     <div key={title}>
       <Text fw={600} size="sm" mt="sm">
         {title}

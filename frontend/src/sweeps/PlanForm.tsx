@@ -113,14 +113,23 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           value={form.seed ?? ""}
           onChange={(next) => set({ seed: typeof next === "number" ? next : null })}
         />
-        <NumberInput
+        <Bound
           label="Least time to collision of a safe case"
-          placeholder="no collision is enough"
           suffix=" s"
-          min={0}
-          step={0.1}
-          value={form.ttc ?? ""}
-          onChange={(next) => set({ ttc: typeof next === "number" ? next : null })}
+          value={form.ttc}
+          onValue={(ttc) => set({ ttc })}
+        />
+        <Bound
+          label="Least post-encroachment time"
+          suffix=" s"
+          value={form.pet}
+          onValue={(pet) => set({ pet })}
+        />
+        <Bound
+          label="Most braking needed"
+          suffix=" m/s²"
+          value={form.drac}
+          onValue={(drac) => set({ drac })}
         />
         <Whole
           label="Runs at a time"
@@ -136,6 +145,13 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           data={(figures ?? []).map(({ name }) => name)}
           value={[...form.figures]}
           onChange={(names) => set({ figures: names })}
+        />
+        <TagsInput
+          className="plan-wide"
+          label="More limits of a safe case, of any column"
+          placeholder="for example mean_speed >= 8"
+          value={[...form.limits]}
+          onChange={(limits) => set({ limits })}
         />
       </div>
       {fault ? (
@@ -190,6 +206,31 @@ export function costOf(planned: PlannedSweep): string {
   const one = `One of them, ${tried}, was tried and took ${case_seconds.toFixed(1)} s`;
   const together = processes === 1 ? "one after another" : `${processes} at a time`;
   return `${count(cases, "case")}. ${one}: about ${lasting(seconds)} for all, ${together}, and ${room}.`;
+}
+
+/** A limit of a safe case; without a number there is none. */
+function Bound({
+  label,
+  suffix,
+  value,
+  onValue,
+}: {
+  label: string;
+  suffix: string;
+  value: number | null;
+  onValue: (value: number | null) => void;
+}) {
+  return (
+    <NumberInput
+      label={label}
+      placeholder="no limit"
+      suffix={suffix}
+      min={0}
+      step={0.1}
+      value={value ?? ""}
+      onChange={(next) => onValue(typeof next === "number" ? next : null)}
+    />
+  );
 }
 
 function Whole({

@@ -1,20 +1,14 @@
 import { Group, Select } from "@mantine/core";
 import { useId, useState } from "react";
 
-import type { SweepCase, SweepCases } from "../api/sweeps";
+import type { SweepCases } from "../api/sweeps";
 import { shortNumber } from "../editor/parameters";
-import { marksOf, type Verdict, VERDICT_WORD, verdictOf } from "./plan";
+import { axesOf, scaleOf, titleOf, type Verdict, VERDICT_WORD, verdictOf } from "./plan";
 
 const W = 760;
 const H = 420;
 const BOX = { left: 62, right: W - 16, top: 16, bottom: H - 48 };
 const ORDER: readonly Verdict[] = ["other", "calm", "safe", "unsafe"];
-
-interface Axis {
-  name: string;
-  label: string;
-  of: (one: SweepCase) => number | null;
-}
 
 /** Cases in the plane of two parameters, and the boundary between those that are safe and not. */
 export function Plane({ table, onOpen }: { table: SweepCases; onOpen: (name: string) => void }) {
@@ -127,34 +121,4 @@ export function Plane({ table, onOpen }: { table: SweepCases; onOpen: (name: str
       </div>
     </figure>
   );
-}
-
-/** Parameters, and after them the least time to collision. */
-function axesOf({ parameters, columns }: SweepCases): Axis[] {
-  const found: Axis[] = parameters.map(({ name, unit }, n) => ({
-    name,
-    label: unit ? `${name}, ${unit}` : name,
-    of: ({ values }) => values[n] ?? null,
-  }));
-  const ttc = columns.findIndex(({ name }) => name === "min_ttc");
-  const last: Axis = { name: "min_ttc", label: "min_ttc, s", of: ({ measures }) => measures[ttc] ?? null };
-  return ttc < 0 ? found : [...found, last];
-}
-
-/** Where values lie, with a little room around, and round numbers between. */
-function scaleOf(values: readonly number[], from: number, to: number): [(v: number) => number, number[]] {
-  const [low, high] = [Math.min(...values), Math.max(...values)];
-  const room = (high - low) * 0.05 || Math.abs(low) * 0.05 || 1;
-  const [a, b] = [low - room, high + room];
-  const at = (v: number): number => Number((from + ((to - from) * (v - a)) / (b - a)).toFixed(2));
-  return [at, marksOf(a, b)];
-}
-
-function titleOf(one: SweepCase, { parameters }: SweepCases, verdict: Verdict): string {
-  const values = parameters.map(({ name, unit }, n) =>
-    `${name} ${shortNumber(one.values[n] ?? 0)} ${unit}`.trim(),
-  );
-  const word =
-    verdict === "other" ? [one.status, one.detail].filter(Boolean).join(": ") : VERDICT_WORD[verdict];
-  return `${one.case}: ${values.join(", ")}: ${word}`;
 }

@@ -6,6 +6,7 @@ import { go, hashOf } from "../ui/address";
 import { tell, tellError } from "../ui/notices";
 import { count } from "../ui/words";
 import { CaseTable } from "./CaseTable";
+import { Parallel } from "./Parallel";
 import { lasting } from "./plan";
 import { Plane } from "./Plane";
 import { useSweep } from "./useSweep";
@@ -45,6 +46,7 @@ export function SweepView({ scenario, sweep }: { scenario: string; sweep: string
       {cases && (
         <>
           <Plane table={cases} onOpen={open} />
+          <Parallel table={cases} onOpen={open} />
           <Title order={2} size="h4" mt="lg" mb="xs">
             Cases
           </Title>
@@ -107,7 +109,7 @@ function Head({ scenario, info, onChanged }: { scenario: string; info: SweepInfo
         {state === "done" && (
           <>
             <Anchor href={sweeps.fileUrl(sweep, "sweep.html")} target="_blank" rel="noreferrer">
-              Whole page, with parallel coordinates
+              Whole page, to keep
             </Anchor>
             <Anchor href={sweeps.fileUrl(sweep, "cases.parquet")}>Table as Parquet</Anchor>
           </>

@@ -1,5 +1,6 @@
 import type { SweepCase, SweepCases, SweepWish, VaryWish } from "../api/sweeps";
 import type { ScenarioDocument } from "../api/types";
+import { shortNumber } from "../editor/parameters";
 
 type Method = SweepWish["method"] & string;
 
@@ -23,6 +24,11 @@ export interface SweepForm {
   seed: number | null;
   /** Least time to collision of a safe case, seconds; null asks for no collision only. */
   ttc: number | null;
+  /** Least post-encroachment time, seconds, and most braking needed, m/s². */
+  pet: number | null;
+  drac: number | null;
+  /** Limits of other columns: "mean_speed >= 5". */
+  limits: readonly string[];
   figures: readonly string[];
   processes: number;
 }
@@ -60,6 +66,9 @@ export function newForm({
     sampleSeed: 0,
     seed: null,
     ttc: 1,
+    pet: null,
+    drac: null,
+    limits: [],
     figures: [],
     processes: 2,
   };
@@ -72,8 +81,12 @@ export function setOf(text: string): number[] | null {
   return found.length > 0 && found.every(Number.isFinite) ? found : null;
 }
 
+const LIMIT = /^\s*[A-Za-z_]\w*\s*(>=|<=|>|<)\s*[+-]?\d+(\.\d+)?([eE][+-]?\d+)?\s*$/;
+
 /** What is wrong with a form, or null. */
-export function faultOf({ varied }: SweepForm): string | null {
+export function faultOf({ varied, limits }: SweepForm): string | null {
+  const odd = limits.find((one) => !LIMIT.test(one));
+  if (odd !== undefined) return `${odd}: write a column, >=, <=, > or <, and a number.`;
   const chosen = Object.entries(varied).filter(([, { how }]) => how !== "fixed");
   if (chosen.length === 0) return "Vary at least one parameter.";
   for (const [name, { how, low, high, values }] of chosen) {
@@ -105,11 +118,20 @@ export function wishOf(scenario: string, form: SweepForm): SweepWish {
     vary,
     method: form.method,
     ...(!grid && { samples: form.samples, sample_seed: form.sampleSeed }),
-    safe: form.ttc === null ? [] : [`min_ttc >= ${form.ttc}`],
+    safe: limitsOf(form),
     figures: [...form.figures],
     seed: form.seed,
     processes: form.processes,
   };
+}
+
+function limitsOf({ ttc, pet, drac, limits }: SweepForm): string[] {
+  return [
+    ...(ttc === null ? [] : [`min_ttc >= ${ttc}`]),
+    ...(pet === null ? [] : [`min_pet >= ${pet}`]),
+    ...(drac === null ? [] : [`max_drac <= ${drac}`]),
+    ...limits,
+  ];
 }
 
 /** How a case went, as its dot and its row are coloured. */
@@ -165,4 +187,51 @@ export function lasting(seconds: number): string {
   if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;
   if (seconds < 5400) return `${Math.round(seconds / 60)} min`;
   return `${(seconds / 3600).toFixed(1)} h`;
+}
+
+/** Something of cases that has a number, on an axis. */
+export interface Axis {
+  name: string;
+  label: string;
+  of: (one: SweepCase) => number | null;
+}
+
+/** Parameters, and after them the columns that some case has. */
+export function axesOf({ parameters, columns, cases }: SweepCases): Axis[] {
+  const label = ({ name, unit }: { name: string; unit: string }): string =>
+    unit ? `${name}, ${unit}` : name;
+  const found: Axis[] = parameters.map((one, n) => ({
+    name: one.name,
+    label: label(one),
+    of: ({ values }) => values[n] ?? null,
+  }));
+  const more = columns.map((one, n): Axis => ({
+    name: one.name,
+    label: label(one),
+    of: ({ measures }) => measures[n] ?? null,
+  }));
+  return [...found, ...more.filter((axis) => cases.some((one) => axis.of(one) !== null))];
+}
+
+/** Where values lie, with a little room around, and round numbers between. */
+export function scaleOf(
+  values: readonly number[],
+  from: number,
+  to: number,
+): [(v: number) => number, number[]] {
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const room = (high - low) * 0.05 || Math.abs(low) * 0.05 || 1;
+  const [a, b] = [low - room, high + room];
+  const at = (v: number): number => Number((from + ((to - from) * (v - a)) / (b - a)).toFixed(2));
+  return [at, marksOf(a, b)];
+}
+
+/** A case in words: its values and how it went. */
+export function titleOf(one: SweepCase, { parameters }: SweepCases, verdict: Verdict): string {
+  const values = parameters.map(({ name, unit }, n) =>
+    `${name} ${shortNumber(one.values[n] ?? 0)} ${unit}`.trim(),
+  );
+  const word =
+    verdict === "other" ? [one.status, one.detail].filter(Boolean).join(": ") : VERDICT_WORD[verdict];
+  return `${one.case}: ${values.join(", ")}: ${word}`;
 }

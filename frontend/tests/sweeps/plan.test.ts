@@ -49,6 +49,15 @@ test("parameters with bounds of their own are varied between them, computed ones
   expect(faultOf(form())).toBeNull();
 });
 
+test("limits of a safe case are those of the form, and odd ones are told", () => {
+  const limited = { ...form(), ttc: null, pet: 1.5, drac: 3, limits: ["mean_speed >= 8"] };
+  expect(wishOf("s", limited).safe).toEqual(["min_pet >= 1.5", "max_drac <= 3", "mean_speed >= 8"]);
+  expect(faultOf(limited)).toBeNull();
+  expect(faultOf({ ...limited, limits: ["fast"] })).toBe(
+    "fast: write a column, >=, <=, > or <, and a number.",
+  );
+});
+
 test("a grid has all combinations, samples as many as are asked for", () => {
   const both = { ...form().varied, ...varied({ how: "set", values: "10, 12.5; 20" }, "speed").varied };
   expect(countOf({ ...form(), varied: both })).toBe(15);

@@ -6,6 +6,7 @@ import type { SweepCase, SweepCases, SweepInfo } from "../../src/api/sweeps";
 import type { ScenarioDocument } from "../../src/api/types";
 import { CaseTable } from "../../src/sweeps/CaseTable";
 import { costOf, PlanForm } from "../../src/sweeps/PlanForm";
+import { Parallel } from "../../src/sweeps/Parallel";
 import { Plane } from "../../src/sweeps/Plane";
 import { SweepView } from "../../src/sweeps/SweepView";
 import { actor, scenario } from "../example";
@@ -107,6 +108,25 @@ test("the plane has a dot for each case and the boundary; a click on a dot opens
   ]);
   expect(document.querySelectorAll(".plane-boundary")).toHaveLength(1);
   for (const dot of dots) await user.click(dot);
+  expect(onOpen.mock.calls.flat().sort()).toEqual(["case-001", "case-002", "case-003"]);
+});
+
+test("each case is a line across its parameters and measures; a click on it opens the case", async () => {
+  const onOpen = vi.fn();
+  const { user } = show(<Parallel table={table} onOpen={onOpen} />);
+  const lines = [...document.querySelectorAll<SVGPathElement>(".parallel-line")];
+  const parts = lines.map((line) => [
+    line.dataset["case"],
+    (line.getAttribute("d") ?? "").split(/[ML]/).length - 1,
+  ]);
+  // gap, speed and min_ttc; no case has a min_pet
+  expect(parts.sort()).toEqual([
+    ["case-001", 3],
+    ["case-002", 2],
+    ["case-003", 3],
+    ["case-004", 2],
+  ]);
+  for (const line of lines) await user.click(line);
   expect(onOpen.mock.calls.flat().sort()).toEqual(["case-001", "case-002", "case-003"]);
 });
 

@@ -6,8 +6,7 @@ import json
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
+from odscen.app.exchange.road_points import RoadPoints
 from odscen.app.exchange.xosc_files import FolderFiles
 from odscen.app.maps import load_map
 from odscen.app.scenarios import check_scenario, write_scenario
@@ -18,8 +17,6 @@ from odscen.interchange.openscenario_import.import_report import ImportReport
 from odscen.interchange.openscenario_import.read_distributions import read_distribution
 from odscen.interchange.openscenario_import.resolved_tree import TreeResolver
 from odscen.interchange.openscenario_import.xosc_reader import XoscSource, read_openscenario
-from odscen.opendrive.geometry import PlanView
-from odscen.opendrive.parse import parse
 from odscen.workspace.store import name_from_file
 
 if TYPE_CHECKING:
@@ -34,7 +31,6 @@ if TYPE_CHECKING:
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
-    from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.store import Workspace
 
 
@@ -120,9 +116,11 @@ def read_files(
     told = _told(files)
     entry = told.files.map(workspace, told.map_named())
     loaded = load_map(entry).sumo
+    roads = RoadPoints(entry)
     source = XoscSource(
         told.root, told.values, told.report, loaded.graph, entry.name, entry.sha256,
-        _road_points(entry), partial(movement_of, loaded), told.parameters, told.varied is not None,
+        roads.point, roads.lane_t, partial(movement_of, loaded), workspace.assets().weather,
+        told.parameters, told.varied is not None,
     )  # fmt: skip
     scenario = read_openscenario(source, name=name, ego=ego)
     plan = None
@@ -209,23 +207,3 @@ def _catalogs(files: XoscFiles) -> Callable[[tuple[str, ...], str], tuple[_Eleme
         return known.get(name)
 
     return find
-
-
-def _road_points(
-    entry: MapEntry,
-) -> Callable[[str, float, float], tuple[float, float, float] | None]:
-    loaded: list[tuple[dict[str, int], PlanView]] = []
-
-    def at(road: str, s: float, t: float) -> tuple[float, float, float] | None:
-        if not loaded:
-            roads = list(parse(entry.read("xodr")).roads.values())
-            rows = {str(one.id): row for row, one in enumerate(roads)}
-            loaded.append((rows, PlanView.of([one.geometry for one in roads])))
-        rows, plan = loaded[0]
-        if road not in rows:
-            return None
-        found = plan.at(np.array([rows[road]]), np.array([s]))
-        x, y, hdg = float(found.x[0]), float(found.y[0]), float(found.hdg[0])
-        return x - t * float(np.sin(hdg)), y + t * float(np.cos(hdg)), hdg
-
-    return at

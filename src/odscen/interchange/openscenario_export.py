@@ -75,9 +75,10 @@ def files_as_run(source: ExportSource) -> ExportFiles:
 
 
 def _weather(source: ExportSource, dialect: Dialect) -> _Element:
-    from odscen.interchange.openscenario.xosc_weather import environment
+    from odscen.interchange.openscenario.xosc_weather import environment, said_of
 
-    return environment(_parameters(source), source.scenario.demand.clock, dialect)
+    scenario = source.scenario
+    return environment(_parameters(source), scenario.demand.clock, dialect, said_of(scenario))
 
 
 def _files(

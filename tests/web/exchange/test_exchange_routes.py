@@ -21,7 +21,7 @@ from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
 from odscen.workspace.store import Workspace
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
-from tests.web.conftest import CROSSING, job
+from tests.web.conftest import CROSSING, finished, job
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -299,3 +299,21 @@ def test_a_scene_of_esmini_is_imported_with_its_map(client: TestClient) -> None:
     report = report_of(client, (file.name, file.read_bytes()), (road.name, road.read_bytes()))
     assert (report["map"], report["refused"]) == ("e6mini", [])
     assert len(report["taken"]) > 80
+
+
+def test_a_finished_run_is_downloaded_as_it_happened(client: TestClient, sampled: str) -> None:
+    answer = client.post("/api/runs", json={"scenario": sampled, "until": 3})
+    run = str(answer.json()["run"])
+    finished(client, run)
+    wish = {"to": "openscenario", "version": "1.2"}
+    answer = client.get(f"/api/runs/{run}/export", params=wish)
+    assert answer.status_code == 200, answer.text
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        (name,) = (one for one in archive.namelist() if one.endswith(".xosc"))
+        root = etree.fromstring(archive.read(name))
+        assert any(one.endswith(".xodr") for one in archive.namelist())
+    lines = root.findall(".//FollowTrajectoryAction")
+    assert lines
+    assert root.find(".//TimeReference/Timing") is not None
+    assert client.get("/api/runs/none/export", params=wish).status_code == 404
+    assert client.get(f"/api/runs/{run}/export", params={"to": "graphml"}).status_code == 422

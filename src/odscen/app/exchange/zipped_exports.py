@@ -9,10 +9,10 @@ import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.app.export import export
+from odscen.app.export import export, export_run
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
@@ -77,7 +77,25 @@ def exported(
     NotFoundError, InputError, ScenarioError
         As of that function.
     """
+    return _written(lambda out: export(workspace, scenario, out, to=to, options=options, name=name))
+
+
+def exported_run(
+    workspace: Workspace, run: Path, *, to: str, options: Mapping[str, str] | None = None
+) -> ExportedFiles:
+    """Write what happened in a run, see :func:`odscen.app.export.export_run`.
+
+    Raises
+    ------
+    NotFoundError, InputError
+        As of that function.
+    """
+    return _written(lambda out: export_run(workspace, run, out, to=to, options=options))
+
+
+def _written(write: Callable[[Path], Iterable[Path]]) -> ExportedFiles:
     with tempfile.TemporaryDirectory(prefix="odscen-export-") as scratch:
         out = Path(scratch)
-        paths = export(workspace, scenario, out, to=to, options=options, name=name)
-        return ExportedFiles({one.relative_to(out).as_posix(): one.read_bytes() for one in paths})
+        return ExportedFiles(
+            {one.relative_to(out).as_posix(): one.read_bytes() for one in write(out)}
+        )

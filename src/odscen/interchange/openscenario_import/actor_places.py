@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.read_actions import put_there
 from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.query import node_id, walk_node_id
 
@@ -19,6 +20,11 @@ _BESIDE: Final = 10.0
 """Metres that an actor can be beside its lane."""
 _FAR: Final = 100_000.0
 """Metres after which a way straight on counts as long enough."""
+
+
+Made = dict[str, Any]
+_ALONG: Final = math.cos(math.radians(5.0))
+"""Of the angle to its lane at which a vehicle starts along it."""
 
 
 class ActorPlaces:
@@ -69,6 +75,26 @@ class ActorPlaces:
         words = f"on the lane {abs(left):.1f} m beside at first, and there 0.1 s later"
         self._report.mark(entity.element, "approximated", words)
         return left
+
+    def at_first(self, centre: MapPoint, left: float, then: list[Made], made: Made) -> list[Made]:
+        """What a vehicle does from the start on, with what puts it where the file has it.
+
+        SUMO turns vehicles along their lanes, and puts them on one; ``left`` is how far from that
+        the vehicle is, metres.
+        """
+        lanes = self._positions.graph.lanes
+        hdg, speed = float(lanes.hdg[self._positions.node_near(centre)]), made["initial_speed"]
+        then = sorted(then, key=lambda one: "path" in one)  # as fast as the speed is by then
+        across = bool(left) or math.cos(centre.hdg - hdg) < _ALONG
+        if "path" in then[-1] and across:
+            made["lateral_offset"] = 0.0
+            then = [put_there(centre, speed), *then]
+        elif left:
+            made["lateral_offset"] = 0.0
+            then = [{"offset": {"to": round(left, 3), "over": 0.1}}, *then]
+        if isinstance(centre.x, TracedNumber) or isinstance(centre.y, TracedNumber):
+            then = [{"appear": {"at": [centre.x, centre.y, hdg], "speed": speed}}, *then]
+        return then
 
     def vehicle(self, entity: ReadEntity, centre: MapPoint) -> dict[str, Any]:
         """Node nearest to the centre of the body, and the offset from it to the left."""

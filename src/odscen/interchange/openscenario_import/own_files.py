@@ -35,11 +35,11 @@ def own_fields(report: ImportReport, thing: _Element) -> Made | None:
         for one in report.children(group, "Property"):
             name, text = one.get("name", ""), one.get("value", "")
             if name.startswith(PREFIX):
-                found[name.removeprefix(PREFIX)] = _value(text)
+                found[name.removeprefix(PREFIX)] = value_of(text)
     return found if "spawn" in found else None
 
 
-def _value(text: str) -> Any:
+def value_of(text: str) -> Any:
     """Inverse of how the export writes a field: JSON, or the bare text where that is none."""
     try:
         return json.loads(text)

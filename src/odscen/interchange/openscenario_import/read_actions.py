@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from odscen.interchange.openscenario_import.read_conditions import ConditionReader
     from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.read_positions import MapPoint
 
 Made = dict[str, Any]
 _SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}
@@ -39,13 +40,15 @@ IGNORED: Final = frozenset(
 class ActionReader:
     """Reads actions of one entity after another.
 
-    ``speeds`` (m/s) and ``lanes`` (ids) are the last ones that each actor was asked for. ``own``
+    ``speeds`` (m/s), ``lanes`` (ids) and ``offsets`` (m) are the last ones that each actor was
+    asked for. ``own``
     says whether odscen wrote the file: its controllers are what drives without rules.
     """
 
     conditions: ConditionReader
     speeds: dict[str, float] = field(default_factory=dict)
     lanes: dict[str, int] = field(default_factory=dict)
+    offsets: dict[str, float] = field(default_factory=dict)
     own: bool = False
 
     def actions(self, element: _Element, entity: ReadEntity) -> list[Made]:
@@ -185,7 +188,7 @@ def _start_lane(read: ActionReader, element: _Element, actor: str) -> tuple[str,
     return key.road, key.lane, 1 if bool(lanes.lanes.forward[row]) else -1
 
 
-def _offset(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+def _offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report = read.conditions.report
     dynamics = report.child(kind, "LaneOffsetActionDynamics")
     target = report.child(kind, "LaneOffsetTarget")
@@ -198,8 +201,12 @@ def _offset(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
         metres += base
         words = f"counted from {base:.2f} m, the offset at which {to.get('entityRef')!r} starts"
         report.mark(to, "approximated", words)
+    named, start = _beside_at_first(read, entity)
+    metres += named
+    moves = metres - read.offsets.get(entity.id, start)
+    read.offsets[entity.id] = metres
     most = 0.0 if dynamics is None else report.number(dynamics, "maxLateralAcc", 0.0)
-    over = math.pi * math.sqrt(abs(metres) / (2.0 * most)) if most > 0 and metres else _USUAL
+    over = math.pi * math.sqrt(abs(moves) / (2.0 * most)) if most > 0 and moves else _USUAL
     report.mark(kind, "approximated", f"a half-cosine of {over:.2f} s")
     return {"offset": {"to": metres, "over": max(over, 0.1)}}
 
@@ -222,6 +229,24 @@ def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     words = f"{to:.2f} m from its own lane, if the other one stays in the lane in which it starts"
     report.mark(kind, "approximated", words)
     return {"offset": {"to": round(to, 3), "over": _USUAL}}
+
+
+def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, float]:
+    """Metres to the left of its lane at which the lane is that the file names, and itself."""
+    positions = read.conditions.positions
+    starts = [
+        positions.starts[name]
+        for name, one in read.conditions.entities.items()
+        if one.id == entity.id and name in positions.starts
+    ]
+    if not starts:
+        return 0.0, 0.0
+    own, lanes = starts[0].moved(entity.ahead), positions.graph.lanes
+    placed, named = positions.node_near(own), starts[0].node
+    left = float(positions.left_of(placed, own))
+    if named is None or int(lanes.lane[placed]) == int(lanes.lane[named]):
+        return 0.0, left
+    return round(left - float(positions.left_of(named, own)), 3), left
 
 
 def _start_offset(read: ActionReader, element: _Element) -> float:
@@ -287,12 +312,17 @@ def _teleport(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report, positions = read.conditions.report, read.conditions.positions
     with positions.exactly():
         centre = positions.point(report.only(kind)).moved(entity.ahead)
-    after = centre.moved(_JUMP * read.speeds.get(entity.id, 0.0))
+    report.mark(kind, "approximated", f"it is led there for {_JUMP:g} s, and drives on")
+    return put_there(centre, read.speeds.get(entity.id, 0.0))
+
+
+def put_there(centre: MapPoint, speed: float) -> Made:
+    """Recording that puts the centre of an actor at a place, with its heading there."""
+    after = centre.moved(_JUMP * speed)
     rows = [
-        [time, round(at.x, 4), round(at.y, 4), round(at.hdg, 6)]
+        [time, round(float(at.x), 4), round(float(at.y), 4), round(float(at.hdg), 6)]
         for time, at in ((0.0, centre), (_JUMP, after))
     ]
-    report.mark(kind, "approximated", f"it is led there for {_JUMP:g} s, and drives on")
     return {"replay": {"rows": rows}}
 
 
@@ -328,17 +358,20 @@ def _goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
     return {"goal": {"to": str(node_id(positions.graph, node))}}
 
 
-def _arrive(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+def _arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report = read.conditions.report
     name = kind.get("masterEntityRef", "")
     if name not in read.conditions.entities:
         raise RefusedError(kind, f"entity {name!r} is not among the actors")
     found = {}
-    for field_name, tag in (("when_at", "TargetPositionMaster"), ("at", "TargetPosition")):
+    for field_name, tag, who in (
+        ("when_at", "TargetPositionMaster", read.conditions.entities[name]),
+        ("at", "TargetPosition", entity),
+    ):
         place = report.child(kind, tag)
         if place is None:
             raise RefusedError(kind, f"{kind.tag} without {tag}")
-        found[field_name] = read.conditions.point_or_node(place)
+        found[field_name] = read.conditions.point_or_node(place, ahead=who.ahead)
     if kind.find("FinalSpeed") is not None:
         report.mark(kind, "approximated", "the speed on arrival is not settled")
     return {"arrive": {**found, "to": read.conditions.entities[name].id}}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -71,7 +72,8 @@ class AppearanceReader:
 
     def _begin(self, kind: _Element) -> MapPoint:
         self.report.mark(kind, "approximated", "the actor starts on it")
-        return read_trajectory(self.report, self.positions, kind)[0].at
+        first, second, *_ = (one.at for one in read_trajectory(self.report, self.positions, kind))
+        return first._replace(hdg=math.atan2(second.y - first.y, second.x - first.x))
 
     @staticmethod
     def _puts(position: _Element) -> str | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.interchange.openscenario_import.import_report import RefusedError
 from odscen.interchange.openscenario_import.own_files import without_repeats
+from odscen.interchange.openscenario_import.read_environment import clock_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -15,13 +16,16 @@ if TYPE_CHECKING:
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
     from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.read_environment import ReadEnvironment
     from odscen.interchange.openscenario_import.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.read_signals import SignalReader
 
 Made = dict[str, Any]
 ALWAYS: Final[Made] = {"time": {"after": 0.0}}
 NEVER: Final[Made] = {"not": ALWAYS}
 _CLOSE: Final = 0.1
 """What counts as equal, in the unit of the value."""
+_TRUTH: Final = {"true": "1", "false": "0"}
 _ROAD_END: Final = 10.0
 _FAR: Final = 100_000.0
 """Metres."""
@@ -43,8 +47,13 @@ class ConditionReader:
         Parameters and variables of the file, as declared.
     state
         Condition that an element of the storyboard has reached a state.
-    movement
-        Light and movement of a signal of the map.
+    signals
+        Reads what is about signals.
+    changes
+        What sets a parameter or variable in the story: its value then, and the condition that this
+        has happened.
+    environment
+        Time of day at the start.
     own
         Whether odscen wrote the file.
     """
@@ -54,7 +63,9 @@ class ConditionReader:
     entities: Mapping[str, ReadEntity]
     values: Mapping[str, str]
     state: Callable[[_Element], Made]
-    movement: Callable[[str], tuple[str, str] | None]
+    signals: SignalReader
+    changes: Callable[[_Element, str], list[tuple[str, Made]]]
+    environment: ReadEnvironment
     own: bool = False
 
     def trigger(self, trigger: _Element | None) -> Made:
@@ -101,43 +112,47 @@ class ConditionReader:
             return {"not": after} if kind.get("rule", "").startswith("less") else after
         if kind.tag == "StoryboardElementStateCondition":
             return self.state(kind)
-        if kind.tag == "TrafficSignalCondition":
-            return self._signal(kind)
+        if kind.tag in ("TrafficSignalCondition", "TrafficSignalControllerCondition"):
+            return self.signals.condition(kind)
         if kind.tag in ("ParameterCondition", "VariableCondition"):
-            self.report.mark(kind, "approximated", "held against the declared value, once")
-            return ALWAYS if self._holds(kind) else NEVER
+            return self._value(kind)
+        if kind.tag == "TimeOfDayCondition":
+            return self._time_of_day(kind)
         raise RefusedError(kind, f"odscen has no {kind.tag}")
 
-    def _signal(self, kind: _Element) -> Made:
-        name, state = self.report.word(kind, "name"), kind.get("state", "").lower()
-        found = self.movement(name)
-        if found is None:
-            raise RefusedError(kind, f"signal {name!r} is over no movement of a light of the map")
-        if state not in ("red", "yellow", "green"):
-            raise RefusedError(kind, f"the state {state!r} of a signal")
-        light, movement = found
-        return {"signal": {"light": light, "movement": movement, "shows": state}}
+    def _time_of_day(self, kind: _Element) -> Made:
+        start = self.environment
+        if start.clock is None:
+            raise RefusedError(kind, "a time of day, of which the file has none at first")
+        clock, day = clock_of(self.report, kind)
+        seconds = (day - start.day) * 86_400.0 + clock - start.clock
+        if not start.runs:
+            seconds = 0.0 if seconds <= 0 else 1e6
+        before = kind.get("rule", "").startswith("less")
+        if seconds <= 0 or seconds > 1e5:
+            return NEVER if before == (seconds <= 0) else ALWAYS
+        after: Made = {"time": {"after": seconds}}
+        return {"not": after} if before else after
 
-    def _holds(self, kind: _Element) -> bool:
-        name = kind.get("parameterRef") or kind.get("variableRef") or ""
-        have, want, rule = (
-            self.values.get(name.lstrip("$")),
-            kind.get("value", ""),
-            kind.get("rule"),
-        )
+    def _value(self, kind: _Element) -> Made:
+        """Whether a value is as it should be: at first, and after what sets it in the story."""
+        name = (kind.get("parameterRef") or kind.get("variableRef") or "").lstrip("$")
+        have = self.values.get(name)
         if have is None:
             raise RefusedError(kind, f"{name!r} is not declared")
-        try:
-            one, other = float(have), float(want)
-        except ValueError:
-            return (have == want) == (rule != "notEqualTo")
-        return {
-            "greaterThan": one > other,
-            "greaterOrEqual": one >= other,
-            "lessThan": one < other,
-            "lessOrEqual": one <= other,
-            "notEqualTo": one != other,
-        }.get(str(rule), one == other)
+        first, changes = _holds(kind, have), self.changes(kind, name)
+        if not changes:
+            self.report.mark(kind, "approximated", "held against the declared value, once")
+            return ALWAYS if first else NEVER
+        words = f"from when an event sets {name!r}, as far as its trigger still holds"
+        self.report.mark(kind, "approximated", words)
+        sets = [when for value, when in changes if _holds(kind, value)]
+        if not first:
+            return joined("any", sets) if sets else NEVER
+        unsets = [when for value, when in changes if not _holds(kind, value)]
+        if not unsets:
+            return ALWAYS
+        return joined("any", [{"not": joined("any", unsets)}, *sets])
 
     def _by_entity(self, element: _Element) -> Made:
         who = self.report.child(element, "TriggeringEntities")
@@ -179,8 +194,10 @@ class ConditionReader:
         ]
         return {"not": {"all": near}} if rule == "notEqualTo" else {"all": near}
 
-    def place(self, kind: _Element) -> list[float] | str:
+    def place(self, kind: _Element, of: str = "") -> list[float] | str:
         """X and y of the position in an element, metres; of a file of odscen's perhaps a node.
+
+        With ``of`` it is where the centre of that actor is when its reference point is there.
 
         Raises
         ------
@@ -190,10 +207,14 @@ class ConditionReader:
         position = self.report.child(kind, "Position")
         if position is None:
             raise RefusedError(kind, f"{kind.tag} without a position")
-        return self.point_or_node(position)
+        ahead = next((one.ahead for one in self.entities.values() if one.id == of), 0.0)
+        return self.point_or_node(position, ahead=ahead)
 
-    def point_or_node(self, position: _Element) -> list[float] | str:
+    def point_or_node(self, position: _Element, *, ahead: float = 0.0) -> list[float] | str:
         """X and y of a position, metres; of a file of odscen's perhaps a node.
+
+        ``ahead`` is from the reference point of who is to be there to its centre, metres; odscen
+        writes places of centres.
 
         Raises
         ------
@@ -201,8 +222,26 @@ class ConditionReader:
             If it cannot be found on the map.
         """
         point = self.positions.point(position)
+        if not self.own:
+            point = point.moved(ahead)
         node = self.positions.name_at(point) if self.own and _headed(position) else None
         return node or [round(point.x, 4), round(point.y, 4)]
+
+
+def _holds(kind: _Element, have: str) -> bool:
+    """Whether a value is to the one of a condition as its rule says."""
+    want, rule = kind.get("value", ""), kind.get("rule")
+    try:
+        one, other = float(_TRUTH.get(have, have)), float(_TRUTH.get(want, want))
+    except ValueError:
+        return (have == want) == (rule != "notEqualTo")
+    return {
+        "greaterThan": one > other,
+        "greaterOrEqual": one >= other,
+        "lessThan": one < other,
+        "lessOrEqual": one <= other,
+        "notEqualTo": one != other,
+    }.get(str(rule), one == other)
 
 
 def _headed(position: _Element) -> bool:
@@ -240,7 +279,7 @@ def _stopped(read: ConditionReader, kind: _Element, of: str) -> Made:
 
 def _reaches(read: ConditionReader, kind: _Element, of: str) -> Made:
     within = min(max(read.report.number(kind, "tolerance"), 0.01), 1000.0)
-    return {"reaches": {"of": of, "place": read.place(kind), "within": within}}
+    return {"reaches": {"of": of, "place": read.place(kind, of), "within": within}}
 
 
 def _headway(read: ConditionReader, kind: _Element, of: str) -> Made:
@@ -275,7 +314,9 @@ def _relative_distance(read: ConditionReader, kind: _Element, of: str) -> Made:
 
 
 def _distance(read: ConditionReader, kind: _Element, of: str) -> Made:
-    part = {"of": of, "place": read.place(kind), **_measure(read, kind, "euclidianDistance")}
+    centre = "" if kind.get("freespace") == "true" else of
+    place = read.place(kind, centre)
+    part = {"of": of, "place": place, **_measure(read, kind, "euclidianDistance")}
     if kind.get("alongRoute") == "true":
         part["along"] = "lane"
     return read.bounded(kind, "distance", part)

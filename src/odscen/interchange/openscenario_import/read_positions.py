@@ -27,6 +27,7 @@ _EXACT = 1e-5
 """Metres and radians that the rounding of a file makes."""
 
 
+_IN_ROUTE: Final = ("FromLaneCoordinates", "FromRoadCoordinates", "FromCurrentEntity")
 _STRAIGHT: Final = 1e-4
 """Radians between the headings of a lane that counts as straight."""
 
@@ -61,6 +62,8 @@ class PositionReader:
     ----------
     road_point
         x, y and heading of a point with growing s at s and t of a road; ``None`` if there is none.
+    lane_t
+        t of the middle of a lane of any type at s; ``None`` if there is none.
     side
         1 where y and what lies left are positive, -1 in the left-handed frame of CARLA.
     starts
@@ -69,15 +72,19 @@ class PositionReader:
         Whether points on straight lanes stay formulas of parameters, for a sweep.
     moving
         Names of entities that are not where they start once the story runs.
+    on_trajectory
+        Point of a ``TrajectoryPosition``.
     """
 
     report: ImportReport
     graph: MapGraph
     road_point: Callable[[str, float, float], tuple[float, float, float] | None]
+    lane_t: Callable[[str, int, float], float | None]
     side: float = 1.0
     starts: dict[str, MapPoint] = field(default_factory=dict)
     varied: bool = False
     moving: set[str] = field(default_factory=set)
+    on_trajectory: Callable[[PositionReader, _Element], MapPoint] | None = None
     _modes: dict[str, bool] = field(default_factory=dict)
 
     @contextmanager
@@ -111,6 +118,7 @@ class PositionReader:
             "RelativeWorldPosition": self._relative_world,
             "RelativeObjectPosition": self._relative_object,
             "RoutePosition": self._route,
+            "TrajectoryPosition": self._trajectory,
         }.get(str(kind.tag))
         if read is None:
             raise RefusedError(kind, f"a place given as {kind.tag}")
@@ -152,7 +160,11 @@ class PositionReader:
 
     def beside_lane(self, point: MapPoint) -> float:
         """Metres that a point is to the left of the lane nearest to it."""
-        lanes, node = self.graph.lanes, self.node_near(point)
+        return self.left_of(self.node_near(point), point)
+
+    def left_of(self, node: int, point: MapPoint) -> float:
+        """Metres that a point is to the left of the lane of a node."""
+        lanes = self.graph.lanes
         dx, dy = point.x - float(lanes.x[node]), point.y - float(lanes.y[node])
         hdg = float(lanes.hdg[node])
         return dy * math.cos(hdg) - dx * math.sin(hdg)
@@ -248,8 +260,19 @@ class PositionReader:
         if walk is not None:
             return walk.moved(0.0, offset if lane < 0 else -offset)
         if node is None:
-            raise RefusedError(kind, f"road {road!r} has no lane {lane:g} to drive or walk on")
+            return self._on_any_lane(kind, road, int(lane), s, offset)
         return self._at(node, s, offset)
+
+    def _on_any_lane(
+        self, kind: _Element, road: str, lane: int, s: float, offset: float
+    ) -> MapPoint:
+        """Middle of a lane that is neither to drive nor to walk on, such as a shoulder."""
+        t = self.lane_t(road, lane, float(s))
+        found = None if t is None else self.road_point(road, float(s), t + float(offset))
+        if found is None:
+            raise RefusedError(kind, f"road {road!r} has no lane {lane}")
+        point = MapPoint(*found)
+        return point if lane <= 0 else point._replace(hdg=point.hdg + math.pi)
 
     def _on_foot(self, road: str, lane: int, s: float) -> MapPoint | None:
         """Centre of a lane for walking; right lanes lead with growing s, left ones against it."""
@@ -318,14 +341,28 @@ class PositionReader:
         dx, dy = (self.report.number(kind, name, 0.0) for name in ("dx", "dy"))
         return self.of_entity(kind)._replace(node=None).moved(dx, self.side * dy)
 
+    def _trajectory(self, kind: _Element) -> MapPoint:
+        if self.on_trajectory is None:
+            raise RefusedError(kind, "a place on a trajectory")
+        return self.on_trajectory(self, kind)
+
     def _route(self, kind: _Element) -> MapPoint:
-        inside = next(kind.iter("FromLaneCoordinates"), None)
+        inside = next(kind.iter(*_IN_ROUTE), None)
         places = kind.findall(".//Waypoint/Position")
+        if inside is not None and inside.tag == "FromCurrentEntity":
+            self.report.mark(inside, "approximated", "where that entity starts")
+            return self.of_entity(inside)
         if inside is None or not places:
-            raise RefusedError(kind, "a place on a route that is not by lanes")
+            raise RefusedError(kind, "a place on a route without the route, or without a place")
         for one in kind.iter("*"):
             self.report.mark(one, "approximated", "taken along the lane of the first waypoint")
         base = self.point(places[0])
         node = self.node_near(base) if base.node is None else base.node
         metres = self.report.number(inside, "pathS")
-        return self._at(self.along(node, metres))
+        there = self.along(node, metres)
+        if inside.tag == "FromLaneCoordinates":
+            return self._at(there)
+        lanes = self.graph.lanes
+        key = lanes.lanes.keys[int(lanes.lane[there])]
+        t = self.side * self.report.number(inside, "t", 0.0)
+        return self._on_road(kind, key.road, float(lanes.s[there]), t)

@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
+from odscen.interchange.openscenario_import.global_actions import READ, tell_unread
 from odscen.interchange.openscenario_import.import_report import RefusedError
 from odscen.interchange.openscenario_import.own_entity_actions import own_entity_action, with_speed
 from odscen.interchange.openscenario_import.own_files import said_in_properties
 from odscen.interchange.openscenario_import.read_actions import FOLLOWING
 from odscen.interchange.openscenario_import.read_conditions import ALWAYS, joined
 from odscen.interchange.openscenario_import.read_entities import plain_id
+from odscen.interchange.openscenario_import.value_changes import new_value, sets_in_story
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -24,7 +26,10 @@ if TYPE_CHECKING:
 
 Made = dict[str, Any]
 _HOLDERS = frozenset({"Story", "Act", "ManeuverGroup", "Maneuver"})
-_GLOBAL = "odscen has no counterpart of this global action in a story"
+
+
+class LaterError(RefusedError):
+    """An element that waits for one that may still be read."""
 
 
 @dataclass(slots=True)
@@ -52,12 +57,50 @@ class StoryReader:
     _made: dict[_Element, list[Made]] = field(default_factory=dict)
     _whens: dict[_Element, Made] = field(default_factory=dict)
     _asked: set[_Element] = field(default_factory=set)
+    _waiting: list[tuple[_Element, _Element | None, list[str]]] = field(default_factory=list)
+    _last: list[bool] = field(default_factory=list)
 
     def read(self, board: _Element) -> None:
         """Read all events; an event that cannot be taken over is left out."""
         for story in self.report.children(board, "Story"):
             for act in self.report.children(story, "Act"):
                 self._act(act)
+        while self._waiting:  # for elements that come later in the file
+            again, self._waiting = self._waiting, []
+            for one in again:
+                self._event(*one)
+            if len(self._waiting) == len(again):
+                self._last.append(True)
+
+    def changes(self, kind: _Element, name: str) -> list[tuple[str, Made]]:
+        """Values that events set a parameter or variable to, and when they have.
+
+        Raises
+        ------
+        RefusedError
+            If the trigger of such an event has no counterpart, or waits for this.
+        """
+        found = []
+        for action in sets_in_story(kind.getroottree().getroot(), name):
+            event = next(action.iterancestors("Event"), None)
+            if event is None or self.actions is None:
+                continue
+            if event in self._asked or any(one is kind for one in event.iter("*")):
+                raise RefusedError(kind, f"{name!r}, which is set by what waits for it")
+            rules = self._made.get(event, [])
+            self._asked.add(event)
+            act = next(event.iterancestors("Act"), None)
+            trigger = self.actions.conditions.trigger
+            starts = () if act is None else (act.find("StartTrigger"), event.find("StartTrigger"))
+            when = joined("all", [trigger(one) for one in starts])
+            self._asked.discard(event)
+            if rules:
+                when = {"rule": {"id": rules[0]["id"], "has": "started"}}
+            for one in action.iter("*"):
+                self.report.mark(one, "taken")
+            value = new_value(action, self.actions.conditions.values.get(name, "0"))
+            found.append((value, when))
+        return found
 
     def state(self, kind: _Element) -> Made:
         """Condition of a ``StoryboardElementStateCondition``.
@@ -66,6 +109,8 @@ class StoryReader:
         ------
         RefusedError
             If it is of a state or an element that rules do not have.
+        LaterError
+            If that element is none that has been read so far.
         """
         state, name = kind.get("state", ""), kind.get("storyboardElementRef", "")
         has = {
@@ -85,7 +130,7 @@ class StoryReader:
                 parts.append(self._whens[event])
             parts += [{"rule": {"id": rule["id"], "has": has}} for rule in rules]
         if not parts:
-            raise RefusedError(kind, f"{name!r}, which is left out or comes later")
+            raise LaterError(kind, f"{name!r}, which is left out or is not there")
         return joined("all" if has == "ended" else "any", parts)
 
     def _begun(self, kind: _Element, name: str) -> Iterator[Made]:
@@ -157,10 +202,14 @@ class StoryReader:
                 rule["then"] += then if len(then) == 1 else [{"together": then}]
             self._made[event] = [rule]
 
-    def _event(self, event: _Element, trigger: _Element | None, names: Iterable[str]) -> None:
+    def _event(self, event: _Element, trigger: _Element | None, names: list[str]) -> None:
+        before = len(self.rules)
         try:
             self._take(event, trigger, names)
         except RefusedError as error:
+            if isinstance(error, LaterError) and not self._last and len(self.rules) == before:
+                self._waiting.append((event, trigger, names))
+                return
             self.report.mark(error.element, "refused", error.reason)
             self.report.mark(event, "refused", f"left out: {error.reason}")
         except InputError as error:
@@ -176,11 +225,13 @@ class StoryReader:
         when = joined("all", [conditions.trigger(trigger), conditions.trigger(own)])
         self._whens[event] = when
         times = int(self.report.number(event, "maximumExecutionCount", 1.0))
-        for about in () if self.own else event.iterfind("Action/GlobalAction/EntityAction"):
-            self._entity(event, about, when, times)
+        if not self.own:
+            self._globals(event, when, times)
+        if event.find("Action/PrivateAction") is None and not self.own:
+            for content in event.iterfind("Action/*"):
+                tell_unread(self.report, content, story=True)
+            return
         for name in names:
-            if event.find("Action/PrivateAction") is None and not self.own:
-                break
             if name not in self.entities:
                 raise RefusedError(event, f"entity {name!r} is not among the actors")
             entity = self.entities[name]
@@ -192,12 +243,30 @@ class StoryReader:
             else:
                 self._add(event, entity.id, when, then, times)
 
+    def _globals(self, event: _Element, when: Made, times: int) -> None:
+        """Read what global actions of an event make rules of."""
+        for about in event.iterfind("Action/GlobalAction/EntityAction"):
+            self._entity(event, about, when, times)
+        for about in event.iterfind("Action/GlobalAction/InfrastructureAction"):
+            self._signal(event, about, when, times)
+
+    def _signal(self, event: _Element, about: _Element, when: Made, times: int) -> None:
+        """Let a rule switch a light; which actor it is of does not matter."""
+        if self.actions is None or not self.entities:
+            return
+        made = self.actions.conditions.signals.action(about)
+        above = about.getparent()
+        for one in () if above is None else (above, above.getparent()):
+            if one is not None:
+                self.report.mark(one, "taken")
+        self._add(event, next(iter(self.entities.values())).id, when, [made], times)
+
     def _then(self, event: _Element, entity: ReadEntity) -> list[Made]:
         found: list[Made] = []
         for action in self.report.children(event, "Action"):
             content = self.report.only(action)
-            entities = content.tag == "GlobalAction" and content.find("EntityAction") is not None
-            if entities and not self.own:
+            kind = content.find("*") if content.tag == "GlobalAction" else None
+            if kind is not None and kind.tag in READ and not self.own:
                 continue
             if content.tag != "PrivateAction":
                 found += self._global(content, entity)
@@ -212,10 +281,13 @@ class StoryReader:
     def _global(self, content: _Element, entity: ReadEntity) -> list[Made]:
         if self.own and self.actions is not None:
             made = own_entity_action(content, entity, self.actions.conditions.positions)
+            about = content.find("InfrastructureAction")
+            if made is None and about is not None:
+                made = self.actions.conditions.signals.action(about)
             if made is not None:
                 self.report.take(content)
                 return [made]
-        self.report.ignore(content, _GLOBAL)
+        tell_unread(self.report, content, story=True)
         return []
 
     def _appearing(self, entity: ReadEntity, at: list[float]) -> list[Made]:
@@ -257,7 +329,7 @@ class StoryReader:
     def at_once(self, actor: str, then: list[Made]) -> None:
         """Add what an actor does from the start, or as soon as it has appeared."""
         first, rest = then[:1], then[1:]
-        if rest and "appear" in first[0]:
+        if rest and ("appear" in first[0] or "replay" in first[0]):
             groups = [[*first, *(rest if len(rest) == 1 else [{"together": rest}])]]
         else:
             groups = [[one] for one in then]

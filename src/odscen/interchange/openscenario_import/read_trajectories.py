@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 _STEP: Final = 1.0
 """Metres between the points of a curve at most."""
 _MOST: Final = 5000
+_SAME: Final = 1e-6
+_BEYOND: Final = 0.5
+"""Metres by which a place may be before or behind a trajectory without a word."""
 
 
 class TrajectoryPoint(NamedTuple):
@@ -56,17 +60,73 @@ def read_trajectory(
     points = reader(report, positions, body)
     if len(points) < 2:
         raise RefusedError(body, f"a {body.tag} of less than two points")
+    return _from(points, report.number(kind, "initialDistanceOffset", 0.0))
+
+
+def trajectory_place(positions: PositionReader, kind: _Element) -> MapPoint:
+    """Point of a ``TrajectoryPosition``: ``s`` metres along it and ``t`` to its left, headed along.
+
+    Raises
+    ------
+    RefusedError
+        If there is no trajectory.
+    """
+    report = positions.report
+    points = read_trajectory(report, positions, kind)
+    along, left = report.number(kind, "s"), positions.side * report.number(kind, "t", 0.0)
+    length = _length_of(points)
+    if not -_BEYOND <= along <= length + _BEYOND:
+        words = f"at the end of the trajectory, which is {length:.1f} m long"
+        report.mark(kind, "approximated", words)
+    first, second = _from(points, min(max(float(along), 0.0), length))[:2]
+    hdg = math.atan2(second.at.y - first.at.y, second.at.x - first.at.x)
+    return MapPoint(float(first.at.x), float(first.at.y), hdg).moved(0.0, float(left))
+
+
+def _length_of(points: list[TrajectoryPoint]) -> float:
+    return sum(one.at.away(other.at) for one, other in itertools.pairwise(points))
+
+
+def _from(points: list[TrajectoryPoint], metres: float) -> list[TrajectoryPoint]:
+    """Points so many metres along a trajectory and after; of its last segment at least the end."""
+    left = float(metres)
+    if left <= 0.0:
+        return points
+    for row, (one, other) in enumerate(itertools.pairwise(points)):
+        long = one.at.away(other.at)
+        if left < long or row == len(points) - 2:
+            share = min(left / long, 1.0 - 1e-6) if long > 0 else 0.0
+            time = one.time + share * (other.time - one.time)
+            x = one.at.x + share * (other.at.x - one.at.x)
+            y = one.at.y + share * (other.at.y - one.at.y)
+            hdg = math.atan2(other.at.y - one.at.y, other.at.x - one.at.x)
+            return [TrajectoryPoint(time, MapPoint(x, y, hdg)), *points[row + 1 :]]
+        left -= long
     return points
 
 
 def _polyline(
     report: ImportReport, positions: PositionReader, shape: _Element
 ) -> list[TrajectoryPoint]:
-    found = []
+    found: list[TrajectoryPoint] = []
+    turned: list[bool] = []
     for vertex in report.children(shape, "Vertex"):
-        at = positions.point(_position(report, vertex, "Position"))
+        place = _position(report, vertex, "Position")
+        at = positions.point(place)
+        turned.append(place.find("*/Orientation") is not None or place.find("*[@h]") is not None)
         found.append(TrajectoryPoint(report.number(vertex, "time", 0.0), at))
-    return found
+    return [
+        one if own else one._replace(at=one.at._replace(hdg=_direction(found, row)))
+        for row, (one, own) in enumerate(zip(found, turned, strict=True))
+    ]
+
+
+def _direction(points: list[TrajectoryPoint], row: int) -> float:
+    """Direction in which a line leads through one of its points."""
+    before, after = points[max(row - 1, 0)].at, points[min(row + 1, len(points) - 1)].at
+    if before.away(after) < _SAME:
+        return float(points[row].at.hdg)
+    return math.atan2(after.y - before.y, after.x - before.x)
 
 
 def _clothoid(

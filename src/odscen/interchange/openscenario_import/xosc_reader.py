@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.interchange.openscenario_import.actor_places import ActorPlaces
+from odscen.interchange.openscenario_import.entity_selections import name_entities
+from odscen.interchange.openscenario_import.global_actions import tell_unread
 from odscen.interchange.openscenario_import.import_report import ImportReport, RefusedError
 from odscen.interchange.openscenario_import.kept_parameters import with_parameters
 from odscen.interchange.openscenario_import.own_files import is_own
@@ -15,9 +17,12 @@ from odscen.interchange.openscenario_import.read_actions import ActionReader
 from odscen.interchange.openscenario_import.read_appearances import AppearanceReader
 from odscen.interchange.openscenario_import.read_conditions import ConditionReader
 from odscen.interchange.openscenario_import.read_entities import read_entities
+from odscen.interchange.openscenario_import.read_environment import read_environment
 from odscen.interchange.openscenario_import.read_positions import MapPoint, PositionReader
+from odscen.interchange.openscenario_import.read_signals import SignalReader
 from odscen.interchange.openscenario_import.read_storyboard import StoryReader
-from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
+from odscen.interchange.openscenario_import.read_trajectories import trajectory_place
+from odscen.interchange.openscenario_import.value_changes import first_values
 from odscen.lanegraph.query import largest_part
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.templates.scene_actors import STEADY, STEADY_DRIVER
@@ -48,14 +53,16 @@ class XoscSource:
         Its tree, its parameters, and the marks of its elements so far.
     graph, map_name, sha256
         The map.
-    road_point
-        x, y and heading at s and t of a road.
+    road_point, lane_t
+        x, y and heading at s and t of a road; t of the middle of a lane at s.
     parameters
         Declarations of those parameters that are numbers, by name.
     varied
         Whether a sweep varies them: vehicles whose places come from them then appear there.
     movement
         Light and movement of a signal.
+    weather
+        Parameters of a preset of the weather.
     """
 
     root: _Element
@@ -65,7 +72,9 @@ class XoscSource:
     map_name: str
     sha256: str
     road_point: Callable[[str, float, float], tuple[float, float, float] | None]
+    lane_t: Callable[[str, int, float], float | None]
     movement: Callable[[str], tuple[str, str] | None]
+    weather: Callable[[str], Mapping[str, float] | None]
     parameters: Mapping[str, _Element] = field(default_factory=dict)
     varied: bool = False
 
@@ -82,6 +91,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
     """
     report, root = source.report, source.root
     report.mark(root, "taken")
+    name_entities(report, root)
     for tag in ("FileHeader", "RoadNetwork", "LogicFile"):
         for element in root.iter(tag):
             report.mark(element, "taken")
@@ -90,12 +100,21 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
         _on_wheels(report, entities.values())
     # How ScenarioRunner tells files in CARLA's frame, whose y and headings are those of Unreal.
     side = -1.0 if _title(root).startswith("CARLA:") else 1.0
-    positions = PositionReader(report, source.graph, source.road_point, side, varied=source.varied)
+    positions = PositionReader(
+        report, source.graph, source.road_point, source.lane_t, side, varied=source.varied,
+        on_trajectory=trajectory_place,
+    )  # fmt: skip
     driven = frozenset(one.id for one in entities.values() if one.ego and ego != "story")
     story = StoryReader(report, entities, driven, own=is_own(root))
+    found = read_environment(report, root, source.weather, driven=bool(driven), own=story.own)
+    signals = SignalReader(report, root, source.movement)
+    signals.programs()
+    values = dict(source.values)
+    first_values(report, root, values)
     conditions = ConditionReader(
-        report, positions, entities, source.values, story.state, source.movement, own=story.own
-    )
+        report, positions, entities, values, story.state, signals, story.changes, found,
+        own=story.own,
+    )  # fmt: skip
     story.actions = ActionReader(conditions, own=story.own)
     board = report.child(root, "Storyboard")
     if board is None:
@@ -119,6 +138,8 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
         "drivers": {"sets": [STEADY_DRIVER] if _steady(actors) else []},
         "actors": actors,
         "simulation": {"duration": _duration(report, board)},
+        "environment": found.environment,
+        "demand": {"clock": found.clock or 0.0},
         "rules": [rule for rule in story.rules if rule["actor"] in init.placed],
     }  # fmt: skip
     return Scenario.model_validate(with_parameters(report, source.parameters, data))
@@ -164,9 +185,7 @@ class _Init:
         if group is None:
             return
         for element in group.iterchildren("GlobalAction"):
-            if element.find("EntityAction") is not None:
-                continue
-            report.ignore(element, "environment and other global actions are not read yet")
+            tell_unread(report, element, story=False)
         privates = list(report.children(group, "Private"))
         self._teleports(privates)
         without = [name for name in self._entities if name not in self._positions.starts]
@@ -326,14 +345,7 @@ class _Init:
             then = [one for one in then if "goal" not in one]
             if not speeds:
                 then.append({"speed": {"to": 0.0, "shape": "step"}})
-            if left:
-                made["lateral_offset"] = 0.0
-                then.insert(0, {"offset": {"to": round(left, 3), "over": 0.1}})
-            if isinstance(centre.x, TracedNumber) or isinstance(centre.y, TracedNumber):
-                lanes = self._source.graph.lanes
-                hdg = float(lanes.hdg[self._positions.node_near(centre)])
-                at = [centre.x, centre.y, hdg]  # SUMO turns vehicles along their lanes
-                then = [{"appear": {"at": at, "speed": speed}}, *then]
+            then = self._places.at_first(centre, left, then, made)
         if entity.ego:
             made["ego"] = True
         if speed > 0:

@@ -2,8 +2,8 @@
 
 The operators and functions are those of OpenSCENARIO 1.3 that give numbers: ``+ - * / %``,
 brackets, ``pow``, ``sqrt``, ``round``, ``floor``, ``ceil``, ``abs``, ``sign``, ``min`` and ``max``,
-and ``pi``.
-Nothing else is ever called.
+``pi``, and ``sin``, ``cos``, ``tan``, ``asin``, ``acos`` and ``atan`` of radians. Those that give
+truth, ``not``, ``and`` and ``or``, give 1 or 0. Nothing else is ever called.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ _OPERATORS: Final[dict[type[ast.AST], Callable[..., float]]] = {
     ast.Mod: math.fmod,
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
+    ast.Not: lambda value: float(not value),
 }
 
 
@@ -48,6 +49,12 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., float]]]] = {
     "sign": (1, lambda value: float((value > 0) - (value < 0))),
     "min": (2, min),
     "max": (2, max),
+    "sin": (1, math.sin),
+    "cos": (1, math.cos),
+    "tan": (1, math.tan),
+    "asin": (1, math.asin),
+    "acos": (1, math.acos),
+    "atan": (1, math.atan),
 }
 
 
@@ -106,6 +113,9 @@ def _value(node: ast.expr, values: Mapping[str, float]) -> float:
         return float(values[node.id[1:]])
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
         return _OPERATORS[type(node.op)](_value(node.left, values), _value(node.right, values))
+    if isinstance(node, ast.BoolOp):
+        all_or_any = all if isinstance(node.op, ast.And) else any
+        return float(all_or_any([_value(one, values) for one in node.values]))
     if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
         return _OPERATORS[type(node.op)](_value(node.operand, values))
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:

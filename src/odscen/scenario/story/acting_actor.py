@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from odscen.scenario.story.channels import Channel
     from odscen.scenario.story.road_view import ActorView, Point, RoadView
 
@@ -18,7 +21,7 @@ class ActingActor(NamedTuple):
     """Who acts, from when on, and what is seen.
 
     ``instant`` lies in the step that begins at ``view.time`` and lasts ``step`` seconds; ``owner``
-    is rule and number of the action.
+    is rule and number of the action. ``channels`` are what rules have taken over of all actors.
     """
 
     view: RoadView
@@ -27,6 +30,7 @@ class ActingActor(NamedTuple):
     instant: float
     step: float
     owner: str
+    channels: Mapping[str, Channel] = MappingProxyType({})
 
     @property
     def speed(self) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
-from odscen.scenario.story.arrivals import arrive, synchronise
+from odscen.scenario.story.arrivals import arrive, end_of_arrival, synchronise
 from odscen.scenario.story.asked_actions import (
     Wanted,
     ask_to_appear,
@@ -43,6 +43,7 @@ from odscen.scenario.story.side_actions import (
     cut_in,
     cut_in_further,
     lane_lasts,
+    leave_aside,
     leave_line,
     move_aside,
 )
@@ -266,7 +267,7 @@ ACTIONS = {
         ActionKind(
             "offset", "move the front to `to` metres left of the lane's centre, `over` so many "
             "seconds on a half-cosine", "m, s", "`moveToXY`", "LaneOffsetAction", _MIRRORED,
-            move_aside, lane_lasts, leave_line, vehicles_only=True,
+            move_aside, lane_lasts, leave_aside, vehicles_only=True,
         ),
         ActionKind(
             "keep_gap", "follow `to`, or drive `ahead` of it, at a free gap of `metres`, or of "
@@ -301,7 +302,7 @@ ACTIONS = {
             "arrive", "be `at` a place at the instant at which `to` is `when_at` another; the "
             "speed is settled once that of `to` is steady", "",
             "`setSpeed` or `person.moveToXY`", "SynchronizeAction", _MIRRORED, arrive,
-            synchronise, _stand,
+            synchronise, end_of_arrival,
         ),
         ActionKind(
             "appear", "be on the road from now on, where it is placed or `at` x, y and heading of "

@@ -6,28 +6,43 @@ import math
 from typing import TYPE_CHECKING
 
 from odscen.scenario.story.acting_actor import CannotAct
-from odscen.scenario.story.side_motion import line_length
+from odscen.scenario.story.path_actions import stay
+from odscen.scenario.story.side_motion import beside, line_length
 from odscen.scenario.story.speed_laws import steady
 
 if TYPE_CHECKING:
     from odscen.scenario.document.actions_document import Arriving
     from odscen.scenario.document.conditions_document import RulePlace
     from odscen.scenario.story.acting_actor import ActingActor
+    from odscen.scenario.story.channels import Channel
     from odscen.scenario.story.road_view import ActorView, RoadView
 
 FASTEST_VEHICLE, FASTEST_WALKER = 70.0, 10.0
 """m/s; who would have to be faster cannot arrive in time."""
 _STEADY = 0.05
 """m/s^2 of acceleration below which a speed counts as steady."""
+_BY = 1.5
+"""Metres between a line and a place that it leads by."""
+_SAME = 1e-6
 
 
 def arrive(part: Arriving, one: ActingActor) -> float:
-    """Begin: a pedestrian goes straight to the place, whatever lies between."""
-    if one.actor.person:
+    """Begin: a pedestrian goes straight to the place, unless it is on a line that leads there."""
+    if one.actor.person and _on_line(one.actor, part.at, one.view, one.channel) is None:
         line = (one.spot(), one.view.place(part.at))
         one.channel.take_speed(steady(one.instant, 0.0), one.owner)
         one.channel.take_line(line, 0.0, None, one.owner, one.instant)
     return math.inf
+
+
+def end_of_arrival(part: Arriving, one: ActingActor) -> None:
+    """Keep the speed; a pedestrian stays where its line ends if that is the place."""
+    line = one.channel.line
+    at = one.view.place(part.at)
+    if one.actor.person and line is not None and math.dist(line[-1], at) < _SAME:
+        stay(one)
+    else:
+        one.channel.keep_speed()
 
 
 def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
@@ -45,7 +60,7 @@ def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
     if other is None:
         msg = f"{part.to!r} is not on the road"
         raise CannotAct(msg)
-    theirs = _rest(other, part.when_at, view)
+    theirs = _rest(other, part.when_at, view, one.channels.get(part.to))
     if theirs is None:
         msg = f"{part.to!r} does not come by the place where it is to be met"
         raise CannotAct(msg)
@@ -67,19 +82,30 @@ def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
 
 def _own_rest(part: Arriving, one: ActingActor) -> float:
     """Metres from where the actor is at the instant to where it is to be."""
-    if one.actor.person:
-        line = one.channel.line or ()
-        return (
-            line_length(line) - one.channel.along - one.channel.metres(one.view.time, one.instant)
-        )
-    rest = _rest(one.actor, part.at, one.view)
+    rest = _rest(one.actor, part.at, one.view, one.channel)
     if rest is None:
         msg = "its route does not lead to the place"
         raise CannotAct(msg)
     return rest - one.channel.metres(one.view.time, one.instant)
 
 
-def _rest(actor: ActorView, place: RulePlace, view: RoadView) -> float | None:
+def _rest(
+    actor: ActorView, place: RulePlace, view: RoadView, channel: Channel | None
+) -> float | None:
+    on_line = None if channel is None else _on_line(actor, place, view, channel)
+    if on_line is not None:
+        return on_line
     if actor.person:
         return math.dist((actor.x, actor.y), view.place(place))
     return view.lane_distance(actor.id, place)
+
+
+def _on_line(actor: ActorView, place: RulePlace, view: RoadView, channel: Channel) -> float | None:
+    """Metres from the centre to a place that the actor's line leads by; ``None`` without one."""
+    if channel.line is None:
+        return None
+    there = beside(channel.line, view.place(place))
+    centre = channel.along - (0.0 if actor.person else actor.length / 2.0)
+    rest = there.along - centre
+    near = abs(there.left) < _BY and there.along < line_length(channel.line) + _BY
+    return rest if near and rest > -_BY else None

@@ -74,7 +74,7 @@ def follow_path(part: PathFollowing, one: ActingActor) -> float:
     Raises
     ------
     CannotAct
-        If the actor stands and is not to go any faster.
+        If the actor stands, and no rule says how fast it goes.
     """
     points = [one.view.place(place) for place in part.points]
     line = (_own_point(one), *points)
@@ -90,7 +90,7 @@ def follow_path(part: PathFollowing, one: ActingActor) -> float:
         return table.end
     if one.actor.person or part.speed is not None:
         _along_line(line, part.speed, one)
-    elif one.speed > 0.0:
+    elif one.speed > 0.0 or channel.law is not None:
         channel.take_line(line, 0.0, None, one.owner, one.instant)
     else:
         msg = "it is stopped; the path has to say how fast it is followed"

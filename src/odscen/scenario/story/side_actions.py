@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from odscen.scenario.story.acting_actor import CannotAct
-from odscen.scenario.story.side_motion import SideLaw, beside, line_length
+from odscen.scenario.story.side_motion import SideLaw, beside, line_length, point_on
 from odscen.scenario.story.speed_laws import SpeedLaw
 
 if TYPE_CHECKING:
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 FASTEST = 70.0
 """m/s; a cut-in that needs more is not possible."""
+_ON_LANE = 2.0
+"""Metres from the centre of a lane at which the front of a vehicle is still on it."""
 
 
 def change_lane(part: LaneChange, one: ActingActor) -> float:
@@ -114,6 +116,19 @@ def lane_lasts(_: object, one: ActingActor, end: float) -> float:
         msg = "the lane ends before it is there"
         raise CannotAct(msg)
     return end
+
+
+def leave_aside(part: LateralMove, one: ActingActor) -> None:
+    """Leave the line with this step; where no lane is, it is followed on, beside the lane."""
+    line = one.channel.line
+    if line is None or abs(part.to) < _ON_LANE:
+        one.channel.leaves = True
+        return
+    x, y, _ = point_on(line, one.channel.along, left=part.to)
+    for by in (0, 1 if part.to > 0 else -1):
+        lane = one.view.lane_line(one.actor.id, by)
+        if lane is not None and abs(beside(lane, (x, y)).left) < _ON_LANE:
+            one.channel.leaves = True
 
 
 def leave_line(_: object, one: ActingActor) -> None:

@@ -306,7 +306,7 @@ class StoryEngine:
             channel = self._channels[actor.id] = Channel()
             channel.begin_step(actor, view.time)
         owner = f"{rule.id}/{one.number}"
-        return ActingActor(view, actor, channel, now, self._step, owner)
+        return ActingActor(view, actor, channel, now, self._step, owner, self._channels)
 
     def _override(self, owner: str, now: float, by: StoryRule) -> None:
         """End an action of another rule, as ``by`` has taken over what it had."""

@@ -9,7 +9,7 @@ from fastapi import APIRouter, File, Form, UploadFile
 from starlette.responses import Response
 
 from odscen.app.exchange.sent_scenarios import SentFile, read_sent_scenario
-from odscen.app.exchange.zipped_exports import exported
+from odscen.app.exchange.zipped_exports import exported, exported_run
 from odscen.base.errors import NotFoundError
 from odscen.web.exchange.exchange_messages import ExportInfo, ImportInfo
 from odscen.web.jobs import JobResult
@@ -78,6 +78,16 @@ def import_plan(name: str, shared: Shared) -> Response:
     headers = {"Content-Disposition": f'attachment; filename="{name}.sweep.json"'}
     content = _kept(shared, name, _PLAN)
     return Response(content, media_type="application/json", headers=headers)
+
+
+@router.get("/runs/{run}/export", response_class=Response, responses=answers("application/zip"))
+def export_run(run: str, shared: Shared, to: str, version: str | None = None) -> Response:
+    """Download what happened in a finished run in another format, with the map."""
+    options = {} if version is None else {"version": version}
+    made = exported_run(shared.workspace, shared.runs.kept.whole(run), to=to, options=options)
+    file = f"{run}-as-run.{to}{'' if version is None else f'-{version}'}.zip"
+    headers = {"Content-Disposition": f'attachment; filename="{file}"'}
+    return Response(made.zipped(), media_type="application/zip", headers=headers)
 
 
 @exports.get("/{name}/export/notes")

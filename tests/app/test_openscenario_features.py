@@ -1,0 +1,394 @@
+"""What collections of OpenSCENARIO files use, one feature after the other, on a straight road.
+
+Shapes of conditions and actions are those of Euro NCAP's, esmini's and ScenarioRunner's files.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from odscen.app.runs import run
+from odscen.app.scenario_imports import ImportedScenario, import_scenario
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+from tests.app.test_scenario_imports import FILE, ROAD, SPEED
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+EVENT = """<Event name="{name}" priority="override"><Action name="x">{action}</Action>
+<StartTrigger>{when}</StartTrigger></Event>"""
+AFTER = (
+    '<ByValueCondition><SimulationTimeCondition value="1" rule="greaterThan"/></ByValueCondition>'
+)
+STOP = FILE.index("</Maneuver>")
+"""Where more events go."""
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    return Workspace.open(tmp_path_factory.mktemp("features"))
+
+
+def when(*conditions: str) -> str:
+    rows = (f'<Condition name="c" delay="0" conditionEdge="none">{one}</Condition>'
+            for one in conditions)  # fmt: skip
+    return f"<ConditionGroup>{''.join(rows)}</ConditionGroup>"
+
+
+def event(name: str, action: str, *conditions: str) -> str:
+    return EVENT.format(name=name, action=action, when=when(*(conditions or (AFTER,))))
+
+
+def private(action: str) -> str:
+    return f"<PrivateAction>{action}</PrivateAction>"
+
+
+def scene(*events: str, **changed: str) -> str:
+    """The file of the imports' tests with more events, and parts put before closing tags."""
+    text = FILE[:STOP] + "".join(events) + FILE[STOP:]
+    text = text.replace("ACTION", SPEED)
+    for tag, more in changed.items():
+        text = text.replace(f"</{tag}>", f"{more}</{tag}>", 1)
+    return text
+
+
+def read(workspace: Workspace, folder: Path, text: str, **others: str) -> ImportedScenario:
+    (folder / "road.xodr").write_text(ROAD)
+    for name, content in others.items():
+        (folder / f"{name}.xosc").write_text(content)
+    (folder / "scene.xosc").write_text(text)
+    found = import_scenario(workspace, folder / "scene.xosc")
+    assert [one for one in found.problems if one.severity == "error"] == []
+    return found
+
+
+def rule(found: ImportedScenario, name: str) -> dict[str, Any]:
+    (one,) = (one for one in found.scenario.rules if one.id == name)
+    return one.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+
+
+def reasons(found: ImportedScenario, verdict: str) -> set[str]:
+    return {row.reason for row in found.lists[verdict]}
+
+
+def entity_condition(kind: str) -> str:
+    return (
+        '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any">'
+        f'<EntityRef entityRef="Ego"/></TriggeringEntities><EntityCondition>{kind}'
+        "</EntityCondition></ByEntityCondition>"
+    )
+
+
+WEATHER = """<Private><PrivateAction/></Private><GlobalAction><EnvironmentAction>
+<Environment name="e"><TimeOfDay animation="true" dateTime="2026-03-01T07:30:00"/>
+<Weather cloudState="overcast"><Sun intensity="0.5" azimuth="1.5707963" elevation="0.5235988"/>
+<Fog visualRange="500"/><Precipitation precipitationType="{rain}" intensity="0.4"/></Weather>
+<RoadCondition frictionScaleFactor="{friction}"/></Environment></EnvironmentAction>
+</GlobalAction>"""
+
+
+def weather(rain: str, friction: float) -> str:
+    text = WEATHER.format(rain=rain, friction=friction)
+    return text.removeprefix("<Private><PrivateAction/></Private>")
+
+
+def test_weather_time_and_road_are_those_of_the_scenario(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    found = read(workspace, tmp_path, scene(Actions=weather("rain", 0.85)))
+    told, clock = found.scenario.environment, found.scenario.demand.clock
+    assert clock == 7.5 * 3600
+    assert told.parameters == pytest.approx(
+        {"cloudiness": 60, "sun_altitude_angle": 30, "sun_azimuth_angle": 90, "fog_distance": 0,
+         "fog_density": 56.54, "precipitation": 40, "wetness": 50, "precipitation_deposits": 0},
+        abs=0.01,
+    )  # fmt: skip
+    assert not told.affects_driving  # how all move is in the file
+    tags = ("Environment", "TimeOfDay", "Sun", "Fog", "Precipitation", "RoadCondition")
+    taken = {row.xpath.rpartition("/")[2] for row in found.lists["taken"]}
+    assert taken >= set(tags)
+
+
+def test_snow_and_ice_are_the_nearest_that_there_is(workspace: Workspace, tmp_path: Path) -> None:
+    found = read(workspace, tmp_path, scene(Actions=weather("snow", 0.3)))
+    assert found.scenario.environment.parameters["wetness"] == 100
+    assert reasons(found, "approximated") >= {
+        "rain of as much water", "grip is 0.7 to 1 times that of a dry road",
+    }  # fmt: skip
+
+
+def test_weather_that_changes_in_the_story_stays_as_it_is(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    text = scene(event("storm", weather("rain", 0.8)))
+    found = read(workspace, tmp_path, text)
+    assert found.scenario.environment.parameters == {}
+    assert "the weather of a scenario is the same from its start to its end" in reasons(
+        found, "ignored"
+    )
+
+
+def test_a_time_of_day_is_a_time_of_the_run(workspace: Workspace, tmp_path: Path) -> None:
+    at = (
+        '<ByValueCondition><TimeOfDayCondition rule="greaterThan" '
+        'dateTime="2026-03-01T07:30:12"/></ByValueCondition>'
+    )
+    text = scene(event("late", private(SPEED), at), Actions=weather("dry", 1.0))
+    assert rule(read(workspace, tmp_path, text), "late")["when"] == {"time": {"after": 12.0}}
+
+
+VARIABLES = """<VariableDeclarations><VariableDeclaration name="hit" variableType="boolean"
+value="false"/></VariableDeclarations><RoadNetwork>"""
+IS_HIT = (
+    '<ByValueCondition><VariableCondition variableRef="hit" rule="equalTo" value="true"/>'
+    "</ByValueCondition>"
+)
+
+
+def sets(value: str) -> str:
+    return (
+        f'<GlobalAction><VariableAction variableRef="hit"><SetAction value="{value}"/>'
+        "</VariableAction></GlobalAction>"
+    )
+
+
+def test_a_variable_that_an_event_sets_is_that_event(workspace: Workspace, tmp_path: Path) -> None:
+    touched = entity_condition('<CollisionCondition><EntityRef entityRef="Other"/>'
+                               "</CollisionCondition>")  # fmt: skip
+    text = scene(event("brake", private(SPEED), IS_HIT), event("sees", sets("true"), touched))
+    found = read(workspace, tmp_path, text.replace("<RoadNetwork>", VARIABLES))
+    assert rule(found, "brake")["when"] == {"touched": {"of": "Ego", "to": "Other"}}
+    assert found.lists["refused"] == []
+
+
+def test_a_variable_that_init_sets_or_nothing_does_is_what_it_is(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    text = scene(event("brake", private(SPEED), IS_HIT)).replace("<RoadNetwork>", VARIABLES)
+    never = {"not": {"time": {"after": 0.0}}}
+    assert rule(read(workspace, tmp_path, text), "brake")["when"] == never
+    text = text.replace("</Actions>", f"{sets('true')}</Actions>", 1)
+    assert rule(read(workspace, tmp_path, text), "brake")["when"] == {"time": {"after": 0.0}}
+
+
+def test_an_event_may_wait_for_one_that_comes_later_in_the_file(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    after = (
+        '<ByValueCondition><StoryboardElementStateCondition storyboardElementType="event" '
+        'storyboardElementRef="second" state="endTransition"/></ByValueCondition>'
+    )
+    text = scene(event("first", private(SPEED), after), event("second", private(SPEED)))
+    found = read(workspace, tmp_path, text)
+    assert rule(found, "first")["when"] == {"rule": {"id": "second"}}  # ended
+    text = text.replace('Ref="second"', 'Ref="third"')
+    found = read(workspace, tmp_path, text)
+    assert "'third', which is left out or is not there" in reasons(found, "refused")
+
+
+SELECTION = """<EntitySelection name="all"><Members><ByType objectType="vehicle"/></Members>
+</EntitySelection><EntitySelection name="van"><Members><EntityRef entityRef="Other"/></Members>
+</EntitySelection>"""
+
+
+def test_a_selection_is_its_members(workspace: Workspace, tmp_path: Path) -> None:
+    text = scene(Entities=SELECTION)
+    old = '"false"><EntityRef entityRef="Other"/>'
+    text = text.replace(old, old.replace("Other", "all"))
+    found = read(workspace, tmp_path, text)
+    later = [one for one in found.scenario.rules if one.id.startswith("later")]
+    assert [one.actor for one in later] == ["Ego", "Other"]
+
+
+def test_whoever_triggers_acts(workspace: Workspace, tmp_path: Path) -> None:
+    near = entity_condition(
+        '<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="0" laneId="-1" '
+        's="100"/></Position></ReachPositionCondition>'
+    )
+    text = scene()
+    text = text.replace('<Actors selectTriggeringEntities="false"><EntityRef entityRef="Other"/>',
+                        '<Actors selectTriggeringEntities="true">')  # fmt: skip
+    head, tail = text.split("</ManeuverGroup><StartTrigger>")
+    tail = tail[tail.index("</StartTrigger>") :]
+    text = f"{head}</ManeuverGroup><StartTrigger>{when(near)}{tail}"
+    found = read(workspace, tmp_path, text)
+    assert rule(found, "later")["actor"] == "Ego"
+
+
+LINE = """<Trajectory name="across" closed="false"><ParameterDeclarations>
+<ParameterDeclaration name="at" parameterType="double" value="120"/></ParameterDeclarations>
+<Shape><Polyline><Vertex><Position><LanePosition roadId="0" laneId="-1" s="$at" offset="-4">
+<Orientation h="${pi/2}" type="relative"/></LanePosition></Position></Vertex><Vertex><Position>
+<LanePosition roadId="0" laneId="-1" s="$at" offset="6"/></Position></Vertex></Polyline></Shape>
+</Trajectory>"""
+CATALOG = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" description="c"/>
+<Catalog name="Lines">{line}</Catalog></OpenSCENARIO>""".replace("{line}", LINE)
+REF = """<TrajectoryRef><CatalogReference catalogName="Lines" entryName="across">
+<ParameterAssignments><ParameterAssignment parameterRef="at" value="${100 + 20}"/>
+</ParameterAssignments></CatalogReference></TrajectoryRef>"""
+FOLLOW = (
+    '<RoutingAction><FollowTrajectoryAction initialDistanceOffset="1"><TimeReference><None/>'
+    '</TimeReference><TrajectoryFollowingMode followingMode="position"/>'
+    f"{REF}</FollowTrajectoryAction></RoutingAction>"
+)
+MEET = f"""<SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster>
+<LanePosition roadId="0" laneId="-1" s="116"/></TargetPositionMaster><TargetPosition>
+<TrajectoryPosition s="4">{REF}</TrajectoryPosition></TargetPosition><FinalSpeed>
+<AbsoluteSpeed value="1.4"><TargetDistanceSteadyState distance="2"/></AbsoluteSpeed></FinalSpeed>
+</SynchronizeAction>"""
+WALKER = """<ScenarioObject name="VRU"><Pedestrian name="p" mass="80" model="p"
+pedestrianCategory="pedestrian"/></ScenarioObject>"""
+GROUP = """<ManeuverGroup name="meets" maximumExecutionCount="1"><Actors
+selectTriggeringEntities="false"><EntityRef entityRef="VRU"/></Actors><Maneuver name="m2">
+EVENT</Maneuver></ManeuverGroup>"""
+
+
+def meeting(road_user: str) -> str:
+    """Euro NCAP's way: on a trajectory of a catalog at first, and synchronized with the ego."""
+    text = scene(
+        Entities=road_user,
+        CatalogLocations="",
+        Actions=f'<Private entityRef="VRU">{private(FOLLOW)}</Private>',
+        ManeuverGroup="",
+    )
+    group = GROUP.replace("EVENT", event("meet", private(MEET)))
+    text = text.replace("</ManeuverGroup>", f"</ManeuverGroup>{group}", 1)
+    places = '<CatalogLocations><TrajectoryCatalog><Directory path="."/></TrajectoryCatalog>'
+    return text.replace("<RoadNetwork>", f"{places}</CatalogLocations><RoadNetwork>")
+
+
+def test_places_on_trajectories_of_catalogs_are_found(workspace: Workspace, tmp_path: Path) -> None:
+    found = read(workspace, tmp_path, meeting(WALKER), lines=CATALOG)
+    arrive = rule(found, "meet")["then"][0]["arrive"]
+    # 4 m along a line that begins 4 m to the right of the middle of the lane, at y = -1.75 m
+    assert arrive["at"] == pytest.approx([120, -1.75])
+    assert arrive["when_at"] == pytest.approx([116 + 1.4, -1.75])  # centre of the body
+    x, y, hdg = next(
+        one.then[0].appear.at for one in found.scenario.rules
+        if one.actor == "VRU" and one.then[0].appear is not None
+    )  # fmt: skip
+    assert (x, y, hdg) == pytest.approx((120, -4.75, np.pi / 2))  # 1 m along it
+    assert found.lists["refused"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", [WALKER, WALKER.replace("Pedestrian", "Vehicle").replace(
+    "pedestrianCategory", "vehicleCategory").replace('="pedestrian"', '="bicycle"')])  # fmt: skip
+def test_who_follows_a_trajectory_meets_the_ego_on_it(
+    workspace: Workspace, tmp_path: Path, body: str
+) -> None:
+    found = read(workspace, tmp_path, meeting(body), lines=CATALOG)
+    settings = RunSettings(until=8.0)
+    done = run(workspace, found.scenario, settings=settings, name="meet", out=tmp_path)
+    rows = {str(key): one for (key,), one in done.trajectories().group_by("id")}
+    other = rows["VRU"].filter(rows["VRU"]["time"] > 0.15)
+    passes = float(np.interp(-1.75, other["y"], other["time"]))
+    # ... when the axle of the ego, on node 25 at first, would come to s = 116 m at 10 m/s
+    assert passes == pytest.approx((116 - (51 - 1.4)) / 10, abs=0.05)
+    assert other["x"].to_numpy() == pytest.approx(np.full(other.height, 120.0), abs=0.05)
+    assert other["y"][-1] > -1.75 + 0.3  # and goes on
+
+
+ROUTE = """<RoutePosition><RouteRef><Route name="r" closed="false"><Waypoint
+routeStrategy="shortest"><Position><LanePosition roadId="0" laneId="-2" s="10"/></Position>
+</Waypoint><Waypoint routeStrategy="shortest"><Position><LanePosition roadId="0" laneId="-2"
+s="400"/></Position></Waypoint></Route></RouteRef><InRoutePosition>{}</InRoutePosition>
+</RoutePosition>"""
+PLACES = {
+    "a route": (ROUTE.format('<FromLaneCoordinates pathS="60" laneId="-2"/>'), (70, -5.25)),
+    "a route by road": (ROUTE.format('<FromRoadCoordinates pathS="60" t="-5.25"/>'), (70, -5.25)),
+    "where one is": (ROUTE.format('<FromCurrentEntity entityRef="Other"/>'), (88.6, -5.25)),
+    "a road": ('<RoadPosition roadId="0" s="88" t="-5"/>', (88, -5)),
+    "beside one": ('<RelativeRoadPosition entityRef="Ego" ds="30" dt="-3.5"/>', (78.6, -5.25)),
+    "ahead of one": ('<RelativeObjectPosition entityRef="Ego" dx="20" dy="-3"/>', (68.6, -4.75)),
+    "a shoulder": ('<LanePosition roadId="0" laneId="-3" s="90"/>', (90, -8.0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_each_kind_of_place_is_on_the_map(tmp_path: Path, name: str) -> None:
+    place, at = PLACES[name]
+    there = entity_condition(
+        f'<ReachPositionCondition tolerance="2"><Position>{place}</Position>'
+        "</ReachPositionCondition>"
+    )
+    width = '<width sOffset="0" a="2" b="0" c="0" d="0"/>'
+    road = ROAD.replace("</right>", f'<lane id="-3" type="shoulder">{width}</lane></right>')
+    (tmp_path / "road.xodr").write_text(road)
+    (tmp_path / "scene.xosc").write_text(scene(event("near", private(SPEED), there)))
+    found = import_scenario(Workspace.open(tmp_path / "w"), tmp_path / "scene.xosc")
+    assert rule(found, "near")["when"]["reaches"]["place"] == pytest.approx(
+        (at[0] + 1.4, at[1]), abs=1.01
+    )
+    assert found.lists["refused"] == []  # the centre of the ego is 1.4 m ahead of its axle
+
+
+NOTHING = {
+    "visibility": private('<VisibilityAction graphics="true" traffic="true" sensors="false"/>'),
+    "lights": private('<AppearanceAction><LightStateAction><LightType><VehicleLight '
+                      'vehicleLightType="indicatorLeft"/></LightType><LightState mode="flashing"/>'
+                      "</LightStateAction></AppearanceAction>"),
+    "controllers": private('<ControllerAction><AssignControllerAction><Controller name="c">'
+                           "<Properties/></Controller></AssignControllerAction></ControllerAction>"),
+    "commands": '<UserDefinedAction><CustomCommandAction type="x">y</CustomCommandAction>'
+                "</UserDefinedAction>",
+    "monitors": '<GlobalAction><SetMonitorAction monitorRef="m" value="true"/></GlobalAction>',
+    "variables": sets("true"),
+    "traffic that ends": '<GlobalAction><TrafficAction trafficName="t"><TrafficStopAction/>'
+                         "</TrafficAction></GlobalAction>",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NOTHING)
+def test_what_moves_nobody_is_ignored_and_makes_no_rule(
+    workspace: Workspace, tmp_path: Path, name: str
+) -> None:
+    found = read(workspace, tmp_path, scene(event("more", NOTHING[name])))
+    assert "more" not in {one.id for one in found.scenario.rules}
+    assert found.lists["refused"] == []
+
+
+REFUSED = {
+    "a swarm": (
+        '<GlobalAction><TrafficAction trafficName="t"><TrafficSwarmAction innerRadius="10" '
+        'offset="0" numberOfVehicles="9" semiMajorAxis="90" semiMinorAxis="50" velocity="9">'
+        '<CentralObject entityRef="Ego"/></TrafficSwarmAction></TrafficAction></GlobalAction>',
+        "it puts traffic of its own on the road; give the scenario flows or demand",
+    ),
+    "a trailer": (private("<TrailerAction><DisconnectTrailerAction/></TrailerAction>"),
+                  "odscen has no DisconnectTrailerAction"),
+    "a random route": (private("<RoutingAction><RandomRouteAction/></RoutingAction>"),
+                       "odscen has no RandomRouteAction"),
+    "a signal": (
+        '<GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction '
+        'name="7" state="green"/></TrafficSignalAction></InfrastructureAction></GlobalAction>',
+        "signal '7' is over no movement of a light of the map",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_would_act_is_refused_with_its_reason(
+    workspace: Workspace, tmp_path: Path, name: str
+) -> None:
+    action, words = REFUSED[name]
+    found = read(workspace, tmp_path, scene(event("more", action)))
+    assert words in reasons(found, "refused")
+    assert {one.id for one in found.scenario.rules} >= {"cut-in", "later"}
+
+
+def test_a_falling_edge_a_delay_and_a_count_are_those_of_the_rule(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    slow = entity_condition('<SpeedCondition rule="lessThan" value="${2 + cos(0)}"/>')
+    text = scene(event("again", private(SPEED), slow))
+    text = text.replace('name="again"', 'name="again" maximumExecutionCount="3"')
+    text = text.replace(f'delay="0" conditionEdge="none">{slow}',
+                        f'delay="0.5" conditionEdge="falling">{slow}')  # fmt: skip
+    made = rule(read(workspace, tmp_path, text), "again")
+    assert (made["times"], made["when"]["delay"], made["when"]["edge"]) == (3, 0.5, "rising")
+    assert made["when"]["not"] == {"speed": {"of": "Ego", "below": 3.0}}
