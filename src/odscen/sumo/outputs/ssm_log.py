@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from lxml import etree
 
 from odscen.base.errors import SimulationError
-from odscen.sumo.outputs.xml_rows import elements
+from odscen.sumo.folder.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -19,6 +19,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.results.measures.summary import summary_to_json
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.folder.found_files import found_files
 from odscen.sumo.folder.run_sums import seal_run
 from odscen.sumo.runner.forecast import refuse_without_room
 from odscen.sumo.runner.forked_worker import is_ready
@@ -26,7 +27,6 @@ from odscen.sumo.runner.long_runs import refuse_interrupted, run_lock, run_long
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
     drop_torn_records,
-    found_files,
     make_summary,
     write_run_folder,
     write_sumo_files,
@@ -55,6 +55,7 @@ def run_prepared(
     tell: Callable[[str], None] | None = None,
     simulate: Callable[[Path], Ended] | None = None,
     several: bool = False,
+    figures: bool = True,
 ) -> Run:
     """Run in a new folder ``out``; whatever was there is replaced.
 
@@ -77,6 +78,10 @@ def run_prepared(
         Whether more runs come: their processes are then forked by one that does the imports once,
         which costs a single run more than it saves unless it has been started already. From the
         second run of this process on it is done anyway.
+
+    figures
+        Whether they are computed at once, as they are for ``finish`` and where something is
+        expected of the run; otherwise when they are asked for. A run in slices has them at once.
 
     Raises
     ------
@@ -111,7 +116,7 @@ def run_prepared(
                 ended = simulate(folder)
             if ended.done is None:
                 drop_torn_records(folder)
-            summary = make_summary(prepared, folder, ended)
+            summary = make_summary(prepared, folder, ended, figures=figures or finish is not None)
             if finish is not None and ended.done is not None:
                 finish(folder, summary)
                 summary["files"] = found_files(folder)
@@ -134,13 +139,14 @@ class _StoppedError(Exception):
 class RunJob:
     """One run of several: ``prepare`` is called when its turn comes; ``out`` is its folder.
 
-    ``finish`` as in :func:`run_prepared`.
+    ``finish`` and ``figures`` as in :func:`run_prepared`.
     """
 
     name: str
     prepare: Callable[[], PreparedRun]
     out: Path
     finish: Finish | None = None
+    figures: bool = True
 
 
 def run_many(
@@ -180,7 +186,13 @@ def run_many(
 
         prepared = job.prepare()
         result = run_prepared(
-            prepared, job.out, progress=follow, finish=job.finish, tell=tell, several=several
+            prepared,
+            job.out,
+            progress=follow,
+            finish=job.finish,
+            tell=tell,
+            several=several,
+            figures=job.figures,
         )
         if done is not None:
             done(job, result)
