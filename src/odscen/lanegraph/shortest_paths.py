@@ -25,6 +25,10 @@ MIN_EDGE_LENGTH = 1e-6
 """Metres; scipy's sparse graphs drop edges of weight zero."""
 
 
+_FEW = 64
+"""Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
+
+
 class _PathFinder:
     """Shortest paths inside ``mask``; node numbers outside are the whole map's.
 
@@ -95,14 +99,30 @@ class _PathFinder:
     def leads(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
         """Whether a path leads from each source to the target in the same place; shape ``(K,)``.
 
-        One pass for all, whatever their number. Sources and targets lie in the region.
+        One pass for all, if they are many. Sources and targets lie in the region.
         """
+        if self._directed and len(sources) <= _FEW:
+            return self._lead_few(sources, targets)
         starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
         if not self._directed:
             return np.asarray(starts == ends, dtype=np.bool_)
         reached, columns = self._reached(ends)
         pairs = zip(starts.tolist(), ends.tolist(), strict=True)
         return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
+
+    def _lead_few(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
+        """The same, each source by itself."""
+        found = np.zeros(len(sources), dtype=np.bool_)
+        for source in np.unique(sources).tolist():
+            seen = np.zeros(len(self.nodes), dtype=np.bool_)
+            seen[
+                csgraph.breadth_first_order(
+                    self._matrix, int(self._local[source]), return_predecessors=False
+                )
+            ] = True
+            asked = sources == source
+            found[asked] = seen[self._local[targets[asked]]]
+        return found
 
     def reach(self, sources: Int32Array, targets: Int32Array) -> tuple[Int32Array, BoolArray]:
         """Which of the targets each source can get to.

@@ -81,7 +81,7 @@ def test_a_server_that_dies_during_a_run_costs_nothing(prepare: Prepare, tmp_pat
             killed.append(server_pid())
             os.kill(killed[0], signal.SIGKILL)
 
-    result = run_prepared(prepare(), tmp_path / "run", progress=kill, several=True)
+    result = run_prepared(prepare(), tmp_path / "run", progress=kill)
     assert killed
     assert result.status == "completed"
 
@@ -115,7 +115,7 @@ def test_where_no_server_starts_the_run_says_so(
     monkeypatch.setenv("ODSCEN_TEST_OTHER", "2")
     monkeypatch.setattr(forked_worker, "SERVER", "odscen.there_is_no_such_module")
     with pytest.raises(forked_worker.ResourceError, match="no process can be started"):
-        run_prepared(prepare(), tmp_path / "runs" / "run", several=True)
+        run_prepared(prepare(), tmp_path / "runs" / "run")
     assert list((tmp_path / "runs").iterdir()) == []
 
 
