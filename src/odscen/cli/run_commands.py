@@ -135,13 +135,14 @@ def run(
     warm_up: WarmUpOption = None,
     interval: IntervalOption = None,
     reports: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--report/--no-report",
-            help="Whether each run gets its report, which takes as long as a short run itself; "
-            "odscen report writes it later, from the same records.",
+            help="Whether each run gets its figures and its report, which take longer than a short "
+            "run itself, at once; otherwise when it is opened, from the same records. "
+            "(default: a single run does)",
         ),
-    ] = True,
+    ] = None,
     until_confident: Annotated[
         str | None,
         typer.Option(
@@ -159,7 +160,7 @@ def run(
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Run scenarios in SUMO, without a window; write records, events, figures and a report.
+    """Run scenarios in SUMO, without a window; write records and events, figures and a report.
 
     The first line of each run says whether its figures can be used; --expect usable fails one
     that is not, --expect criteria one that misses a criterion of its scenario. Exit code 0:
@@ -198,6 +199,8 @@ def run(
     )
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)
+    if reports is None:
+        reports = until_confident is None and len(paths) * len(seeds or (None,)) == 1
     if until_confident is not None:
         if seed is not None:
             raise typer.BadParameter("it takes several seeds, not --seed", param_hint="--seed")
@@ -336,8 +339,10 @@ def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> Non
         _say_verdicts(result)
         if result.status is RunStatus.FAILED:
             log(f"{result.folder.name}: {result.known['error']}")
+        elif result.report is not None:
+            log(f"Report: {result.report}")
         else:
-            log(f"Report: {result.report or result.folder}")
+            log(f"Records: {result.folder}; its report: odscen report {result.folder}")
 
 
 def _say_verdicts(result: Run) -> None:
