@@ -25,6 +25,7 @@ MIN_EDGE_LENGTH = 1e-6
 """Metres; scipy's sparse graphs drop edges of weight zero."""
 
 
+_KEPT = 2
 _FEW = 64
 """Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
 
@@ -32,8 +33,8 @@ _FEW = 64
 class _PathFinder:
     """Shortest paths inside ``mask``; node numbers outside are the whole map's.
 
-    An *end* is a node that is left by at most ``end_degree`` edges. The last source's tree is kept:
-    a caller asks for goals first and for the path to one of them next.
+    An *end* is a node that is left by at most ``end_degree`` edges. Trees of the last sources are
+    kept: a caller asks for goals of one or two first, and for the path to one of them next.
     """
 
     end_degree = 0
@@ -60,7 +61,7 @@ class _PathFinder:
         self.out_degree = np.bincount(rows, minlength=len(self.nodes))
         if not directed:
             self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
-        self._tree: tuple[int, FloatArray, Int32Array] | None = None
+        self._trees: tuple[tuple[int, FloatArray, Int32Array], ...] = ()
 
     def distances(self, source: int) -> FloatArray:
         """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
@@ -245,15 +246,17 @@ class _PathFinder:
         if not 0 <= source < len(self.mask) or not self.mask[source]:
             msg = f"{self._name(source)} is outside the region of interest"
             raise InputError(msg)
-        tree = self._tree  # other threads may ask for theirs
-        if tree is None or tree[0] != source:
+        trees = self._trees  # other threads may ask for theirs
+        tree = next((one for one in trees if one[0] == source), None)
+        if tree is None:
             distances, predecessors = csgraph.dijkstra(
                 self._matrix,
                 directed=self._directed,
                 indices=np.asarray(self._local[source]),
                 return_predecessors=True,
             )
-            tree = self._tree = source, distances, predecessors
+            tree = source, distances, predecessors
+            self._trees = (tree, *trees[: _KEPT - 1])
         return tree[1], tree[2]
 
     def _name(self, node: int) -> str:

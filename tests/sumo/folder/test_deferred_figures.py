@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,22 +18,28 @@ from odscen.sumo.folder.ended import RECORDS_ONLY
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.run_sums import damaged_in
 from odscen.sumo.realize.run_settings import RunSettings
-from odscen.sumo.runner.run_jobs import run_prepared
+from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
 from tests.sumo.conftest import Prepare
 
 CLOCK = ("wall_seconds", "real_time_factor")
 
 
 @pytest.fixture
-def waiting(prepare: Prepare, tmp_path: Path) -> Run:
+def prepared(prepare: Prepare) -> PreparedRun:
+    """Of a map, as all runs but those of other tests."""
+    return replace(prepare(), about={"map": "grid", "map_sha256": "0" * 64, "meso": False})
+
+
+@pytest.fixture
+def waiting(prepared: PreparedRun, tmp_path: Path) -> Run:
     """A run of which nobody has asked for figures."""
-    return run_prepared(prepare(), tmp_path / "waiting", figures=False)
+    return run_prepared(prepared, tmp_path / "waiting", figures=False)
 
 
 def test_a_run_that_is_opened_ends_with_the_bytes_of_one_that_was_measured_at_once(
-    prepare: Prepare, waiting: Run, tmp_path: Path
+    prepared: PreparedRun, waiting: Run, tmp_path: Path
 ) -> None:
-    measured = run_prepared(prepare(), tmp_path / "measured")
+    measured = run_prepared(prepared, tmp_path / "measured")
     assert not (waiting.folder / layout.FIGURES_FILE).exists()
     assert waiting.status == "completed"
     assert waiting.counts == measured.counts
@@ -71,24 +78,16 @@ def test_two_who_open_a_run_at_a_time_read_the_same(waiting: Run) -> None:
 def test_nothing_is_computed_from_damaged_records(waiting: Run) -> None:
     (waiting.folder / layout.ACTORS_FILE).write_text("{}", encoding="utf-8")
     for read in (measured_summary, whole_summary):
-        with pytest.raises(DamagedError, match="actors.json"):
+        with pytest.raises(DamagedError, match=r"actors\.json"):
             read(waiting.folder)
     assert not (waiting.folder / layout.FIGURES_FILE).exists()
 
 
 def test_what_is_expected_of_a_run_is_held_against_figures_at_once(
-    prepare: Prepare, tmp_path: Path
+    prepared: PreparedRun, tmp_path: Path
 ) -> None:
-    expected = (parse_expectation("mean_speed >= 1 km/h"),)
-    prepared = prepare()
-    settings = RunSettings(expectations=expected)
-    judged = run_prepared(
-        type(prepared)(
-            plan=prepared.plan, sumo_files=prepared.sumo_files, net=prepared.net, settings=settings
-        ),
-        tmp_path / "run",
-        figures=False,
-    )
+    settings = RunSettings(expectations=(parse_expectation("mean_speed >= 1 km/h"),))
+    judged = run_prepared(replace(prepared, settings=settings), tmp_path / "run", figures=False)
     assert RECORDS_ONLY not in judged.known
     assert judged.expectations_met
 
