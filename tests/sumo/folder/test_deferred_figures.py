@@ -32,7 +32,7 @@ def prepared(prepare: Prepare) -> PreparedRun:
 
 @pytest.fixture
 def waiting(prepared: PreparedRun, tmp_path: Path) -> Run:
-    """A run of which nobody has asked for figures."""
+    """A run whose figures have not been asked for."""
     return run_prepared(prepared, tmp_path / "waiting", figures=False)
 
 

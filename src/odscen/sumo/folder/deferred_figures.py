@@ -1,8 +1,8 @@
 """Figures of a run, computed at its end or when they are first asked for.
 
-The records of a run are always complete. Where nobody waits for figures, as in a batch of many
-runs, ``summary.json`` says ``"records_only": true`` and has none; whoever opens the run has them
-computed, and written as they would have been at its end, byte for byte.
+The records of a run are always complete. Where figures are not waited for, as in a batch of many
+runs, ``summary.json`` says ``"records_only": true`` and has none; they are computed when the run is
+opened, and written as they would have been at its end, byte for byte.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from odscen.results.measures.summary import ActorOutcome
 
 _PATIENCE = 60.0
-"""Wall seconds to wait for somebody else who computes the same."""
+"""Wall seconds to wait for another process that computes the same."""
 
 
 def compute_figures(

@@ -78,7 +78,7 @@ def main() -> int:
 def run_plan(plan_file: Path, how: Sequence[str] = (), *, raw: bool = False) -> int:
     """Run a plan, with the pace and the commands of ``how``; the exit code of the process.
 
-    With ``raw`` it may leave what SUMO has written to whoever follows it, see :class:`Done`.
+    With ``raw`` it may leave what SUMO has written to its reader, see :class:`Done`.
     """
     folder = plan_file.parent
     with in_use(folder), captured_output(folder / LOG_FILE) as stdout:
