@@ -359,7 +359,8 @@ def run_many(
     figures
         Whether figures of runs without a report are computed at once. Otherwise they are
         computed from its records when it is opened: by ``run.summary`` and ``run.figures``,
-        ``odscen report``, the page, comparisons. Where something is expected of a run they are computed at once.
+        ``odscen report``, the page, comparisons. Where something is expected of a run they are
+        computed at once.
     progress, done
         Called from the threads that wait for the runs, ``done`` in the order in which they end.
     tell
