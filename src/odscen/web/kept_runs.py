@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from odscen.base.checksums import read_checked, read_sums
 from odscen.base.durations import clock
-from odscen.base.errors import ConflictError, InputError, NotFoundError
+from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.deferred_figures import measured_summary
 from odscen.sumo.folder.ended import RECORDS_ONLY, read_summary
@@ -84,7 +84,7 @@ class KeptRuns:
 
     def complete(self, run: str) -> None:
         """Have the figures of a run computed if it has its records only; damage shows elsewhere."""
-        with suppress(InputError):
+        with suppress(OdscenError):
             if self._records_only(self.folder(run)):
                 self.whole(run)
 

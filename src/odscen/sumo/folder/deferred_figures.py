@@ -87,13 +87,16 @@ def measured_summary(run: Path) -> dict[str, Any]:
         If figures are to be computed from files that are not as they were written.
     ConflictError
         If another process works on the run.
-    OSError
+    WorkspaceError
         If they cannot be written.
     """
     summary = read_summary(run)
     if not summary.get(RECORDS_ONLY):
         return summary
-    with locked(run, what=f"run {run.name!r}", patience=_PATIENCE):
+    with (
+        disk_errors(f"run folder {run}"),
+        locked(run, what=f"run {run.name!r}", patience=_PATIENCE),
+    ):
         summary = read_summary(run)
         if not summary.pop(RECORDS_ONLY, False):  # another process has been quicker
             return summary

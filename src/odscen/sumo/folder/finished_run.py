@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args, get_type_hints
 
 from odscen.base.errors import InputError, NotFoundError, in_file
-from odscen.base.system_errors import disk_errors
 from odscen.results.by_place.lane_places import LanePlaces
 from odscen.results.measures.figure import Basis, SummaryPart
 from odscen.results.measures.registry import names_of, run_figure
@@ -88,8 +87,7 @@ class Run:
             If they are not, and the records of the run are not whole any more.
         """
         if self.known.get(RECORDS_ONLY):
-            with disk_errors(f"run folder {self.folder}"):
-                object.__setattr__(self, "known", measured_summary(self.folder))
+            object.__setattr__(self, "known", measured_summary(self.folder))
         return self.known
 
     @property
