@@ -23,7 +23,8 @@ def test_text_and_attributes_are_those_of_the_standard_library(text: str) -> Non
 def test_the_command_line_starts_without_tables_and_without_a_client_for_the_network() -> None:
     code = (
         "import sys, odscen.cli, odscen.app.runs;"
-        "print([name for name in ('polars', 'urllib.request', 'ssl') if name in sys.modules])"
+        "names = 'polars', 'shapely', 'urllib.request', 'ssl';"
+        "print([name for name in names if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
