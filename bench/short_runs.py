@@ -3,8 +3,9 @@
 Aim: at most 1.5 times the CPU of the pool, and one run alone at most 0.6 s. The pool has two
 processes that keep libsumo loaded and go through the same SUMO files, with the same outputs and
 the same allocator; it checks nothing and makes no figures. odscen's side has everything, from the
-start of ``odscen run``; once with reports, and once without. Its modules are compiled, as those of
-an installed package are, whatever ``PYTHONDONTWRITEBYTECODE`` says.
+start of ``odscen run``: with complete records, with figures, too, and with reports, too. Its
+modules are compiled, as those of an installed package are, whatever ``PYTHONDONTWRITEBYTECODE``
+says. ``--actors`` and ``--seconds`` measure larger runs by the same rule.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 from odscen.app.scenarios import GenerationSettings, generate
 from odscen.scenario.document.sampling_config import SamplingConfig
@@ -53,57 +55,76 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="bench short_runs")
     options.add_argument("--runs", type=int, default=20, help="scenarios")
     options.add_argument("--repeats", type=int, default=3, help="rounds; medians are shown")
+    options.add_argument("--actors", type=int, default=ACTORS, help="of each scenario")
+    options.add_argument("--seconds", type=float, default=SECONDS, help="of each scenario")
+    options.add_argument("--map", type=Path, default=MAP, help="file with the map")
     asked = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="odscen-bench-") as name:
-        compare(Path(name), runs=asked.runs, repeats=asked.repeats)
+        size = Size(asked.map, asked.actors, asked.seconds)
+        compare(Path(name), size, runs=asked.runs, repeats=asked.repeats)
 
 
-def compare(folder: Path, *, runs: int, repeats: int) -> None:
-    scenarios = _scenarios(folder, runs)
+class Size(NamedTuple):
+    """Map, actors and simulated seconds of each scenario."""
+
+    map: Path
+    actors: int
+    seconds: float
+
+
+def compare(folder: Path, size: Size, *, runs: int, repeats: int) -> None:
+    scenarios = _scenarios(folder, size, runs)
     script = folder / "pool.py"
-    script.write_text(_POOL % (SECONDS, JOBS), encoding="utf-8")
+    script.write_text(_POOL % (size.seconds, JOBS), encoding="utf-8")
     out = folder / "runs"
-    batch = _command(folder, out, scenarios)
-    _cpu(batch)
+    kinds = {
+        "records": ["--no-report"],
+        "figures": ["--no-report", "--json"],
+        "reports": ["--report"],
+    }
+    batches = {kind: _command(folder, out, scenarios, *more) for kind, more in kinds.items()}
+    lone = {
+        kind: _command(folder, folder / "alone", scenarios[:1], *more)
+        for kind, more in kinds.items()
+    }
+    _cpu(batches["records"])
     configs = sorted(out.glob(f"*/{layout.SUMO_FOLDER}/{layout.CONFIG_FILE}"))
     bare = folder / "bare"
     for config in configs:
         shutil.copytree(config.parent, bare / config.parent.parent.name)
     given = "\n".join(str(bare / one.parent.parent.name / one.name) for one in configs)
-    rounds = [
-        (
-            _cpu([sys.executable, str(script)], given=given),
-            _cpu(batch),
-            _cpu([*batch, "--no-report"]),
-            _cpu(_command(folder, folder / "alone", scenarios[:1])),
-            _cpu([*_command(folder, folder / "alone", scenarios[:1]), "--no-report"]),
-        )
-        for _ in range(repeats)
-    ]
-    for row, words in ((1, "with reports"), (2, "without reports")):
-        each = statistics.median(one[row][0] for one in rounds) / runs
-        peer = statistics.median(one[0][0] for one in rounds) / runs
-        ratio = statistics.median(one[row][0] / one[0][0] for one in rounds)
+    pool: list[float] = []
+    spent: dict[str, list[float]] = {kind: [] for kind in kinds}
+    alone: dict[str, list[tuple[float, float]]] = {kind: [] for kind in kinds}
+    for _ in range(repeats):
+        pool.append(_cpu([sys.executable, str(script)], given=given)[0])
+        for kind in kinds:
+            spent[kind].append(_cpu(batches[kind])[0])
+            alone[kind].append(_cpu(lone[kind]))
+    peer = statistics.median(pool) / runs
+    for kind in kinds:
+        each = statistics.median(spent[kind]) / runs
+        ratio = statistics.median(a / b for a, b in zip(spent[kind], pool, strict=True))
         print(
-            f"{runs} runs of {ACTORS} actors, {SECONDS:g} s, {JOBS} at a time, {words}: "
+            f"{runs} runs of {size.actors} actors, {size.seconds:g} s, {JOBS} at a time, {kind}: "
             f"odscen {each:.3f} CPU s each, bare pool {peer:.3f}, ratio {ratio:.2f} (aim 1.5)"
         )
-        cpu, wall = (statistics.median(one[row + 2][part] for one in rounds) for part in (0, 1))
-        print(f"one alone, {words}: {wall:.2f} s, {cpu:.2f} CPU s (aim 0.6 s)")
+        cpu, wall = (statistics.median(one[part] for one in alone[kind]) for part in (0, 1))
+        print(f"one alone, {kind}: {wall:.2f} s, {cpu:.2f} CPU s (aim 0.6 s)")
 
 
-def _scenarios(folder: Path, number: int) -> list[Path]:
+def _scenarios(folder: Path, size: Size, number: int) -> list[Path]:
     workspace = Workspace.open(folder / "workspace")
-    workspace.add_map(MAP)
-    config = SamplingConfig(actors_max=ACTORS, duration=SECONDS)
-    settings = GenerationSettings(map_name=MAP.stem, count=number, fill=1.0, config=config)
+    workspace.add_map(size.map)
+    config = SamplingConfig(actors_max=size.actors, duration=size.seconds)
+    settings = GenerationSettings(map_name=size.map.stem, count=number, fill=1.0, config=config)
     return list(generate(workspace, settings=settings))
 
 
-def _command(folder: Path, out: Path, scenarios: list[Path]) -> list[str]:
+def _command(folder: Path, out: Path, scenarios: list[Path], *more: str) -> list[str]:
     command = [sys.executable, "-m", "odscen", "run", *map(str, scenarios)]
     command += ["--workspace", str(folder / "workspace"), "--out", str(out)]
-    return [*command, "--jobs", str(JOBS)]
+    return [*command, "--jobs", str(JOBS), *more]
 
 
 def _cpu(command: list[str], *, given: str = "") -> tuple[float, float]:

@@ -18,7 +18,7 @@ from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.results.report.report_map import fitted_view, scale_bar, view_box
 from odscen.results.report.report_parking import parking_layer
 from odscen.scenario.document.scenario_document import MapReference, Scenario
-from odscen.sumo.outputs.measured import read_parking
+from odscen.sumo.folder.measured import read_parking
 from odscen.sumo.realize.transit.parking_places import parking_positions, planned_parking
 from odscen.workspace.store import Workspace
 

@@ -70,6 +70,29 @@ def test_a_run_without_a_report_has_the_same_records_and_gets_one_later(
     assert odscen("report", run, *options).code == 0, "its checksum is known"
 
 
+def test_several_runs_have_their_records_and_the_rest_when_they_are_opened(
+    workspace, scenario, tmp_path
+):
+    options = ("--out", tmp_path, "--workspace", workspace)
+    done = odscen("run", scenario, "--seeds", "2", "--until", "20", *options)
+    assert done.code == 0, done.err
+    runs = sorted(tmp_path.glob("*-seed-*"))
+    assert len(runs) == 2
+    for run in runs:
+        assert f"its report: odscen report {run}" in done.err
+        assert json.loads((run / "summary.json").read_text())["records_only"]
+        assert (run / "trips.parquet").is_file()
+        assert not (run / "figures.json").exists()
+        assert not (run / "report.html").exists()
+    assert odscen("report", runs[0], "--workspace", workspace).code == 0
+    assert (runs[0] / "report.html").is_file()
+    assert odscen("compare", *runs).code in (0, 1)
+    for run in runs:
+        summary = json.loads((run / "summary.json").read_text())
+        assert "records_only" not in summary
+        assert summary["figures"]["vehicle_km"] > 0.0
+
+
 def test_a_run_gives_what_scripts_rely_on(finished):
     assert list(finished)[2:4] == ["usable", "status"], "the verdict comes first"
     assert finished["usable"] == {"level": "usable", "headline": "usable", "reasons": []}

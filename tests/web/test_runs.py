@@ -194,6 +194,8 @@ def test_a_finished_run_has_figures_a_report_and_a_replay(
     info = finished(client, run)
     assert client.get(f"/api/runs/{run}/summary").json() == info["summary"]
     assert "<html" in client.get(f"/api/runs/{run}/report.html").text
+    (workspace.runs / run / "report.html").unlink()
+    assert "<html" in client.get(f"/api/runs/{run}/report.html").text, "it is written when opened"
     truth = recorded(workspace, run)
     for every in (1, 4):
         replay = client.get(f"/api/runs/{run}/trajectories?every={every}").json()

@@ -198,7 +198,7 @@ def run_until_confident(
     while True:
         done += run_many(
             workspace, [scenario], settings=settings, seeds=batch, out=out, processes=processes,
-            reports=reports, tell=tell,
+            reports=reports, figures=reports, tell=tell,
         )  # fmt: skip
         found = confidence_of(
             [_value(run, figure) for run in done],
@@ -221,4 +221,4 @@ def _completed(run: Run) -> bool:
 
 def _value(run: Run, figure: str) -> float | None:
     entry = run_figure(figure)
-    return entry.of_summary(run.summary) if entry is not None and _completed(run) else None
+    return run.value_of(entry) if entry is not None and _completed(run) else None

@@ -191,7 +191,7 @@ def _happened(folder: Path) -> WhatHappened:
         plan = Plan.from_json(file.read_text(encoding="utf-8"))
     times = rows["time"].unique().sort().to_list()
     step = min((b - a for a, b in pairwise(times)), default=plan.step_length)
-    ended = run.summary["sim_seconds"]
+    ended = run.known["sim_seconds"]
     until = float(times[-1] if ended is None else ended)
     if not plan.elevation and "z" in rows.columns:  # SUMO's network is flat, the map is not
         rows = rows.drop("z")

@@ -320,7 +320,7 @@ def _carried(
         for converter, entry in entries.items()
         for seed in settings.seeds
     ]
-    ended = run_all(jobs, processes=processes, reports=False)
+    ended = run_all(jobs, processes=processes, reports=False, figures=False)
     by_converter: dict[ConverterName, list[CarriedTraffic]] = {}
     for converter, run in zip(
         [name for name in entries for _ in settings.seeds], ended, strict=True
@@ -333,10 +333,10 @@ def _carried(
 
 
 def _of_run(run: Run) -> CarriedTraffic:
-    if run.summary["error"]:
-        msg = f"a run of the comparison failed: {run.summary['error']}"
+    if run.known["error"]:
+        msg = f"a run of the comparison failed: {run.known['error']}"
         raise ToolError(msg)
-    end, counts = float(run.summary["sim_seconds"]), run.counts
+    end, counts = float(run.known["sim_seconds"]), run.counts
     delays = [
         max(end - row["depart"], 0.0)
         if row["inserted"] is None

@@ -27,7 +27,9 @@ from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.run_report import render_report
 from odscen.results.report.signals.report_signals import LightsOfRun
 from odscen.sumo.folder import layout
+from odscen.sumo.folder.deferred_figures import whole_summary
 from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.folder.measured import read_parking, read_run_data
 from odscen.sumo.folder.recorded import (
     read_conflicts,
     read_light_states,
@@ -35,9 +37,8 @@ from odscen.sumo.folder.recorded import (
     read_visits,
 )
 from odscen.sumo.folder.run_status import unfinished
-from odscen.sumo.folder.run_sums import damaged_in, seal_again, whole_summary
+from odscen.sumo.folder.run_sums import damaged_in, seal_again
 from odscen.sumo.outputs.corridor_traces import corridor_traces
-from odscen.sumo.outputs.measured import read_parking, read_run_data
 from odscen.sumo.runner.long_runs import run_lock
 
 if TYPE_CHECKING:
@@ -201,6 +202,7 @@ def renew_report(
         If a file of the run is not as it was written; that of the report is reported only.
     """
     folder = _folder_of(workspace, run)
+    _completed(folder)  # which may have figures computed, and takes the run's lock for that
     own = out is None and not unfinished(folder)
     with run_lock(folder) if own else nullcontext():
         summary = _completed(folder)

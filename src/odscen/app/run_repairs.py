@@ -24,9 +24,9 @@ from odscen.results.records.run_records import Plan
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.checkpoint import last_number, read_checkpoint
 from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.measured import read_run_data, write_figures
 from odscen.sumo.folder.run_status import read_status, unfinished, write_status
 from odscen.sumo.folder.run_sums import damaged_in, seal_again, seal_run, seal_start, without_sums
-from odscen.sumo.outputs.measured import read_run_data, write_figures
 from odscen.sumo.runner.long_runs import about, run_lock
 
 if TYPE_CHECKING:

@@ -226,6 +226,7 @@ def run_all(
     *,
     processes: int = 1,
     reports: bool = True,
+    figures: bool = True,
     progress: Callable[[RunJob, Progress], None] | None = None,
     done: Callable[[RunJob, Run], None] | None = None,
     refused: Callable[[RunJob, InputError], None] | None = None,
@@ -239,6 +240,8 @@ def run_all(
         How many run at a time.
     reports
         Whether reports are written.
+    figures
+        Whether figures of runs without a report are computed at once, see :func:`run_many`.
     progress, done
         Called from the threads that wait for the runs, ``done`` in the order in which they end.
     refused
@@ -252,7 +255,7 @@ def run_all(
     tuple of Run
         In the order of ``runs``, without those refused.
     """
-    jobs = [_job(run, report=reports, tell=tell) for run in runs]
+    jobs = [_job(run, report=reports, figures=figures, tell=tell) for run in runs]
     return run_jobs(
         jobs, processes=processes, progress=progress, done=done, refused=refused, tell=tell
     )
@@ -330,6 +333,7 @@ def run_many(
     out: Path | None = None,
     processes: int = 1,
     reports: bool = True,
+    figures: bool = True,
     progress: Callable[[RunJob, Progress], None] | None = None,
     done: Callable[[RunJob, Run], None] | None = None,
     tell: Callable[[str], None] | None = None,
@@ -352,6 +356,11 @@ def run_many(
         How many run at a time.
     reports
         Whether reports are written; :func:`odscen.app.reports.renew_report` writes one later.
+    figures
+        Whether figures of runs without a report are computed at once. Otherwise they are
+        computed from its records when it is opened: by ``run.summary`` and ``run.figures``,
+        ``odscen report``, the page, comparisons. Where something is expected of a run they are
+        computed at once.
     progress, done
         Called from the threads that wait for the runs, ``done`` in the order in which they end.
     tell
@@ -379,11 +388,19 @@ def run_many(
         checked = check_given(workspace, scenario, name=own, out=out, settings=settings)
         runs += [checked] if seeds is None else [_with_seed(checked, seed) for seed in seeds]
     return run_all(
-        runs, processes=processes, reports=reports, progress=progress, done=done, tell=tell
+        runs,
+        processes=processes,
+        reports=reports,
+        figures=figures,
+        progress=progress,
+        done=done,
+        tell=tell,
     )
 
 
-def _job(run: CheckedRun, *, report: bool, tell: Callable[[str], None] | None) -> RunJob:
+def _job(
+    run: CheckedRun, *, report: bool, figures: bool, tell: Callable[[str], None] | None
+) -> RunJob:
     kept: list[LoadedMap] = []  # the map may be removed while the run goes on
 
     def get_ready() -> PreparedRun:
@@ -397,7 +414,7 @@ def _job(run: CheckedRun, *, report: bool, tell: Callable[[str], None] | None) -
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
         _report(folder, summary, kept.pop())
 
-    return RunJob(run.name, get_ready, run.folder, finish if report else None)
+    return RunJob(run.name, get_ready, run.folder, finish if report else None, figures)
 
 
 def _report(folder: Path, summary: Mapping[str, Any], loaded: LoadedMap) -> None:

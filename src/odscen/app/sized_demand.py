@@ -234,9 +234,7 @@ class _Trials:
             )
             prepared = prepare_run(checked)
             try:
-                run = run_prepared(
-                    prepared, checked.folder, progress=_limit(prepared.plan), several=True
-                )
+                run = run_prepared(prepared, checked.folder, progress=_limit(prepared.plan))
                 level, headline = (run.usability[key] for key in ("level", "headline"))
             except _BacklogError:
                 level = UsabilityLevel.NOT_USABLE

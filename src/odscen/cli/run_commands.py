@@ -135,13 +135,14 @@ def run(
     warm_up: WarmUpOption = None,
     interval: IntervalOption = None,
     reports: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--report/--no-report",
-            help="Whether each run gets its report, which takes as long as a short run itself; "
-            "odscen report writes it later, from the same records.",
+            help="Whether each run gets its figures and its report, which take longer than a short "
+            "run itself, at once; otherwise when it is opened, from the same records. "
+            "(default: a single run does)",
         ),
-    ] = True,
+    ] = None,
     until_confident: Annotated[
         str | None,
         typer.Option(
@@ -159,7 +160,7 @@ def run(
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Run scenarios in SUMO, without a window; write records, events, figures and a report.
+    """Run scenarios in SUMO, without a window; write records and events, figures and a report.
 
     The first line of each run says whether its figures can be used; --expect usable fails one
     that is not, --expect criteria one that misses a criterion of its scenario. Exit code 0:
@@ -198,6 +199,8 @@ def run(
     )
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)
+    if reports is None:
+        reports = until_confident is None and len(paths) * len(seeds or (None,)) == 1
     if until_confident is not None:
         if seed is not None:
             raise typer.BadParameter("it takes several seeds, not --seed", param_hint="--seed")
@@ -216,6 +219,7 @@ def run(
             out=out,
             processes=jobs,
             reports=reports,
+            figures=reports or as_json,
             progress=_follow(step, len(paths) * len(seeds or (None,))),
             tell=log,
         )
@@ -271,12 +275,16 @@ def _run_until_confident(
 def _warn_of_seeds(results: Sequence[Run], seeds: int) -> None:
     """Say of which scenario the seeds hardly vary; runs of one scenario follow each other."""
     from odscen.regression.scatter import VARYING, hardly_varying
+    from odscen.results.measures.registry import run_figure
 
+    figure = run_figure(VARYING)
+    if figure is None:
+        return
     for first in range(0, len(results), seeds):
         runs = [run for run in results[first : first + seeds] if run.status is RunStatus.COMPLETED]
-        words = hardly_varying([run.summary["figures"].get(VARYING) for run in runs])
+        words = hardly_varying([run.value_of(figure) for run in runs])
         if words is not None:
-            log(f"{runs[0].summary['scenario']}: {words}")
+            log(f"{runs[0].known['scenario']}: {words}")
 
 
 def resume(
@@ -320,7 +328,7 @@ def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> Non
         keys = ("planned", "inserted", "arrived", "teleported", "collided")
         rows = []
         for result in results:
-            counts = result.summary["actors"]
+            counts = result.known["actors"]
             verdict = result.status if result.expectations_met else "expectation failed"
             level = result.usability.get("level")
             if result.status is RunStatus.COMPLETED and level != UsabilityLevel.USABLE:
@@ -330,9 +338,11 @@ def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> Non
     for result in results:
         _say_verdicts(result)
         if result.status is RunStatus.FAILED:
-            log(f"{result.folder.name}: {result.summary['error']}")
+            log(f"{result.folder.name}: {result.known['error']}")
+        elif result.report is not None:
+            log(f"Report: {result.report}")
         else:
-            log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
+            log(f"Records: {result.folder}; its report: odscen report {result.folder}")
 
 
 def _say_verdicts(result: Run) -> None:
@@ -340,10 +350,10 @@ def _say_verdicts(result: Run) -> None:
     from odscen.results.judging.criteria import missed_words
     from odscen.results.judging.expectations import CRITERIA, USABLE
 
-    for row in result.summary.get("criteria") or ():
+    for row in result.known.get("criteria") or ():
         met = f"met: {row['words']}" if row["passed"] else f"not met: {missed_words(row)}"
         log(visible(f"{result.folder.name}: {met}"))
-    for verdict in result.summary["expectations"]:
+    for verdict in result.known["expectations"]:
         if verdict["passed"] or verdict["expectation"] == CRITERIA.text:
             continue
         own = result.usability.get("headline") if verdict["expectation"] == USABLE.text else None

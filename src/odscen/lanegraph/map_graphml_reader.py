@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-from lxml import etree
 
 from odscen.base.errors import GraphFormatError
 from odscen.base.ids import JunctionId, LaneKey, RoadId, SegmentId
@@ -57,6 +56,8 @@ def from_graphml(data: bytes, *, file: str | None = None) -> MapGraph:
     GraphFormatError
         If the bytes are not such a document.
     """
+    from lxml import etree
+
     try:
         return check_map_graph(_map_graph(_parse(data)))
     except GraphFormatError as error:
@@ -68,6 +69,8 @@ def from_graphml(data: bytes, *, file: str | None = None) -> MapGraph:
 
 
 def _parse(data: bytes) -> _GraphmlDocument:
+    from lxml import etree
+
     document = _GraphmlDocument()
     names: dict[str, str] = {}
     tags = [NAMESPACE + tag for tag in ("key", "node", "edge", "graph")]

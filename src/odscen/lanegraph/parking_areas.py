@@ -12,10 +12,11 @@ from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import shapely
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+    import shapely
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.lanegraph.graphs import LaneGraph
@@ -128,6 +129,8 @@ def map_parking(
 
 def _places_of(outline: FloatArray) -> Iterator[ParkingPlace]:
     """Yield the place, or the row of places, that an outline is; nothing if it is neither."""
+    import shapely
+
     sides = np.roll(outline, -1, axis=0) - outline
     longest = sides[int(np.argmax(np.hypot(*sides.T)))]
     hdg = math.atan2(longest[1], longest[0])
@@ -201,6 +204,8 @@ class _Beside:
 
     def cut(self, outline: FloatArray) -> Iterator[_Reached]:
         """Yield the places on a parking lane, along the nearest lane beside it."""
+        import shapely
+
         polygon = shapely.make_valid(shapely.polygons(outline))
         hits = self._hits(outline, polygon)
         if hits is None:
@@ -218,6 +223,8 @@ class _Beside:
 
         All shape ``(n,)``; metres from the centre of the node's lane.
         """
+        import shapely
+
         low, high = outline.min(axis=0) - 12.0, outline.max(axis=0) + 12.0
         xy = self._xy[self._nodes]
         nodes = self._nodes[np.all((xy >= low) & (xy <= high), axis=1)]

@@ -25,11 +25,16 @@ MIN_EDGE_LENGTH = 1e-6
 """Metres; scipy's sparse graphs drop edges of weight zero."""
 
 
+_KEPT = 2
+_FEW = 64
+"""Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
+
+
 class _PathFinder:
     """Shortest paths inside ``mask``; node numbers outside are the whole map's.
 
-    An *end* is a node that is left by at most ``end_degree`` edges. The last source's tree is kept:
-    a caller asks for goals first and for the path to one of them next.
+    An *end* is a node that is left by at most ``end_degree`` edges. Trees of the last sources are
+    kept: a caller asks for goals of one or two first, and for the path to one of them next.
     """
 
     end_degree = 0
@@ -56,7 +61,7 @@ class _PathFinder:
         self.out_degree = np.bincount(rows, minlength=len(self.nodes))
         if not directed:
             self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
-        self._tree: tuple[int, FloatArray, Int32Array] | None = None
+        self._trees: tuple[tuple[int, FloatArray, Int32Array], ...] = ()
 
     def distances(self, source: int) -> FloatArray:
         """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
@@ -95,14 +100,30 @@ class _PathFinder:
     def leads(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
         """Whether a path leads from each source to the target in the same place; shape ``(K,)``.
 
-        One pass for all, whatever their number. Sources and targets lie in the region.
+        One pass for all, if they are many. Sources and targets lie in the region.
         """
+        if self._directed and len(sources) <= _FEW:
+            return self._lead_few(sources, targets)
         starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
         if not self._directed:
             return np.asarray(starts == ends, dtype=np.bool_)
         reached, columns = self._reached(ends)
         pairs = zip(starts.tolist(), ends.tolist(), strict=True)
         return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
+
+    def _lead_few(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
+        """The same, each source by itself."""
+        found = np.zeros(len(sources), dtype=np.bool_)
+        for source in np.unique(sources).tolist():
+            seen = np.zeros(len(self.nodes), dtype=np.bool_)
+            seen[
+                csgraph.breadth_first_order(
+                    self._matrix, int(self._local[source]), return_predecessors=False
+                )
+            ] = True
+            asked = sources == source
+            found[asked] = seen[self._local[targets[asked]]]
+        return found
 
     def reach(self, sources: Int32Array, targets: Int32Array) -> tuple[Int32Array, BoolArray]:
         """Which of the targets each source can get to.
@@ -225,15 +246,17 @@ class _PathFinder:
         if not 0 <= source < len(self.mask) or not self.mask[source]:
             msg = f"{self._name(source)} is outside the region of interest"
             raise InputError(msg)
-        tree = self._tree  # other threads may ask for theirs
-        if tree is None or tree[0] != source:
+        trees = self._trees  # other threads may ask for theirs
+        tree = next((one for one in trees if one[0] == source), None)
+        if tree is None:
             distances, predecessors = csgraph.dijkstra(
                 self._matrix,
                 directed=self._directed,
                 indices=np.asarray(self._local[source]),
                 return_predecessors=True,
             )
-            tree = self._tree = source, distances, predecessors
+            tree = source, distances, predecessors
+            self._trees = (tree, *trees[: _KEPT - 1])
         return tree[1], tree[2]
 
     def _name(self, node: int) -> str:

@@ -18,9 +18,9 @@ from odscen.results.measures.traffic_files import read_tables
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.report.place_shapes import place_shapes
 from odscen.scenario.document.json_form import loads
+from odscen.sumo.folder.deferred_figures import whole_summary
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.layout import FIGURES_FOLDER, SCENARIO_FILE, SUMMARY_FILE
-from odscen.sumo.folder.run_sums import whole_summary
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

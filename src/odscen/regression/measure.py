@@ -13,7 +13,7 @@ from odscen.results.measures.registry import ACTOR_FIGURES, COUNTS, SEGMENT_FIGU
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.outcomes import RunStatus
 from odscen.sumo.folder import layout
-from odscen.sumo.outputs.measured import read_figures
+from odscen.sumo.folder.measured import read_figures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
 from odscen.base.checksums import read_checked, read_sums
 from odscen.base.durations import clock
-from odscen.base.errors import ConflictError, InputError, NotFoundError
+from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.deferred_figures import measured_summary
+from odscen.sumo.folder.ended import RECORDS_ONLY, read_summary
 from odscen.sumo.folder.run_status import going, read_status, unfinished, unfinished_words
 from odscen.sumo.folder.run_sums import REPAIR, check_run_files
 from odscen.sumo.runner.long_runs import about
@@ -59,7 +61,7 @@ class KeptRuns:
         return folder
 
     def whole(self, run: str) -> Path:
-        """Folder of a run whose files are all as they were written.
+        """Folder of a run whose files are all as they were written, with all of its figures.
 
         They are compared with their checksums when a run is opened first, and after any change.
 
@@ -74,8 +76,24 @@ class KeptRuns:
         states = _states(folder)
         if self._checked.get(run) != states:
             check_run_files(folder)
+            if self._records_only(folder):
+                measured_summary(folder)
+                states = _states(folder)
             self._checked[run] = states
         return folder
+
+    def complete(self, run: str) -> None:
+        """Have the figures of a run computed if it has its records only; damage shows elsewhere."""
+        with suppress(OdscenError):
+            if self._records_only(self.folder(run)):
+                self.whole(run)
+
+    def _records_only(self, folder: Path) -> bool:
+        """Whether its figures have not been computed yet."""
+        try:
+            return not unfinished(folder) and bool(read_summary(folder).get(RECORDS_ONLY))
+        except InputError:
+            return False
 
     def finished_file(self, run: str, name: str) -> Path:
         """A file that a run has written at its end.

@@ -100,6 +100,7 @@ def resume(run: str, wish: GoOn, shared: Shared) -> RunStarted:
 @router.get("/{run}")
 def show(run: str, shared: Shared) -> RunInfo:
     """One run, with its summary once it has ended."""
+    shared.runs.kept.complete(run)
     return shared.runs.info(run)
 
 
@@ -111,7 +112,16 @@ def control(run: str, wish: RunControl, shared: Shared) -> RunInfo:
 
 @router.get("/{run}/report.html", response_class=Response, responses=HTML)
 def report(run: str, shared: Shared) -> Response:
-    """Report of a completed run."""
+    """Report of a completed run, which is written if it is not there."""
+    kept = shared.runs.kept
+    info = kept.info(run)
+    if (
+        info.state in ("completed", "stopped")
+        and not (kept.whole(run) / layout.REPORT_FILE).exists()
+    ):
+        from odscen.app.reports import renew_report
+
+        renew_report(shared.workspace, kept.folder(run))
     return page_of_run(shared, run, layout.REPORT_FILE)
 
 

@@ -11,8 +11,8 @@ from odscen.results.by_place.corridors import busiest_corridor, corridor_along, 
 from odscen.results.by_place.traffic import over_run
 from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.report_corridor import NONE_RECORDED
+from odscen.sumo.folder.measured import read_figures
 from odscen.sumo.outputs.corridor_traces import corridor_traces
-from odscen.sumo.outputs.measured import read_figures
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared

@@ -17,7 +17,7 @@ import pytest
 from odscen.results.measures.registry import figure_values
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.measures.timetable import stops_served
-from odscen.sumo.outputs.measured import read_run_data
+from odscen.sumo.folder.measured import read_run_data
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.parking_case import PLACES, parking_scenario, parking_town

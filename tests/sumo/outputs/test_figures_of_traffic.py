@@ -36,8 +36,8 @@ from odscen.results.measures.figure import RunData
 from odscen.results.measures.registry import figure_values
 from odscen.results.records.planned_stations import PlannedStation, StationKind
 from odscen.sumo.folder import layout
+from odscen.sumo.folder.net_facts import read_net_facts
 from odscen.sumo.outputs.lane_measures import lane_table
-from odscen.sumo.outputs.net_facts import read_net_facts
 from odscen.sumo.outputs.trip_table import trip_table
 from odscen.sumo.realize.measure_files import measures_xml
 from odscen.sumo.realize.sumo_lane_places import lane_places

@@ -22,7 +22,7 @@ from odscen.results.by_place.facility_levels import place_level
 from odscen.results.by_place.group_figures import group_rates, group_sums
 from odscen.results.by_place.queue_metres import GAP, QUEUED
 from odscen.sumo.folder import layout
-from odscen.sumo.outputs.net_facts import read_net_facts
+from odscen.sumo.folder.net_facts import read_net_facts
 from odscen.sumo.realize.sumo_lane_places import lane_places
 from tests.sumo.conftest import BIN
 from tests.sumo.runner.test_on_maps import built, net_file

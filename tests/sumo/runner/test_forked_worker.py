@@ -4,11 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
+from odscen.base.errors import SimulationError
 from odscen.sumo.folder import layout
+from odscen.sumo.outputs.output_tables import make_tables
 from odscen.sumo.runner import forked_worker
 from odscen.sumo.runner.run_folder import write_run_folder
 from odscen.sumo.runner.run_jobs import run_prepared
@@ -46,6 +49,39 @@ def test_a_forked_process_records_the_bytes_of_one_that_was_started(
     assert made(prepare, tmp_path / "second", forked=True) == fresh
 
 
+def test_tables_that_are_left_to_us_are_those_that_the_process_makes(
+    prepare: Prepare, tmp_path: Path
+) -> None:
+    fresh = made(prepare, tmp_path / "fresh", forked=True)
+    folder, prepared = tmp_path / "raw", prepare()
+    folder.mkdir()
+    write_run_folder(prepared, folder)
+    asked = []
+
+    def tables(lengths: Mapping[str, Mapping[str, float]]) -> None:
+        asked.append((folder / layout.TRIPINFO_FILE).is_file())
+        make_tables(folder, prepared.plan, lengths)
+
+    assert run_worker(folder, forked=True, tables=tables).error is None
+    assert asked == [True]
+    assert {name: (folder / name).read_bytes() for name in RECORDS} == fresh
+
+
+def test_records_that_cannot_be_made_into_tables_fail_their_run(
+    prepare: Prepare, tmp_path: Path
+) -> None:
+    write_run_folder(prepare(), tmp_path)
+
+    def torn(_lengths: Mapping[str, Mapping[str, float]]) -> None:
+        msg = "SUMO has not written its measurements to the end"
+        raise SimulationError(msg)
+
+    ended = run_worker(tmp_path, forked=True, tables=torn)
+    assert ended.done is None
+    assert ended.error is not None
+    assert ended.error.startswith("SUMO has not written")
+
+
 def test_a_crash_of_sumo_ends_one_run_and_leaves_the_next_alone(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -81,7 +117,7 @@ def test_a_server_that_dies_during_a_run_costs_nothing(prepare: Prepare, tmp_pat
             killed.append(server_pid())
             os.kill(killed[0], signal.SIGKILL)
 
-    result = run_prepared(prepare(), tmp_path / "run", progress=kill, several=True)
+    result = run_prepared(prepare(), tmp_path / "run", progress=kill)
     assert killed
     assert result.status == "completed"
 
@@ -115,7 +151,7 @@ def test_where_no_server_starts_the_run_says_so(
     monkeypatch.setenv("ODSCEN_TEST_OTHER", "2")
     monkeypatch.setattr(forked_worker, "SERVER", "odscen.there_is_no_such_module")
     with pytest.raises(forked_worker.ResourceError, match="no process can be started"):
-        run_prepared(prepare(), tmp_path / "runs" / "run", several=True)
+        run_prepared(prepare(), tmp_path / "runs" / "run")
     assert list((tmp_path / "runs").iterdir()) == []
 
 

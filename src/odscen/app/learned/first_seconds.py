@@ -61,10 +61,10 @@ def first_seconds(workspace: Workspace, scenarios: Sequence[Scenario]) -> list[F
             for place, one in enumerate(scenarios)
         ]
         found = []
-        for run in run_all(checked, reports=False):
+        for run in run_all(checked, reports=False, figures=False):
             if run.exit_code == 3:
-                msg = f"the run has failed: {run.summary.get('error')}"
-                raise InputError(msg, file=run.summary.get("scenario"))
+                msg = f"the run has failed: {run.known.get('error')}"
+                raise InputError(msg, file=run.known.get("scenario"))
             rows = run.trajectories()
             rows = rows.filter(rows["category"] != str(Category.PEDESTRIAN))
             first = rows.filter(rows["time"] < STEP / 2.0)["id"].to_list()

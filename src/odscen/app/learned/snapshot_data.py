@@ -213,7 +213,7 @@ def _attempted(
             out=Path(folder),
             settings=RunSettings(recording=Recording(emissions=False)),
         )
-        (run,) = run_all([checked], reports=False)
+        (run,) = run_all([checked], reports=False, figures=False)
         why, snapshots = _judged(run, loaded, settings, seed)
     if why is not None:
         return MadeShard(file, 0, why)
@@ -262,7 +262,7 @@ def _judged(
 ) -> tuple[str | None, tuple[Snapshot, ...]]:
     """Why a run is left out, or its snapshots."""
     if run.exit_code == 3:
-        return f"the run has failed: {run.summary.get('error')}", ()
+        return f"the run has failed: {run.known.get('error')}", ()
     bad = [one["words"] for one in run.usability.get("reasons", ()) if one["kind"] == "gridlock"]
     if bad:
         return f"gridlocked: {bad[0]}", ()

@@ -76,12 +76,12 @@ def estimate(
     with TemporaryDirectory(prefix="odscen-sweep-") as folder:
         began = time.monotonic()
         run = _possible(workspace, scenario, plan, settings, patience, Path(folder))
-        (ended,) = run_all([run], reports=False)
+        (ended,) = run_all([run], reports=False, figures=False)
         seconds = time.monotonic() - began
         disk = sum(file.stat().st_size for file in run.folder.rglob("*") if file.is_file())
     whole = ended.status is RunStatus.COMPLETED
     if not whole and seconds < patience:
-        msg = f"{run.name} was tried, and has failed: {ended.summary['error']}"
+        msg = f"{run.name} was tried, and has failed: {ended.known['error']}"
         raise InputError(msg)
     return SweepEstimate(run.name, seconds, disk, whole)
 

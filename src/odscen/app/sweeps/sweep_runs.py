@@ -165,6 +165,7 @@ def _run(
             these,
             processes=processes,
             reports=settings.reports,
+            figures=bool(settings.figures),
             progress=progress,
             done=one_more,
         )

@@ -107,7 +107,7 @@ def rows_of(
                     limit.holds(measured) for limit in limits
                 )
             else:
-                row["detail"] = str(run.summary["error"])
+                row["detail"] = str(run.known["error"])
         rows.append(row | measured)
     return rows
 
@@ -125,7 +125,7 @@ def _measured(run: Run, settings: SweepSettings, watched: Collection[str] | None
     )
     for name in settings.figures:
         entry = run_figure(name)
-        found[name] = None if entry is None else entry.of_summary(run.summary)
+        found[name] = None if entry is None else run.value_of(entry)
     return found | {name: function(run) for name, function in settings.own.items()}
 
 

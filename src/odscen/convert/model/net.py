@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
-from xml.sax.saxutils import escape
 
 import numpy as np
 
+from odscen.base.xml_text import escape
 from odscen.convert.model.net_shapes import LinkPath, border
 
 if TYPE_CHECKING:

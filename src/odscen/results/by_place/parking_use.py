@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import polars as pl
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import polars as pl
 
     from odscen.base.arrays import FloatArray, IntArray
     from odscen.results.records.run_records import Plan, PlannedParking
@@ -71,6 +72,8 @@ class ParkingUse:
     @classmethod
     def of(cls, stays: pl.DataFrame, plan: Plan, *, begin: float, end: float) -> ParkingUse:
         """Hold the stays of a run against its plan."""
+        import polars as pl
+
         wanted = {one.id: one.ends_in for one in plan.actors if one.ends_in is not None}
         names = {"actor": list(wanted), "wanted": list(wanted.values())}
         table = pl.DataFrame(names, schema={"actor": pl.String, "wanted": pl.String})
@@ -79,6 +82,8 @@ class ParkingUse:
 
     def use(self, area: str | None = None) -> AreaUse:
         """Use of an area; of all together if none is named."""
+        import polars as pl
+
         places = sum(one.places for one in self.areas if area in (None, one.id))
         mine = self._of(area)
         arrived = pl.col("arrival").is_between(self.begin, self.end, closed="left")
@@ -111,4 +116,6 @@ class ParkingUse:
         return Taken(times, come - gone)
 
     def _of(self, area: str | None) -> pl.DataFrame:
+        import polars as pl
+
         return self.stays if area is None else self.stays.filter(pl.col("area") == area)

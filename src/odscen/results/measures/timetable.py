@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import polars as pl
-
 from odscen.results.measures.figure import Basis, Better, Display, ReportSection, RunFigure
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from odscen.results.measures.figure import RunData
 
 LATE = 300.0
@@ -20,6 +20,8 @@ _SOURCE = "SUMO stop output; TCRP Report 165 (TCQSM, 3rd edition), on-time perfo
 
 def lateness(visits: pl.DataFrame) -> pl.DataFrame:
     """Visits with a scheduled departure, and seconds behind it in column ``late``."""
+    import polars as pl
+
     late = (pl.col("departure") - pl.col("scheduled")).clip(lower_bound=0.0).alias("late")
     return visits.filter(pl.col("scheduled").is_not_null()).with_columns(late)
 
@@ -30,6 +32,8 @@ def stops_served(visits: pl.DataFrame) -> pl.DataFrame:
     Columns ``line``, ``stop``, ``visits``, ``dwell`` (mean, s), ``late`` (mean, s) and ``on_time``
     (share of scheduled departures); the last two are null without a timetable.
     """
+    import polars as pl
+
     known = visits.with_columns(
         pl.col("actor").str.replace(r"\.\d+$", "").alias("line"),
         (pl.col("departure") - pl.col("arrival")).alias("dwell"),

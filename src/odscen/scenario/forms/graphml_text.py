@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from itertools import chain
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import escape, quoteattr
 
 from odscen.base.errors import InputError, LimitError, ScenarioError
 from odscen.base.xml_reading import read_xml
+from odscen.base.xml_text import escape, quoteattr
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -150,7 +150,7 @@ def _text(value: str | float | bool) -> str:
 
 
 def _quoted(name: object) -> str:
-    return quoteattr(str(name), {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+    return quoteattr(str(name))
 
 
 def _values(

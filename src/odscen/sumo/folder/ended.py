@@ -13,6 +13,9 @@ from odscen.sumo.folder.run_status import unfinished_words
 if TYPE_CHECKING:
     from pathlib import Path
 
+RECORDS_ONLY = "records_only"
+"""True in the summary of a run whose figures have not been computed yet."""
+
 _PARTS: dict[str, type | tuple[type, ...]] = {
     "seed": int,
     "scenario": str,

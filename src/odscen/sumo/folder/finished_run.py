@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, get_args, get_type_hints
 
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.results.by_place.lane_places import LanePlaces
+from odscen.results.measures.figure import Basis, SummaryPart
 from odscen.results.measures.registry import names_of, run_figure
 from odscen.results.measures.summary import ActorOutcome, actors_from_json
 from odscen.results.measures.traffic_files import places_from_json, read_stations, read_tables
@@ -15,7 +16,8 @@ from odscen.results.records.body_centres import body_centres
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import Event, Plan, events_from_json
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.deferred_figures import figure_of_actors, measured_summary
+from odscen.sumo.folder.ended import RECORDS_ONLY, read_summary
 from odscen.sumo.folder.recorded import read_trajectories
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.results.by_place.traffic import TableName
+    from odscen.results.measures.figure import RunFigure
 
 PlaceKind = Literal["network", "segment", "junction", "movement", "lane_group"]
 _TABLES: dict[PlaceKind, TableName] = {
@@ -47,9 +50,10 @@ class Run:
     ----------
     folder
         Its folder, with all files.
-    summary
+    known
         As in ``summary.json``: ``status``, ``seed``, ``sim_seconds``, counts of ``actors``,
-        ``figures``, ``expectations``, ``problems``, ``versions`` and more.
+        ``figures``, ``expectations``, ``problems``, ``versions`` and more. With ``records_only``
+        there are no figures yet: ``summary`` has them.
 
     Examples
     --------
@@ -60,7 +64,7 @@ class Run:
     """
 
     folder: Path
-    summary: Mapping[str, Any]
+    known: Mapping[str, Any]
 
     @classmethod
     def open(cls, folder: Path) -> Self:
@@ -74,14 +78,27 @@ class Run:
         return cls(folder, read_summary(folder))
 
     @property
+    def summary(self) -> Mapping[str, Any]:
+        """As in ``summary.json``; figures are computed, and written down, if they are not there.
+
+        Raises
+        ------
+        InputError
+            If they are not, and the records of the run are not whole any more.
+        """
+        if self.known.get(RECORDS_ONLY):
+            object.__setattr__(self, "known", measured_summary(self.folder))
+        return self.known
+
+    @property
     def status(self) -> RunStatus:
         """``completed`` if the simulation ended by itself, whatever became of the actors."""
-        return RunStatus(self.summary["status"])
+        return RunStatus(self.known["status"])
 
     @property
     def expectations_met(self) -> bool:
         """Whether every expectation has passed; true if there is none."""
-        return all(verdict["passed"] for verdict in self.summary["expectations"])
+        return all(verdict["passed"] for verdict in self.known["expectations"])
 
     @property
     def exit_code(self) -> int:
@@ -97,12 +114,12 @@ class Run:
         ``level`` is ``"usable"``, ``"usable with reservations"`` or ``"not usable"``. Empty for a
         run of an earlier version.
         """
-        return dict(self.summary.get("usable") or {})
+        return dict(self.known.get("usable") or {})
 
     @property
     def counts(self) -> Mapping[str, int]:
         """How many road users were planned, inserted, arrived, teleported, ..., by name."""
-        return dict(self.summary["actors"])
+        return dict(self.known["actors"])
 
     @property
     def figures(self) -> Mapping[str, float | None]:
@@ -138,15 +155,25 @@ class Run:
         if entry is None:
             what = "figure"
             raise NotFoundError(what, name, names_of("run"))
-        value = entry.of_summary(self.summary)
+        value = self.value_of(entry)
         if value is None:
             msg = f"the run has no {name}: {entry.definition} It is {self.status}."
             raise InputError(msg, file=str(self.folder))
         return value
 
+    def value_of(self, figure: RunFigure) -> float | None:
+        """Value of a figure of the run; ``None`` if it has nothing to compute it from.
+
+        Those that are made of what became of the actors do not have all others computed.
+        """
+        waits = self.known.get(RECORDS_ONLY) and figure.part is SummaryPart.FIGURES
+        if waits and figure.basis is Basis.ACTORS:
+            return figure_of_actors(self.folder, self.known, figure)
+        return figure.of_summary(self.summary if waits else self.known)
+
     def __repr__(self) -> str:
-        seed, scenario = self.summary.get("seed"), self.summary.get("scenario")
-        return f"<Run of {scenario}, seed {seed}: {self.summary['status']}>"
+        seed, scenario = self.known.get("seed"), self.known.get("scenario")
+        return f"<Run of {scenario}, seed {seed}: {self.known['status']}>"
 
     @property
     def report(self) -> Path | None:
@@ -265,7 +292,7 @@ class Run:
         if place not in _TABLES:
             what = "kind of place"
             raise NotFoundError(what, place, list(_TABLES))
-        name = _TABLES[place]
+        name, _ = _TABLES[place], self.summary  # which has them computed
         if not over_time:
             return places_from_json(self._text(layout.FIGURES_FILE), name)
         tables = read_tables(self.folder / layout.FIGURES_FOLDER)
@@ -290,6 +317,7 @@ class Run:
         InputError
             If the study has none, or no trajectories were recorded.
         """
+        _ = self.summary  # which has them computed
         found = read_stations(self.folder / layout.FIGURES_FOLDER)
         if found is None:
             msg = "the run has no stations: its study has none, or no trajectories were recorded"

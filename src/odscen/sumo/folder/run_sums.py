@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from odscen.base.checksums import (
     SUMS_FILE,
@@ -16,8 +16,6 @@ from odscen.base.checksums import (
 from odscen.base.errors import DamagedError, DamagedFile
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.checkpoint import part_sums
-from odscen.sumo.folder.ended import read_summary
-from odscen.sumo.folder.run_status import unfinished
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -100,21 +98,6 @@ def check_run_files(run: Path, *, leave: Collection[str] = ()) -> None:
     wrong = damaged_in(run, leave=leave)
     if wrong:
         raise DamagedError(str(run), wrong, advice=REPAIR)
-
-
-def whole_summary(run: Path, *, leave: Collection[str] = ()) -> dict[str, Any]:
-    """Summary of a run that has ended, when all of its files are as they were written.
-
-    Raises
-    ------
-    InputError
-        If no run has ended here.
-    DamagedError
-        With each file that is not as it was written.
-    """
-    if not unfinished(run) and ((run / layout.SUMMARY_FILE).is_file() or not without_sums(run)):
-        check_run_files(run, leave=leave)
-    return read_summary(run)
 
 
 def damaged_in(

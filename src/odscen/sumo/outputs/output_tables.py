@@ -18,13 +18,17 @@ from odscen.sumo.folder.layout import (
     LANES_FILE,
     STAYS_FILE,
     STOPINFO_FILE,
+    TRAJECTORIES_FILE,
     TRIPINFO_FILE,
     TRIPS_FILE,
     VISITS_FILE,
 )
+from odscen.sumo.folder.parts import tidy_part
+from odscen.sumo.outputs.conflict_files import tidy_conflicts
 from odscen.sumo.outputs.lane_measures import lane_table
+from odscen.sumo.outputs.signal_log import tidy_signals
 from odscen.sumo.outputs.stop_table import stay_table, stop_table
-from odscen.sumo.outputs.trip_table import ParkedCar, Stay, trip_table
+from odscen.sumo.outputs.trip_table import ParkedCar, Stay, logged_trips, trip_table
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -33,6 +37,10 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.results.records.run_records import Plan
+
+
+_SMALL = 1 << 20
+"""Bytes."""
 
 
 def outputs_to(folder: Path, sumo: Path) -> list[str]:
@@ -92,8 +100,31 @@ def tidy_outputs(
                 trips.write_parquet(folder / TRIPS_FILE)
             tripinfo.unlink()
     except (etree.XMLSyntaxError, PolarsError) as error:
-        msg = f"SUMO has not written its measurements to the end; the disk may be full: {error}"
-        raise SimulationError(msg) from error
+        raise _torn(error) from error
+
+
+def make_tables(folder: Path, plan: Plan, lengths: Mapping[str, Mapping[str, float]]) -> None:
+    """Make all that SUMO has written of a run in one piece into the tables that we keep.
+
+    Parameters
+    ----------
+    lengths
+        As of :func:`tidy_outputs`.
+
+    Raises
+    ------
+    SimulationError
+        If SUMO has not written it to its end.
+    """
+    tidy_part(folder / TRAJECTORIES_FILE)
+    tidy_outputs(folder, lengths, plan, present={}, last=True)
+    tidy_conflicts(folder, plan)
+    tidy_signals(folder)
+
+
+def are_small(folder: Path) -> bool:
+    """Whether what SUMO has written takes longer to get ready for than to make into tables."""
+    return sum(file.stat().st_size for file in folder.iterdir() if file.is_file()) <= _SMALL
 
 
 def _tidy_stops(folder: Path, plan: Plan, *, last: bool) -> pl.DataFrame | None:
@@ -127,6 +158,25 @@ def _parked(
     }
 
 
+def trips_logged(tripinfo: Path) -> dict[str, Trip]:
+    """The same as :func:`trips_in` from SUMO's tripinfo, of a run in which nobody parks.
+
+    Raises
+    ------
+    SimulationError
+        If SUMO has not written it to its end.
+    """
+    from lxml import etree
+
+    if not tripinfo.is_file():
+        return {}
+    try:
+        rows = list(logged_trips(tripinfo, {}))
+    except etree.XMLSyntaxError as error:
+        raise _torn(error) from error
+    return {row[0]: Trip(row[8], row[6], row[7]) for row in rows}
+
+
 def trips_in(file: Path) -> dict[str, Trip]:
     """What a table of trips says of each actor; empty if there is none."""
     import polars as pl
@@ -135,6 +185,11 @@ def trips_in(file: Path) -> dict[str, Trip]:
         return {}
     table = pl.read_parquet(file, columns=["id", "time_loss", "waiting_time", "waiting_count"])
     return {name: Trip(*values) for name, *values in table.iter_rows()}
+
+
+def _torn(error: Exception) -> SimulationError:
+    msg = f"SUMO has not written its measurements to the end; the disk may be full: {error}"
+    return SimulationError(msg)
 
 
 def write_results(run: Path, events: Iterable[str], actors: Iterable[str]) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import SimulationError
 from odscen.sumo.folder.layout import CALLS_FILE, LIGHT_STATES_FILE, STATES_FILE
-from odscen.sumo.outputs.xml_rows import elements
+from odscen.sumo.folder.xml_rows import elements
 from odscen.sumo.realize.measure_files import calls_file
 
 if TYPE_CHECKING:

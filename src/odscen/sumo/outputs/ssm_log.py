@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lxml import etree
-
 from odscen.base.errors import SimulationError
-from odscen.sumo.outputs.xml_rows import elements
+from odscen.sumo.folder.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from lxml import etree
 
 
 _KINDS = {
@@ -38,6 +38,8 @@ def logged_conflicts(
     SimulationError
         If the log is not whole.
     """
+    from lxml import etree
+
     try:
         for conflict in elements(file, "conflict"):
             yield _row(conflict, net_offset)

@@ -30,7 +30,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.results.records.run_records import begin_area
-from odscen.sumo.outputs.xml_rows import elements
+from odscen.sumo.folder.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

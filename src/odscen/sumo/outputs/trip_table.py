@@ -25,7 +25,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.sumo.outputs.xml_rows import elements
+from odscen.sumo.folder.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -93,12 +93,19 @@ def trip_table(
         "waiting_count": pl.Int64,
         "time_loss": pl.Float64,
     }
-    rows = [row for row in _rows(tripinfo, parked) if unfinished or row[3] is not None]
+    rows = [row for row in logged_trips(tripinfo, parked) if unfinished or row[3] is not None]
     table = pl.DataFrame(rows, schema=schema, orient="row")
     return table.sort("arrival", "depart", "id", nulls_last=True)
 
 
-def _rows(tripinfo: Path, parked: Mapping[str, ParkedCar]) -> Iterator[tuple[Any, ...]]:
+def logged_trips(tripinfo: Path, parked: Mapping[str, ParkedCar]) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of the table, columns in their order, as SUMO has logged them.
+
+    Raises
+    ------
+    lxml.etree.XMLSyntaxError
+        If the file does not go on to its end.
+    """
     for element in elements(tripinfo, "tripinfo", "personinfo"):
         if element.tag == "personinfo":
             yield _walk(element)

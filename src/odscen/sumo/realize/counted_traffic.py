@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from lxml import etree
 
 from odscen.scenario.demand.count_stations import Passing
 from odscen.scenario.demand.trips import FIRST, Trips, drawn_categories
@@ -160,6 +159,8 @@ def _choose(
     seed: int,
 ) -> list[tuple[PassedStations, float]]:
     """Let routeSampler choose: the kind of each vehicle's route, and when it passes, seconds."""
+    from lxml import etree
+
     with tempfile.TemporaryDirectory(prefix="odscen-counts-") as name:
         folder = Path(name)
         (folder / "ways.rou.xml").write_text(_routes_xml(kinds), encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from odscen.convert.model.net import CROSSED, UNUSED
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 _TURNS = {"l": "left", "s": "straight", "r": "right", "t": "turnaround", CROSSED: "walk"}
 
 
+@lru_cache(maxsize=4)
 def scenario_lights(sumo_map: SumoMap) -> tuple[Light, ...]:
     """Traffic lights as scenarios see them, in the order of the network."""
     if not sumo_map.lights:

@@ -87,6 +87,7 @@ def lane_places(sumo_map: SumoMap) -> LanePlaces:
     )
 
 
+@lru_cache(maxsize=4)
 def lane_segments(sumo_map: SumoMap) -> dict[str, tuple[str, ...]]:
     """Segments in which each lane lies that has nodes, or lies beside one; in driving direction."""
     parts = _road_parts(sumo_map, _junctions(sumo_map))

@@ -39,6 +39,8 @@ class ForkedWorker:
         Descriptor that gets its words.
     keep
         Descriptors that it holds open.
+    raw
+        Whether it may leave what SUMO has written to be made into tables.
 
     Attributes
     ----------
@@ -55,12 +57,14 @@ class ForkedWorker:
         If no process can be started.
     """
 
-    def __init__(self, plan: Path, *, stderr: int, keep: tuple[int, ...] = ()) -> None:
+    def __init__(
+        self, plan: Path, *, stderr: int, keep: tuple[int, ...] = (), raw: bool = False
+    ) -> None:
         self.returncode: int | None = None
         reading, stdout = os.pipe()
         self.stdout: BinaryIO = os.fdopen(reading, "rb")
         try:
-            self.pid, self._said = _forked(plan, (stdout, stderr, *keep))
+            self.pid, self._said = _forked(plan, (stdout, stderr, *keep), raw=raw)
         except BaseException:
             self.stdout.close()
             raise
@@ -121,6 +125,7 @@ class _Server:
 
 _lock = threading.Lock()
 _server: _Server | None = None
+_many = False
 
 
 def worker_environment() -> dict[str, str]:
@@ -140,6 +145,26 @@ def get_ready() -> None:
             _ready_server()
 
 
+def expect_runs(number: int) -> None:
+    """Learn that so many runs will be made: of more than one the first is forked, too."""
+    global _many  # noqa: PLW0603 - as above
+    with _lock:
+        _many = _many or number > 1
+
+
+def is_one_of_many() -> bool:
+    """Whether a run that is about to begin is one of many: announced, or not the first.
+
+    Processes of many runs are forked by one that does the imports once, which costs a single run
+    more than it saves, unless it has been started already; and what they record is made into tables
+    here, where all that this needs is loaded once.
+    """
+    global _many
+    with _lock:
+        known, _many = _many, True
+    return known
+
+
 def is_ready() -> bool:
     """Whether that process has been started, so that a single run had better be forked too."""
     with _lock:
@@ -157,13 +182,13 @@ def _ready_server() -> _Server:
     return _server
 
 
-def _forked(plan: Path, descriptors: tuple[int, ...]) -> tuple[int, BinaryIO]:
+def _forked(plan: Path, descriptors: tuple[int, ...], *, raw: bool) -> tuple[int, BinaryIO]:
     """Have a process forked; its number, and where its end is said."""
     try:
         folder = str(Path.cwd())
     except FileNotFoundError:
         folder = None  # it has been removed
-    request = json.dumps({"plan": str(plan), "cwd": folder}).encode()
+    request = json.dumps({"plan": str(plan), "cwd": folder, "raw": raw}).encode()
     global _server  # noqa: PLW0603 - one for all runs of this process
     for _ in range(_TRIES):
         reading, said_to = os.pipe()

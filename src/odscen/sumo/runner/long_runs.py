@@ -28,6 +28,7 @@ from odscen.sumo.folder.checkpoint import (
     survey,
 )
 from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.folder.found_files import found_files
 from odscen.sumo.folder.run_status import (
     going,
     read_status,
@@ -44,7 +45,6 @@ from odscen.sumo.folder.run_sums import (
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
-    found_files,
     make_summary,
     write_run_folder,
 )

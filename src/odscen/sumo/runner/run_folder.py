@@ -12,23 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.version import __version__
 from odscen.results.by_place.analysis_times import AnalysisTimes
-from odscen.results.by_place.traffic import TABLES
 from odscen.results.judging.actor_measures import RunRecords
 from odscen.results.judging.criteria import criteria_rows
 from odscen.results.judging.expectations import evaluate
 from odscen.results.measures.figure import RunData, SummaryPart
 from odscen.results.measures.gridlock import find_incidents, incident_summary
 from odscen.results.measures.registry import COUNTS, figure_values
-from odscen.results.measures.signal_use import SIGNALS_TABLE
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.measures.traffic_files import STATIONS_TABLE
 from odscen.results.measures.usability import failed_run, run_usability
 from odscen.results.records.light_programs import programs_to_json
 from odscen.results.records.outcomes import RunStatus
-from odscen.results.records.run_records import events_from_json, rounded
+from odscen.results.records.run_records import events_from_json
 from odscen.sumo.folder import layout
+from odscen.sumo.folder.deferred_figures import compute_figures
+from odscen.sumo.folder.ended import RECORDS_ONLY
+from odscen.sumo.folder.found_files import found_files
 from odscen.sumo.folder.judged import read_judged
-from odscen.sumo.outputs.measured import read_run_data, write_figures
 from odscen.sumo.outputs.signal_log import signal_logs
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 
@@ -130,9 +129,16 @@ def write_sumo_files(files: Mapping[str, str], net: Path, folder: Path, *, link:
     shutil.copyfile(net, target)
 
 
-def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str, Any]:
-    """What ``summary.json`` says of a run that has ended, well or badly."""
+def make_summary(
+    prepared: PreparedRun, folder: Path, ended: Ended, *, figures: bool = True
+) -> dict[str, Any]:
+    """What ``summary.json`` says of a run that has ended, well or badly.
+
+    Without ``figures`` those of a run that nothing is expected of are left for
+    :func:`odscen.sumo.folder.deferred_figures.measured_summary`.
+    """
     plan, done = prepared.plan, ended.done
+    judged = bool(plan.criteria or prepared.settings.expectations)
     # A long run may have been in the hands of several processes.
     wall_seconds = done.wall_seconds if done and plan.slice_length else ended.wall_seconds
     summary: dict[str, Any] = {
@@ -159,14 +165,12 @@ def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str,
     if done:
         text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
         outcomes = actors_from_json(text)
-        meso = bool(prepared.about.get("meso"))
-        times = AnalysisTimes(plan.warm_up, plan.interval)
-        data = read_run_data(folder, outcomes, end=done.sim_seconds, meso=meso, times=times)
-        write_figures(folder, data)
-        summary |= times.to_dict()
+        summary |= AnalysisTimes(plan.warm_up, plan.interval).to_dict()
         summary["actors"] = figure_values(RunData(outcomes), part=SummaryPart.ACTORS)
-        summary["figures"] = rounded(figure_values(data))
-        summary["insertion_error_max"] = summary["figures"]["insertion_error_max"]
+        if figures or judged:
+            compute_figures(folder, summary, outcomes)
+        else:
+            summary[RECORDS_ONLY] = True
         text = (folder / layout.EVENTS_FILE).read_text(encoding="utf-8")
         events = events_from_json(text)
         incidents = find_incidents(plan, outcomes, events, end=done.sim_seconds)
@@ -174,7 +178,6 @@ def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str,
         until = plan.until if done.stopped else None
         verdict = run_usability(outcomes, incidents, end=done.sim_seconds, until=until)
         summary["usable"] = (failed_run(ended.error) if ended.error else verdict).to_dict()
-    judged = bool(plan.criteria or prepared.settings.expectations)
     records = read_judged(folder) if done and judged else RunRecords()
     if plan.criteria:
         summary["criteria"] = criteria_rows(plan.criteria, summary, records)
@@ -210,50 +213,3 @@ def drop_torn_records(folder: Path) -> None:
         whole = opened.read() == b"PAR1"
     if not whole:
         file.unlink()
-
-
-def found_files(folder: Path) -> dict[str, str]:
-    """Files of a run by what they are, relative to its folder; only those that are there."""
-    sumo = layout.SUMO_FOLDER
-    names = {
-        "scenario": layout.SCENARIO_FILE,
-        "plan": layout.PLAN_FILE,
-        "assignment": layout.ASSIGNMENT_FILE,
-        "net": f"{sumo}/{layout.NET_FILE}",
-        "routes": f"{sumo}/{layout.ROUTES_FILE}",
-        "signals": f"{sumo}/{layout.SIGNALS_FILE}",
-        "stops": f"{sumo}/{layout.STOPS_FILE}",
-        "parking": f"{sumo}/{layout.PARKING_FILE}",
-        "measures": f"{sumo}/{layout.MEASURES_FILE}",
-        "config": f"{sumo}/{layout.CONFIG_FILE}",
-        "trajectories": layout.TRAJECTORIES_FILE,
-        "trajectory_parts": layout.TRAJECTORIES_FOLDER,
-        "lanes": layout.LANES_FILE,
-        "lane_parts": layout.LANES_FOLDER,
-        "trips": layout.TRIPS_FILE,
-        "trip_parts": layout.TRIPS_FOLDER,
-        "conflicts": layout.CONFLICTS_FILE,
-        "conflict_parts": layout.CONFLICTS_FOLDER,
-        "signal_states": layout.LIGHT_STATES_FILE,
-        "signal_state_parts": layout.LIGHT_STATES_FOLDER,
-        "detector_calls": layout.CALLS_FILE,
-        "detector_call_parts": layout.CALLS_FOLDER,
-        "stop_visits": layout.VISITS_FILE,
-        "stop_visit_parts": layout.VISITS_FOLDER,
-        "parking_stays": layout.STAYS_FILE,
-        "parking_stay_parts": layout.STAYS_FOLDER,
-        "lights": layout.LIGHTS_FILE,
-        "signal_figures": f"{layout.FIGURES_FOLDER}/{SIGNALS_TABLE}",
-        "station_figures": f"{layout.FIGURES_FOLDER}/{STATIONS_TABLE}",
-        "lane_places": layout.LANE_PLACES_FILE,
-        "figures": layout.FIGURES_FILE,
-        **{f"{name}_figures": f"{layout.FIGURES_FOLDER}/{name}.csv" for name in TABLES},
-        "events": layout.EVENTS_FILE,
-        "actors": layout.ACTORS_FILE,
-        "report": layout.REPORT_FILE,
-        "parity": layout.PARITY_FILE,
-        "parity_figures": layout.PARITY_FIGURES_FILE,
-        "log": layout.LOG_FILE,
-    }
-    found = {key: name for key, name in names.items() if (folder / name).exists()}
-    return {**found, "summary": layout.SUMMARY_FILE}

@@ -7,10 +7,10 @@ log; nothing that goes wrong inside SUMO raises here.
 
 from __future__ import annotations
 
-import itertools
 import threading
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from odscen.base.atomic_folders import clear_leftovers, new_folder
@@ -19,14 +19,15 @@ from odscen.base.system_errors import disk_errors
 from odscen.results.measures.summary import summary_to_json
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.folder.found_files import found_files
 from odscen.sumo.folder.run_sums import seal_run
+from odscen.sumo.outputs.output_tables import make_tables
 from odscen.sumo.runner.forecast import refuse_without_room
-from odscen.sumo.runner.forked_worker import is_ready
+from odscen.sumo.runner.forked_worker import expect_runs, is_one_of_many, is_ready
 from odscen.sumo.runner.long_runs import refuse_interrupted, run_lock, run_long
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
     drop_torn_records,
-    found_files,
     make_summary,
     write_run_folder,
     write_sumo_files,
@@ -54,7 +55,7 @@ def run_prepared(
     live: Companion | None = None,
     tell: Callable[[str], None] | None = None,
     simulate: Callable[[Path], Ended] | None = None,
-    several: bool = False,
+    figures: bool = True,
 ) -> Run:
     """Run in a new folder ``out``; whatever was there is replaced.
 
@@ -73,10 +74,9 @@ def run_prepared(
         Called with what the user should know before a long run.
     simulate
         Runs what is in a folder and writes the results there, instead of SUMO's worker.
-    several
-        Whether more runs come: their processes are then forked by one that does the imports once,
-        which costs a single run more than it saves unless it has been started already. From the
-        second run of this process on it is done anyway.
+    figures
+        Whether they are computed at once, as they are for ``finish`` and where something is
+        expected of the run; otherwise when they are asked for. A run in slices has them at once.
 
     Raises
     ------
@@ -98,20 +98,21 @@ def run_prepared(
             write_run_folder(prepared, folder)
             if simulate is None:
                 limit = prepared.settings.time_limit
-                again = next(_RUNS) > 0
+                many = is_one_of_many()
                 ended = run_worker(
                     folder,
                     progress=progress,
                     time_limit=limit,
                     live=live,
                     keep=(lock,),
-                    forked=(several or again) and live is None,
+                    forked=(many or is_ready()) and live is None,
+                    tables=partial(make_tables, folder, prepared.plan) if many else None,
                 )
             else:
                 ended = simulate(folder)
             if ended.done is None:
                 drop_torn_records(folder)
-            summary = make_summary(prepared, folder, ended)
+            summary = make_summary(prepared, folder, ended, figures=figures or finish is not None)
             if finish is not None and ended.done is not None:
                 finish(folder, summary)
                 summary["files"] = found_files(folder)
@@ -120,8 +121,6 @@ def run_prepared(
         return Run(out, summary)
 
 
-_RUNS = itertools.count()
-"""One number for each run of this process."""
 _LISTEN = 0.2
 """Wall seconds after which a wait looks for Ctrl-C."""
 
@@ -134,13 +133,14 @@ class _StoppedError(Exception):
 class RunJob:
     """One run of several: ``prepare`` is called when its turn comes; ``out`` is its folder.
 
-    ``finish`` as in :func:`run_prepared`.
+    ``finish`` and ``figures`` as in :func:`run_prepared`.
     """
 
     name: str
     prepare: Callable[[], PreparedRun]
     out: Path
     finish: Finish | None = None
+    figures: bool = True
 
 
 def run_many(
@@ -160,7 +160,7 @@ def run_many(
     and the result leaves it out.
     """
     stopping = threading.Event()
-    several = len(jobs) > 1 or is_ready()
+    expect_runs(len(jobs))
 
     def one(job: RunJob) -> Run | None:
         try:
@@ -180,7 +180,12 @@ def run_many(
 
         prepared = job.prepare()
         result = run_prepared(
-            prepared, job.out, progress=follow, finish=job.finish, tell=tell, several=several
+            prepared,
+            job.out,
+            progress=follow,
+            finish=job.finish,
+            tell=tell,
+            figures=job.figures,
         )
         if done is not None:
             done(job, result)

@@ -14,7 +14,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from odscen.base.system_errors import ADVICE
+from odscen.base.errors import SimulationError
+from odscen.base.system_errors import ADVICE, NO_MEMORY, system_words
 from odscen.sumo.folder.layout import LOG_FILE, PLAN_FILE
 from odscen.sumo.runner.forked_worker import POSSIBLE, ForkedWorker, worker_environment
 from odscen.sumo.worker.protocol import (
@@ -33,7 +34,7 @@ from odscen.sumo.worker.protocol import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from odscen.sumo.worker.protocol import Lockstep, Message, OnProgress, Pace
@@ -93,6 +94,7 @@ def run_worker(
     live: Companion | None = None,
     keep: tuple[int, ...] = (),
     forked: bool = False,
+    tables: Callable[[Mapping[str, Mapping[str, float]]], None] | None = None,
 ) -> Ended:
     """Run the simulation prepared in ``folder``.
 
@@ -114,6 +116,9 @@ def run_worker(
     forked
         Whether its process may be forked by one that has done the imports; not for a run that is
         live or in slices.
+    tables
+        Makes what SUMO has written into tables, from lengths of lanes. A forked process, to which
+        the first table costs as much as the simulation, then leaves those of a small run to it.
     """
     start = time.perf_counter()
     late = threading.Event()
@@ -121,7 +126,12 @@ def run_worker(
     with (
         (folder / LOG_FILE).open("ab") as log,
         _started(
-            folder / PLAN_FILE, log.fileno(), live, keep, forked=forked and POSSIBLE
+            folder / PLAN_FILE,
+            log.fileno(),
+            live,
+            keep,
+            forked=forked and POSSIBLE,
+            raw=tables is not None,
         ) as process,
     ):
         timer = _kill_after(process, time_limit, late)
@@ -136,6 +146,8 @@ def run_worker(
             if live is not None:
                 live.detach()
     seconds = time.perf_counter() - start
+    if isinstance(last, Done) and not process.returncode and tables is not None:
+        last = _with_tables(last, tables)
     if isinstance(last, Done) and not process.returncode:
         return Ended(last, seconds, live.failure if live else None)
     if late.is_set():
@@ -146,12 +158,35 @@ def run_worker(
     return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
 
 
+def _with_tables(
+    done: Done, tables: Callable[[Mapping[str, Mapping[str, float]]], None]
+) -> Done | Failed:
+    """Make the tables that the worker has left."""
+    if done.lengths is None:
+        return done
+    try:
+        tables(done.lengths)
+    except SimulationError as error:
+        return Failed(str(error))
+    except OSError as error:
+        return Failed(system_words(error))
+    except MemoryError:
+        return Failed(NO_MEMORY)
+    return done
+
+
 def _started(
-    plan: Path, log: int, live: Companion | None, keep: tuple[int, ...], *, forked: bool
+    plan: Path,
+    log: int,
+    live: Companion | None,
+    keep: tuple[int, ...],
+    *,
+    forked: bool,
+    raw: bool,
 ) -> subprocess.Popen[bytes] | ForkedWorker:
     """Start the process of a simulation."""
     if forked:
-        return ForkedWorker(plan, stderr=log, keep=keep)
+        return ForkedWorker(plan, stderr=log, keep=keep, raw=raw)
     command = [sys.executable, "-m", WORKER, str(plan)]
     if live is not None:
         command.append(encode(live.start))

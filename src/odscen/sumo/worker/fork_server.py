@@ -6,8 +6,9 @@ it before. So a run still has a process of its own, and what SUMO does still dep
 ran before. (libsumo can load one simulation after the other, but not with the same result: who
 yields inside a junction depends on the order of addresses in memory.)
 
-Stdin is a Unix socket. Each message on it is a JSON object ``{"plan": FILE, "cwd": FOLDER}`` with
-descriptors: one to say ``pid N`` on, and later ``exit N``; stdout; stderr; then those to hold open.
+Stdin is a Unix socket. Each message on it is a JSON object ``{"plan": FILE, "cwd": FOLDER,
+"raw": BOOL}`` with descriptors: one to say ``pid N`` on, and later ``exit N``; stdout; stderr; then
+those to hold open. With ``raw`` tables may be left to be made.
 The process ends when the socket is closed, or when it has had nothing to do for a minute.
 """
 
@@ -51,10 +52,10 @@ def _import_all() -> None:
     import lxml.etree
     import polars as pl
 
-    from odscen.sumo.outputs import conflict_files, lane_measures, output_tables, trip_table
+    from odscen.sumo.outputs import output_tables
     from odscen.sumo.worker import session, simulate
 
-    del lxml, pl, conflict_files, lane_measures, output_tables, trip_table, simulate
+    del lxml, pl, output_tables, simulate
     session.import_libsumo()
 
 
@@ -134,7 +135,7 @@ def _work(request: dict[str, Any], said_to: int, stdout: int, stderr: int) -> No
             os.chdir(request["cwd"])
         os.write(said_to, f"pid {os.getpid()}\n".encode())
         os.close(said_to)
-        code = simulate.run_plan(Path(request["plan"]))
+        code = simulate.run_plan(Path(request["plan"]), raw=request["raw"])
     except BaseException:
         traceback.print_exc()
     finally:

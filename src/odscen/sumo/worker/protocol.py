@@ -40,13 +40,15 @@ class Progress:
 class Done:
     """The run has ended without an error: simulated seconds, steps, wall seconds of the simulation.
 
-    ``stopped`` if a user who watched it has ended it before its time.
+    ``stopped`` if a user who watched it has ended it before its time. With ``lengths`` of lanes, m,
+    by edge, what SUMO has written has not been made into tables yet.
     """
 
     sim_seconds: float
     steps: int
     wall_seconds: float
     stopped: bool = False
+    lengths: dict[str, dict[str, float]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,13 +35,17 @@ from odscen.sumo.folder.layout import (
     LOG_FILE,
     STORY_FILE,
     SUMO_FOLDER,
-    TRAJECTORIES_FILE,
+    TRIPINFO_FILE,
     TRIPS_FILE,
 )
-from odscen.sumo.folder.parts import tidy_part
-from odscen.sumo.outputs.conflict_files import tidy_conflicts
-from odscen.sumo.outputs.output_tables import outputs_to, tidy_outputs, trips_in, write_results
-from odscen.sumo.outputs.signal_log import tidy_signals
+from odscen.sumo.outputs.output_tables import (
+    are_small,
+    make_tables,
+    outputs_to,
+    trips_in,
+    trips_logged,
+    write_results,
+)
 from odscen.sumo.worker.lockstep import LockstepWatch
 from odscen.sumo.worker.output_capture import captured_output
 from odscen.sumo.worker.protocol import (
@@ -71,8 +75,11 @@ def main() -> int:
     return run_plan(Path(sys.argv[1]), sys.argv[2:])
 
 
-def run_plan(plan_file: Path, how: Sequence[str] = ()) -> int:
-    """Run a plan, with the pace and the commands of ``how``; the exit code of the process."""
+def run_plan(plan_file: Path, how: Sequence[str] = (), *, raw: bool = False) -> int:
+    """Run a plan, with the pace and the commands of ``how``; the exit code of the process.
+
+    With ``raw`` it may leave what SUMO has written to its reader, see :class:`Done`.
+    """
     folder = plan_file.parent
     with in_use(folder), captured_output(folder / LOG_FILE) as stdout:
 
@@ -86,7 +93,7 @@ def run_plan(plan_file: Path, how: Sequence[str] = ()) -> int:
             gc.freeze()  # the plan stays, and need not be gone through again and again
             gc.enable()
             watch = _watch(plan, folder, how, send) if how else None
-            done = simulate(plan, folder, send, watch)
+            done = simulate(plan, folder, send, watch, raw=raw)
             if done is not None:
                 send(done)
         except OdscenError as error:
@@ -108,8 +115,15 @@ def simulate(
     folder: Path,
     send: Callable[[Message], None],
     watch: Watch | LockstepWatch | None = None,
+    *,
+    raw: bool = False,
 ) -> Done | None:
     """Run the simulation in ``folder`` and write its events and actors.
+
+    Parameters
+    ----------
+    raw
+        Whether the tables of a small run may be left to be made from what it returns.
 
     Returns
     -------
@@ -123,10 +137,12 @@ def simulate(
     stepper = Stepper(plan, send, watch, _story(plan, folder))
     if plan.slice_length is not None:
         return run_slice(plan, folder, stepper)
-    done = _in_one_piece(plan, folder, stepper)
+    done = _in_one_piece(plan, folder, stepper, raw=raw and not plan.parking)
     events = stepper.recorder.events
     outcomes = Outcomes(plan)
-    outcomes.hear(events, trips_in(folder / TRIPS_FILE))
+    made = done.lengths is None
+    trips = trips_in(folder / TRIPS_FILE) if made else trips_logged(folder / TRIPINFO_FILE)
+    outcomes.hear(events, trips)
     write_results(folder, map(event_line, events), outcomes.rows())
     return done
 
@@ -148,18 +164,17 @@ def _begin_anew(watch: Watch | LockstepWatch | None) -> None:
     os.execv(sys.executable, arguments)  # noqa: S606 - no shell is wanted
 
 
-def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
+def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper, *, raw: bool) -> Done:
     start = time.perf_counter()
     sumo = folder / SUMO_FOLDER
     arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(folder, sumo)]
     with open_session(arguments) as session:
         now = stepper.run(session, plan.until)
         lengths = session.lane_lengths()
-    tidy_part(folder / TRAJECTORIES_FILE)
-    tidy_outputs(folder, lengths, plan, present={}, last=True)
-    tidy_conflicts(folder, plan)
-    tidy_signals(folder)
-    return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)
+    left = lengths if raw and are_small(folder) else None
+    if left is None:
+        make_tables(folder, plan, lengths)
+    return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped, left)
 
 
 def _watch(

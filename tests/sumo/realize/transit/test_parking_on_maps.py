@@ -12,8 +12,8 @@ from odscen.base.frames import body_centre
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_records import Plan
 from odscen.sumo.folder.layout import PARKING_FILE
+from odscen.sumo.folder.measured import read_parking
 from odscen.sumo.folder.recorded import read_stays, read_trips
-from odscen.sumo.outputs.measured import read_parking
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner import worker_process

@@ -6,7 +6,6 @@ from math import hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 
 from odscen.results.records.light_programs import ShownDetector
 from odscen.sumo.realize.light_detectors import lane_before
@@ -77,6 +76,8 @@ def _loop_place(loop: PlacedLoop, light: SumoLight, sumo_map: SumoMap) -> _Place
 
 def _area_place(lane: str | None, length: float, sumo_map: SumoMap) -> _Place:
     """Line of so many metres before the end of a lane, over the lanes before it where it ends."""
+    import shapely
+
     pieces: list[_Place] = []
     while lane is not None and length > 0.0:
         whole = sumo_map.net.lanes[lane].length

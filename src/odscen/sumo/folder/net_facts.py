@@ -14,7 +14,7 @@ from odscen.base.xml_reading import read_xml
 from odscen.convert.verify.net_reader import read_net
 from odscen.results.by_place.facilities import NetFacts, no_links
 from odscen.sumo.folder import layout
-from odscen.sumo.outputs.xml_rows import elements
+from odscen.sumo.folder.xml_rows import elements
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -29,6 +29,7 @@ from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.planned_stations import PlannedStation
 from odscen.results.records.run_records import PLAN_FORMAT, VERSION, Plan
 from odscen.sumo.folder import layout
+from odscen.sumo.folder.net_facts import read_net_facts
 from odscen.sumo.folder.recorded import (
     read_conflicts,
     read_lanes,
@@ -38,7 +39,6 @@ from odscen.sumo.folder.recorded import (
     read_visits,
     scan_trajectories,
 )
-from odscen.sumo.outputs.net_facts import read_net_facts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
