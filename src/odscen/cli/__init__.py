@@ -36,6 +36,7 @@ from odscen.cli.run_commands import resume, run
 from odscen.cli.scenario_commands import check, export, generate, replay
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
+from odscen.cli.study_commands import app as study
 from odscen.cli.sweep_command import sweep
 from odscen.cli.template_command import NewCommand, new
 from odscen.cli.transit_commands import app as transit
@@ -69,6 +70,7 @@ app.add_typer(signals, name="signals")
 app.add_typer(transit, name="transit")
 app.add_typer(trash, name="trash")
 app.add_typer(learn, name="learn")
+app.add_typer(study, name="study")
 app.command()(generate)
 app.command()(variant)
 app.command(cls=NewCommand)(new)
