@@ -142,7 +142,8 @@ class StudyPlan(Part):
             msg = "variant: each needs a name of its own, and there must be one"
             raise ValueError(msg)
         try:
-            self.sweep()
+            if (sweep := self.sweep()) is not None:
+                sweep.cases()
             self.run.settings(0)
         except InputError as error:
             raise ValueError(error.problem) from error

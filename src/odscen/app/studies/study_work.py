@@ -7,20 +7,22 @@ It writes nothing that another worker reads, so an order can be lost or carried 
 from __future__ import annotations
 
 import io
+import os
 import platform
 import tarfile
 import time
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.app.maps import load_map
 from odscen.app.runs import check_run, run_all
 from odscen.app.studies.study_rows import REFUSED, outcome_row, row_of
 from odscen.app.variants import edited
+from odscen.base.atomic_folders import clear_leftovers, passing_folder
 from odscen.base.errors import ConflictError, InputError, MissingDependencyError
 from odscen.base.version import __version__
 from odscen.results.records.outcomes import RunStatus
@@ -100,18 +102,30 @@ def versions() -> dict[str, str]:
     return {"odscen": __version__, "sumo": version("libsumo")}
 
 
-def refuse_other_versions(wanted: Mapping[str, str], *, where: str | None = None) -> None:
+def refuse_other_versions(
+    wanted: Mapping[str, str],
+    *,
+    found: Mapping[str, str] | None = None,
+    where: str | None = None,
+) -> None:
     """Refuse to work with other versions than those of whoever orders it.
+
+    Parameters
+    ----------
+    found
+        Versions of the worker; those here if not given.
+    where
+        Names the worker.
 
     Raises
     ------
     ConflictError
         Names the worker and both versions.
     """
-    own = versions()
+    own = versions() if found is None else found
     for name, theirs in wanted.items():
         if own.get(name) != theirs:
-            place = where or f"worker on {platform.node()}"
+            place = where or f"the worker on {platform.node()}"
             msg = f"{place} has {name} {own.get(name)}, the study needs {theirs}; install the same"
             raise ConflictError(msg)
 
@@ -149,14 +163,23 @@ def _carried_out(
 ) -> Outcome:
     began = time.monotonic()
     workspace = workspaces[order.sources[run.scenario].map_name]
-    with TemporaryDirectory(prefix="odscen-study-", ignore_cleanup_errors=True) as name:
+    with passing_folder(_work_folder()) as folder:
         try:
-            checked = _checked(order, run, values, workspace, Path(name))
+            checked = _checked(order, run, values, workspace, folder)
             outcome = _simulated(order, run, checked, workspace, stopped)
         except InputError as error:
             outcome = Outcome(run.name, outcome_row(REFUSED, _words(error)))
     outcome.row["seconds"] = round(time.monotonic() - began, 3)
     return outcome
+
+
+@cache
+def _work_folder() -> Path:
+    """Where runs are carried out; what killed processes have left there is removed."""
+    folder = Path(gettempdir()) / f"odscen-studies-{os.getuid()}"
+    folder.mkdir(parents=True, exist_ok=True)
+    clear_leftovers(folder)
+    return folder
 
 
 def _words(error: InputError) -> str:
