@@ -20,6 +20,7 @@ from odscen.cli.asset_commands import app as assets
 from odscen.cli.console import report_error, report_usage
 from odscen.cli.cosim_commands import cosim
 from odscen.cli.count_commands import correct, fit, parking, routes
+from odscen.cli.dataset_command import dataset
 from odscen.cli.demand_commands import app as demand
 from odscen.cli.demo_command import demo
 from odscen.cli.difference_commands import diff_maps, diff_scenarios
@@ -82,6 +83,7 @@ app.command()(run)
 app.command()(resume)
 app.command()(report)
 app.command()(sweep)
+app.command()(dataset)
 app.command("test")(gate)
 app.command()(compare)
 app.command("diff")(diff_scenarios)

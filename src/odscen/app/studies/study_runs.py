@@ -170,6 +170,8 @@ def carry_out_study(
     *,
     target: str | None = None,
     again: bool = False,
+    formats: tuple[str, ...] = (),
+    take: Callable[[Outcome], None] | None = None,
     done: Callable[[int, int], None] | None = None,
 ) -> EndedStudy:
     """Carry out the runs of a study that have not ended, and write its table.
@@ -185,6 +187,11 @@ def carry_out_study(
         folder ``runs`` of the study if not given.
     again
         Runs those that failed or were refused again.
+    formats
+        Formats of ``odscen export`` that each run is exported to.
+    take
+        Called with the outcome of each run before its row is kept, so that what it writes is there
+        for every row, also after a kill.
     done
         Called with how many of how many have ended.
 
@@ -206,10 +213,10 @@ def carry_out_study(
                     for name, row in journal.rows.items()
                     if row["status"] != RunStatus.COMPLETED
                 )
-            orders = StudyOrders(grid, journal.rows, target=target)
+            orders = StudyOrders(grid, journal.rows, target=target, formats=formats)
             for outcomes in executor.outcomes(orders):
                 for outcome in outcomes:
-                    _take(out, journal, outcome)
+                    _take(out, journal, outcome, take)
                 if done is not None:
                     done(len(journal.rows), grid.count)
             table = write_table(out, grid, journal.rows)
@@ -217,13 +224,20 @@ def carry_out_study(
     return EndedStudy(state, table)
 
 
-def _take(out: Path, journal: StudyJournal, outcome: Outcome) -> None:
+def _take(
+    out: Path,
+    journal: StudyJournal,
+    outcome: Outcome,
+    more: Callable[[Outcome], None] | None,
+) -> None:
     """Keep what a run has given; its row last, as a run without a row is run again."""
     if outcome.name in journal.rows:
         return
     if outcome.folder is not None:
         with new_folder(out / RUNS_FOLDER / outcome.name) as folder:
             unpacked(outcome.folder, folder)
+    if more is not None:
+        more(outcome)
     journal.add(outcome.name, outcome.row)
 
 
