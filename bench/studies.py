@@ -123,9 +123,9 @@ def scheduler_load(folder: Path, tasks: int) -> None:
     base = [sys.executable, "-m", "distributed.cli"]
     scheduler = [f"{base[2]}.dask_scheduler", "--no-dashboard", "--port", "0"]
     worker = [f"{base[2]}.dask_worker", "--no-dashboard", "--nthreads", "1", "--no-nanny"]
+    given = ["--host", "127.0.0.1", "--scheduler-file", str(file)]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     commands = [[*base[:2], *scheduler], *([[*base[:2], *worker]] * JOBS)]
-    given = ["--scheduler-file", str(file)]
     processes = [subprocess.Popen([*one, *given], **quiet) for one in commands]
     try:
         while not file.is_file():
@@ -136,7 +136,7 @@ def scheduler_load(folder: Path, tasks: int) -> None:
             _submit(client, tasks, psutil.Process(processes[0].pid))
     finally:
         for process in processes:
-            process.terminate()
+            process.kill()
             process.wait()
 
 

@@ -198,7 +198,9 @@ def test_recordings_of_real_runs_are_in_the_shards(tmp_path: Path) -> None:
     shard = tmp_path / "out/train/pyg/shard-00000"
     with np.load(shard / "signal_crossing-0000-as-designed-seed-2.npz") as arrays:
         assert json.loads(str(arrays["about"]))["seed"] == 2
-        assert arrays["agent_state"].shape[1] == 101  # 10 s at 10 Hz, both ends
+        assert np.diff(arrays["time"]) == pytest.approx(0.1)
+        assert 9.0 < np.ptp(arrays["time"]) <= 10.0
+        assert arrays["agent_state"].shape[1] == len(arrays["time"])
         assert len(arrays["agent_id"]) == facts.table["planned"][1]
     index = json.loads((tmp_path / "out/train/waymo/shard-00000/index.json").read_text("utf-8"))
     assert [len(one["scenarios"]) for one in index["runs"]] == [2, 2]
