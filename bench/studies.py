@@ -131,7 +131,7 @@ def scheduler_load(folder: Path, tasks: int) -> None:
         while not file.is_file():
             time.sleep(0.2)
         dask.config.set({"distributed.comm.timeouts.connect": "60s"})
-        with Client(scheduler_file=str(file), set_as_default=False) as client:
+        with Client(scheduler_file=str(file)) as client:
             client.wait_for_workers(JOBS, timeout=120)
             _submit(client, tasks, psutil.Process(processes[0].pid))
     finally:

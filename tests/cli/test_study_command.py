@@ -58,7 +58,7 @@ def test_a_killed_study_resumes_is_extended_and_reported(workspace: Path, tmp_pa
     more = odscen("study", "extend", killed, "--seeds", "4", *place, "--jobs", 2, "--json")
     assert (more.json["runs"], more.json["ended"]) == (8, 8)
     found = odscen("study", "report", killed, "--figure", "planned", "--json")
-    assert [group["runs"] for group in found.json["groups"]] == [4, 4]
+    assert [group["runs"] for group in found.json["means"]] == [4, 4]
     assert (killed / "study.html").is_file()
 
 

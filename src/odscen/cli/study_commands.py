@@ -19,7 +19,10 @@ from odscen.cli.console import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.app.studies.executors import Executor
+    from odscen.app.studies.study_report import StudyGroup
     from odscen.app.studies.study_runs import StudyState
     from odscen.workspace.store import Workspace
 
@@ -182,20 +185,27 @@ def report(
     from odscen.app.studies.study_report import SHOWN_FIGURES, study_groups, write_study_page
 
     figures = tuple(figure or SHOWN_FIGURES)
-    groups = study_groups(study, figures)
+    means, differences = study_groups(study, figures)
     file = write_study_page(study, figures, out or study / PAGE_FILE)
     if as_json:
-        print_json({"file": str(file), "groups": [one.to_dict() for one in groups]})
+        parts = {"means": means, "differences": differences}
+        said = {name: [one.to_dict() for one in groups] for name, groups in parts.items()}
+        print_json({"file": str(file), **said})
         return
-    heads = ("scenario", "variant", "runs", *figures)
+    _show_groups("Means", means, figures)
+    if differences:
+        _show_groups("Differences from the first variant, by case and seed", differences, figures)
+    log(f"Page: {file}")
+
+
+def _show_groups(title: str, groups: Sequence[StudyGroup], figures: Sequence[str]) -> None:
     rows = [
         (one.scenario, one.variant, one.runs, *(one.words(name) for name in figures))
         for one in groups[:_SHOWN]
     ]
-    print_table("", heads, rows)
+    print_table(title, ("scenario", "variant", "runs", *figures), rows)
     if len(groups) > _SHOWN:
         log(f"and {len(groups) - _SHOWN} more")
-    log(f"Page: {file}")
 
 
 def open_executor(place: Workspace, name: str, jobs: int, scheduler: str | None) -> Executor:

@@ -71,8 +71,8 @@ class StudyGroup:
         }
 
 
-def study_groups(out: Path, figures: Sequence[str]) -> list[StudyGroup]:
-    """Means of figures by scenario and variant, in the order of the study.
+def study_groups(out: Path, figures: Sequence[str]) -> tuple[list[StudyGroup], list[StudyGroup]]:
+    """Means of figures by scenario and variant, in the order of the study; then differences.
 
     Raises
     ------
@@ -80,7 +80,8 @@ def study_groups(out: Path, figures: Sequence[str]) -> list[StudyGroup]:
         If there is no study, or no such figure.
     """
     _refuse_unknown(figures)
-    return _groups(_completed(study_results(out).table), figures)
+    own = _completed(study_results(out).table)
+    return _groups(own, figures), paired_differences(own, figures)
 
 
 def _refuse_unknown(figures: Iterable[str]) -> None:
