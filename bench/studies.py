@@ -36,6 +36,12 @@ MAP = Path(__file__).parents[1] / "maps" / "signal_crossing.xodr"
 SECONDS = 60.0
 JOBS = 2
 SCENARIOS = 20
+QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.tick.limit": "1h",
+}
+"""What docs/studies.md advises: a worker whose threads wake up often takes turns with the run."""
 
 
 def main() -> None:
@@ -87,6 +93,7 @@ def _study(workspace: Workspace, out: Path, how: str, runs: int) -> tuple[float,
     if how == "local":
         return _carry_out(out, LocalExecutor(workspace, JOBS))
     began = time.perf_counter()
+    dask.config.set(QUIET)
     with LocalCluster(
         n_workers=JOBS, threads_per_worker=1, dashboard_address=None, silence_logs=50
     ) as cluster:

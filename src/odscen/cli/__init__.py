@@ -20,7 +20,6 @@ from odscen.cli.asset_commands import app as assets
 from odscen.cli.console import report_error, report_usage
 from odscen.cli.cosim_commands import cosim
 from odscen.cli.count_commands import correct, fit, parking, routes
-from odscen.cli.dataset_command import dataset
 from odscen.cli.demand_commands import app as demand
 from odscen.cli.demo_command import demo
 from odscen.cli.difference_commands import diff_maps, diff_scenarios
@@ -34,14 +33,14 @@ from odscen.cli.regression_commands import compare, gate
 from odscen.cli.removal_commands import remove, remove_map, trash
 from odscen.cli.report_command import report
 from odscen.cli.run_commands import resume, run
-from odscen.cli.scenario_commands import check, export, generate, replay
+from odscen.cli.scenario_commands import check, export, generate, replay, variant
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
 from odscen.cli.study_commands import app as study
+from odscen.cli.study_commands import dataset
 from odscen.cli.sweep_command import sweep
 from odscen.cli.template_command import NewCommand, new
 from odscen.cli.transit_commands import app as transit
-from odscen.cli.variant_command import variant
 
 _AGAIN = 0.05
 """Wall seconds after which an interruption that Python has only shown comes again."""

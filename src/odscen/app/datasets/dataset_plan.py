@@ -25,6 +25,10 @@ SplitName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
 TRAIN: Final = "train"
 
 
+def _one_split() -> dict[str, tuple[str, ...]]:
+    return {TRAIN: ("*",)}
+
+
 class DatasetPlan(Part):
     """The plan of a dataset.
 
@@ -50,7 +54,7 @@ class DatasetPlan(Part):
     licence: Label
     description: str = ""
     formats: Annotated[tuple[DatasetFormat, ...], Field(min_length=1)] = ("pyg",)
-    splits: dict[SplitName, tuple[Label, ...]] = Field(default_factory=lambda: {TRAIN: ("*",)})
+    splits: dict[SplitName, tuple[Label, ...]] = Field(default_factory=_one_split)
     keep_if: tuple[Label, ...] = ()
     usable: bool = True
     shard: Annotated[int, Field(ge=1, le=100_000)] = 100
