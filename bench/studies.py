@@ -95,7 +95,7 @@ def _study(workspace: Workspace, out: Path, how: str, runs: int) -> tuple[float,
     began = time.perf_counter()
     dask.config.set(QUIET)
     with LocalCluster(
-        n_workers=JOBS, threads_per_worker=1, dashboard_address=None, silence_logs=50
+        n_workers=JOBS, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50
     ) as cluster:
         print(f"  the cluster has started in {time.perf_counter() - began:.1f} s")
         return _carry_out(out, DaskExecutor(workspace, cluster.scheduler_address))

@@ -47,7 +47,7 @@ def cluster(*, processes: bool = False, **given: Any) -> Iterator[str]:
             n_workers=2,
             threads_per_worker=1,
             processes=processes,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
             silence_logs=50,
         ) as found,
     ):
