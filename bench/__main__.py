@@ -20,6 +20,7 @@ ALL = (
     "assignment",
     "recording",
     "short_runs",
+    "studies",
     "rules",
     "learning",
     "osc_import",

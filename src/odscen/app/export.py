@@ -145,6 +145,7 @@ def export_run(
         If the folder cannot be written.
     """
     from odscen.app.scenarios import read_scenario
+    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.folder.layout import SCENARIO_FILE
 
     exporter = _exporter(to, options)
@@ -153,7 +154,8 @@ def export_run(
         msg = f"the format {to} cannot say what happened in a run; {able} can"
         raise InputError(msg)
     happened = _happened(run)
-    document = read_scenario(run / SCENARIO_FILE)
+    seed = Run.open(run).summary["seed"]  # perhaps another one than the scenario's own
+    document = read_scenario(run / SCENARIO_FILE).model_copy(update={"seed": seed})
     source = _source(workspace, document, run.resolve().name, options, happened)
     if exporter.needs_roads:
         source = replace(source, roads=_roads(source.map_file))

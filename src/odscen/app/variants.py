@@ -115,14 +115,9 @@ def make_variant(
     if not ones:
         msg = "a variant differs from its parent; give a file of edits, or --set"
         raise InputError(msg)
-    loaded = map_of(workspace, old)
-    new = old.model_copy(update={"name": name, "variant": None})
-    for index, one in enumerate(ones):
-        try:
-            new = apply_edit(one, new, loaded)
-        except ScenarioError as error:
-            msg = f"edit {index + 1}, {one.label!r}: {error}"
-            raise ScenarioError(msg) from error
+    new = edited(
+        old.model_copy(update={"name": name, "variant": None}), ones, map_of(workspace, old)
+    )
     variant = Variant(
         parent=scenario_name(parent),
         parent_sha256=content_sha256(old),
@@ -130,6 +125,23 @@ def make_variant(
         edits=tuple(one.data for one in ones),
     )
     return new.model_copy(update={"variant": variant})
+
+
+def edited(scenario: Scenario, edits: Iterable[EditBase], loaded: LoadedMap) -> Scenario:
+    """Return a scenario with edits, one after the other.
+
+    Raises
+    ------
+    ScenarioError
+        If an edit is not possible; names it.
+    """
+    for index, one in enumerate(edits):
+        try:
+            scenario = apply_edit(one, scenario, loaded)
+        except ScenarioError as error:
+            msg = f"edit {index + 1}, {one.label!r}: {error}"
+            raise ScenarioError(msg) from error
+    return scenario
 
 
 def _read(data: Any, *, place: str) -> EditBase:

@@ -53,6 +53,16 @@ def in_use(folder: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
+@contextmanager
+def passing_folder(parent: Path) -> Iterator[Path]:
+    """Yield an empty folder that is removed afterwards.
+
+    That of a process that was killed is removed by :func:`clear_leftovers` of ``parent``.
+    """
+    with _temporary(parent, _BUILDING) as folder:
+        yield folder
+
+
 def discard(folder: Path) -> None:
     """Take a folder out of sight in one step, then delete it."""
     with _temporary(folder.parent, _REMOVED) as grave:

@@ -33,13 +33,14 @@ from odscen.cli.regression_commands import compare, gate
 from odscen.cli.removal_commands import remove, remove_map, trash
 from odscen.cli.report_command import report
 from odscen.cli.run_commands import resume, run
-from odscen.cli.scenario_commands import check, export, generate, replay
+from odscen.cli.scenario_commands import check, export, generate, replay, variant
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
+from odscen.cli.study_commands import app as study
+from odscen.cli.study_commands import dataset
 from odscen.cli.sweep_command import sweep
 from odscen.cli.template_command import NewCommand, new
 from odscen.cli.transit_commands import app as transit
-from odscen.cli.variant_command import variant
 
 _AGAIN = 0.05
 """Wall seconds after which an interruption that Python has only shown comes again."""
@@ -69,6 +70,7 @@ app.add_typer(signals, name="signals")
 app.add_typer(transit, name="transit")
 app.add_typer(trash, name="trash")
 app.add_typer(learn, name="learn")
+app.add_typer(study, name="study")
 app.command()(generate)
 app.command()(variant)
 app.command(cls=NewCommand)(new)
@@ -80,6 +82,7 @@ app.command()(run)
 app.command()(resume)
 app.command()(report)
 app.command()(sweep)
+app.command()(dataset)
 app.command("test")(gate)
 app.command()(compare)
 app.command("diff")(diff_scenarios)

@@ -1,0 +1,1 @@
+"""Studies: many runs as data, with a plan, a state and one table of results."""
