@@ -20,6 +20,7 @@ ALL = (
     "assignment",
     "recording",
     "short_runs",
+    "critical_search",
     "rules",
     "learning",
     "osc_import",

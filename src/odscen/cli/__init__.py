@@ -34,6 +34,7 @@ from odscen.cli.removal_commands import remove, remove_map, trash
 from odscen.cli.report_command import report
 from odscen.cli.run_commands import resume, run
 from odscen.cli.scenario_commands import check, export, generate, replay
+from odscen.cli.search_command import search
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
 from odscen.cli.sweep_command import sweep
@@ -80,6 +81,7 @@ app.command()(run)
 app.command()(resume)
 app.command()(report)
 app.command()(sweep)
+app.command()(search)
 app.command("test")(gate)
 app.command()(compare)
 app.command("diff")(diff_scenarios)

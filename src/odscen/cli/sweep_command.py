@@ -148,11 +148,11 @@ def _plan(
     if how not in ("grid", "latin", "sobol", "random"):
         msg = f"method {how!r} is not one of sobol, latin, random"
         raise InputError(msg)
-    axes = tuple(map(axis_from_text, vary or ())) or _bounds(scenario)
+    axes = tuple(map(axis_from_text, vary or ())) or bounds_of(scenario)
     return SweepPlan(axes, cast("Method", how), samples, seed)
 
 
-def _bounds(scenario: Scenario) -> tuple[Any, ...]:
+def bounds_of(scenario: Scenario) -> tuple[Any, ...]:
     """Each parameter between its bounds."""
     from odscen.scenario.sweeps.sweep_plan import Range
 

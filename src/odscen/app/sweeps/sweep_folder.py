@@ -115,13 +115,27 @@ def begin_sweep(out: Path, scenario: Scenario, plan: SweepPlan, settings: SweepS
     """
     head = {"format": FORMAT, "version": VERSION}
     said = head | {"plan": plan.to_dict(), "settings": settings.to_dict()}
-    text = json.dumps(said, indent=2, ensure_ascii=False) + "\n"
-    own = dumps(scenario)
-    files = {SWEEP_FILE: text, SCENARIO_FILE: own}
+    begin_folder(out, {SWEEP_FILE: said}, scenario, what="sweep")
+
+
+def begin_folder(
+    out: Path, said: Mapping[str, Mapping[str, Any]], scenario: Scenario, *, what: str
+) -> None:
+    """Write what the folder of a sweep or a search is about, by file, and its scenario.
+
+    Raises
+    ------
+    ConflictError
+        If the folder holds another one.
+    """
+    files = {
+        name: json.dumps(data, indent=2, ensure_ascii=False) + "\n" for name, data in said.items()
+    }
+    files[SCENARIO_FILE] = dumps(scenario)
     there = {name: out / name for name in files if (out / name).is_file()}
     for name, file in there.items():
         if file.read_text(encoding="utf-8") != files[name]:
-            msg = f"{out} holds another sweep ({name} differs); name another folder"
+            msg = f"{out} holds another {what} ({name} differs); name another folder"
             raise ConflictError(msg)
     for name in files.keys() - there.keys():
         write_text(out / name, files[name])
