@@ -22,6 +22,7 @@ ALL = (
     "short_runs",
     "critical_search",
     "rules",
+    "behaviour",
     "learning",
     "osc_import",
     "long_run",

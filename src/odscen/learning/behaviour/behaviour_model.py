@@ -220,4 +220,6 @@ class BehaviourDoor:
     @property
     def shown(self) -> str:
         """What messages and summaries call it."""
-        return self.name or self.command or "a program at a socket"
+        if self.name is not None:
+            return self.name.rpartition("/")[2]
+        return self.command or "a program at a socket"

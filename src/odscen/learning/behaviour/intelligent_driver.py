@@ -107,9 +107,9 @@ class IntelligentDriver:
         rest = scene.lane_length[seen.lane] - seen.pos
         stops = seen.speed**2 / (2.0 * self.deceleration) < rest
         red = (seen.light == LightAhead.RED) | ((seen.light == LightAhead.YELLOW) & stops)
-        gap = np.where(red & (seen.lane >= 0), np.maximum(rest - _STOP_GAP, 0.1), np.inf)
         # The line is no bumper: without the gap that a driver keeps to one.
-        return self.follow(seen.speed, wanted, gap + self.gap, np.zeros(len(seen)))
+        gap = np.where(red & (seen.lane >= 0), rest - _STOP_GAP + self.gap, np.inf)
+        return self.follow(seen.speed, wanted, gap, np.zeros(len(seen)))
 
     def _changes(
         self, seen: Observation, scene: BehaviourScene, wanted: FloatArray, own: FloatArray

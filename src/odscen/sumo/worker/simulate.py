@@ -123,9 +123,13 @@ def simulate(
         If SUMO refuses to start or stops with an error.
     """
     stepper = Stepper(plan, send, watch, _story(plan, folder), _behaviour(plan, folder))
-    if plan.slice_length is not None:
-        return run_slice(plan, folder, stepper)
-    done = _in_one_piece(plan, folder, stepper)
+    try:
+        if plan.slice_length is not None:
+            return run_slice(plan, folder, stepper)
+        done = _in_one_piece(plan, folder, stepper)
+    finally:
+        if stepper.behaviour is not None:
+            stepper.behaviour.close()
     events = stepper.recorder.events
     outcomes = Outcomes(plan)
     outcomes.hear(events, trips_in(folder / TRIPS_FILE))

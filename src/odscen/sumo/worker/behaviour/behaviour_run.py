@@ -6,11 +6,10 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from odscen.base.errors import InputError, OdscenError, SimulationError
 from odscen.base.frames import angle_deg_from_hdg
 from odscen.learning.behaviour.behaviour_model import ActionKind, BehaviourDoor
+from odscen.learning.behaviour.checked_action import CheckedAction
 from odscen.scenario.document.named_random import stream
 from odscen.sumo.folder.layout import BEHAVIOUR_FILE, SUMO_FOLDER
 from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour
@@ -20,18 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Collection
     from pathlib import Path
 
-    from odscen.learning.behaviour.behaviour_model import Action, BehaviourModel, Observation
-    from odscen.learning.fill import Array
+    from odscen.learning.behaviour.behaviour_model import BehaviourModel, Observation
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.driven_vehicles import DrivenVehicles
     from odscen.sumo.worker.session import Session
-
-_FASTEST = 150.0
-"""m/s; a model that asks for more is mistaken."""
-_NEEDS = {
-    ActionKind.SPEED: ("speed",), ActionKind.SPEED_UNCHECKED: ("speed",),
-    ActionKind.LANE_POSITION: ("lane", "pos"), ActionKind.POSE: ("x", "y", "hdg"),
-}  # fmt: skip
 
 
 class BehaviourRun:
@@ -94,10 +85,16 @@ class BehaviourRun:
         except Exception as error:  # whatever code from outside may raise
             raise self._failure(seen, f"act failed: {error!r}") from error
         try:
-            asked = _Asked(action, controlled, len(names))
+            asked = CheckedAction(action, controlled, len(names))
             self._drive(seen, names, asked, taken)
         except InputError as error:
             raise self._failure(seen, str(error)) from error
+
+    def close(self) -> None:
+        """Let a model that has a method ``close`` know that the simulation is over."""
+        close = getattr(self._model, "close", None)
+        if callable(close):
+            close()
 
     def state(self) -> list[str]:
         """What has to be remembered from one slice of a run to the next: who is driven."""
@@ -120,7 +117,7 @@ class BehaviourRun:
             raise SimulationError(msg) from error
 
     def _drive(
-        self, seen: Observation, names: list[str], asked: _Asked, taken: Collection[str]
+        self, seen: Observation, names: list[str], asked: CheckedAction, taken: Collection[str]
     ) -> None:
         present = set(names)
         self._earlier &= present
@@ -145,7 +142,7 @@ class BehaviourRun:
                 if name not in taken:
                     self._road.release(name)
 
-    def _act(self, seen: Observation, row: int, name: str, asked: _Asked) -> None:
+    def _act(self, seen: Observation, row: int, name: str, asked: CheckedAction) -> None:
         kind = asked.kind[row]
         mode = kind == ActionKind.SPEED, asked.change is not None
         if self._modes.get(name) != mode:
@@ -172,60 +169,3 @@ class BehaviourRun:
 
     def _failure(self, seen: Observation, words: str) -> SimulationError:
         return SimulationError(f"behaviour {self._name} at {seen.time:g} s: {words}")
-
-
-class _Asked:
-    """What a model has asked for, checked; rows of those that it controls."""
-
-    def __init__(self, action: Action, controlled: Any, count: int) -> None:
-        mask = np.asarray(controlled)
-        if mask.shape != (count,) or mask.dtype != np.bool_:
-            msg = f"is_controlled is {mask.dtype} {mask.shape}, not bool ({count},)"
-            raise InputError(msg)
-        self.rows = np.flatnonzero(mask)
-        kinds = np.broadcast_to(np.asarray(action.kind), (count,))
-        used = np.unique(kinds[mask]).tolist()
-        if unknown := [kind for kind in used if kind not in {*ActionKind}]:
-            msg = f"there is no kind of action {unknown[0]!r}"
-            raise InputError(msg)
-        self.kind = kinds.tolist()
-        self.real = {
-            name: self._numbers(action, name, count)
-            for name in ("speed", "pos", "x", "y", "hdg")
-            if getattr(action, name) is not None
-        }
-        self.whole = {
-            name: self._numbers(action, name, count).astype(np.int64).tolist()
-            for name in ("lane", "change")
-            if getattr(action, name) is not None
-        }
-        for kind in used:
-            for name in _NEEDS[ActionKind(kind)]:
-                if name not in self.real and name not in self.whole:
-                    msg = f"an action of kind {ActionKind(kind).name} needs {name}"
-                    raise InputError(msg)
-        speed = self.real.get("speed")
-        if speed is not None and len(self.rows):
-            low, high = speed[self.rows].min(), speed[self.rows].max()
-            if low < 0.0 or high > _FASTEST:
-                bad = low if low < 0.0 else high
-                msg = f"a speed of {bad:g} m/s is not between 0 and {_FASTEST:g}"
-                raise InputError(msg)
-        self.speed = None if speed is None else speed.tolist()
-        self.change = self.whole.get("change")
-
-    def _numbers(self, action: Action, name: str, count: int) -> Array:
-        try:
-            values = np.asarray(getattr(action, name), dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            msg = f"{name} is no array of numbers"
-            raise InputError(msg) from error
-        if values.shape != (count,):
-            msg = f"{name} has shape {values.shape}, not ({count},)"
-            raise InputError(msg)
-        bad = ~np.isfinite(values[self.rows])
-        if bad.any():
-            row = int(self.rows[np.flatnonzero(bad)[0]])
-            msg = f"{name} of row {row} is {values[row]:g}"
-            raise InputError(msg)
-        return np.where(np.isfinite(values), values, 0.0)

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 _LAST_LINES = 5
 _LAST_BYTES = 4000
 _BLOCK = 1 << 16
+_PATIENCE = 5.0
+"""Wall seconds that a program has to end when its input is over."""
 
 
 class _Peer:
@@ -58,6 +60,10 @@ class _Peer:
         """Ask it."""
         del state
         return action_from_bytes(self._ask(observation_bytes(observation)), len(observation))
+
+    def close(self) -> None:
+        """Say that the run is over."""
+        raise NotImplementedError
 
     def _connect(self) -> None:
         raise NotImplementedError
@@ -131,6 +137,17 @@ class PipedDriver(_Peer):
         if self._process.stdin is not None and self._process.stdout is not None:
             self._to, self._back = self._process.stdin.fileno(), self._process.stdout.fileno()
 
+    def close(self) -> None:
+        """Let it end: its input is over."""
+        if self._process is not None and self._process.stdin is not None:
+            with suppress(OSError):
+                self._process.stdin.close()
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(_PATIENCE)
+            if self._process.poll() is None:
+                self._process.kill()
+                self._process.wait()
+
     def _ended(self) -> str:
         code = None
         if self._process is not None:
@@ -163,6 +180,11 @@ class SocketDriver(_Peer):
             msg = f"nobody listens at its socket: {error.strerror}"
             raise InputError(msg) from error
         self._to = self._back = self._socket.fileno()
+
+    def close(self) -> None:
+        """Hang up."""
+        if hasattr(self, "_socket"):
+            self._socket.close()
 
     def _ended(self) -> str:
         return "it has closed its socket"
