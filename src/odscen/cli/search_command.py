@@ -7,6 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from odscen.cli.behaviour_options import (
+    BehaviourCommandOption,
+    BehaviourOption,
+    BehaviourSettingOption,
+    BehaviourTimeoutOption,
+    behaviour_door,
+)
 from odscen.cli.console import JobsOption, JsonOption, WorkspaceOption, log, print_json, print_table
 from odscen.cli.console import progress as shown_progress
 from odscen.cli.scenario_commands import ScenarioArgument
@@ -55,6 +62,10 @@ def search(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Of every run, instead of the scenario's.")
     ] = None,
+    behaviour: BehaviourOption = None,
+    behaviour_set: BehaviourSettingOption = None,
+    behaviour_cmd: BehaviourCommandOption = None,
+    behaviour_timeout: BehaviourTimeoutOption = 60.0,
     jobs: JobsOption = 1,
     reports: Annotated[bool, typer.Option("--reports", help="Write a report of each run.")] = False,
     workspace: WorkspaceOption = None,
@@ -74,6 +85,7 @@ def search(
     from odscen.workspace.store import Workspace
 
     document = scenarios.read_scenario(scenario)
+    driven = behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout)
     with shown_progress("searching") as step:
         found = find(
             Workspace.open(workspace),
@@ -81,7 +93,7 @@ def search(
             tuple(map(axis_from_text, vary or ())) or bounds_of(document),
             out or Path(f"{scenarios.scenario_name(scenario)}-search"),
             search_settings=SearchSettings(method, runs, batch, search_seed),
-            settings=SweepSettings(tuple(safe or ()), seed=seed, reports=reports),
+            settings=SweepSettings(tuple(safe or ()), seed=seed, reports=reports, behaviour=driven),
             processes=jobs,
             done=lambda ended, count: step(f"{ended} of {count} cases", ended / count),
         )

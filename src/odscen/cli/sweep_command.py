@@ -11,6 +11,13 @@ import typer
 
 from odscen.base.errors import InputError, in_file
 from odscen.base.given_files import read_given_text
+from odscen.cli.behaviour_options import (
+    BehaviourCommandOption,
+    BehaviourOption,
+    BehaviourSettingOption,
+    BehaviourTimeoutOption,
+    behaviour_door,
+)
 from odscen.cli.console import (
     JobsOption,
     JsonOption,
@@ -79,6 +86,10 @@ def sweep(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Of every run, instead of the scenario's.")
     ] = None,
+    behaviour: BehaviourOption = None,
+    behaviour_set: BehaviourSettingOption = None,
+    behaviour_cmd: BehaviourCommandOption = None,
+    behaviour_timeout: BehaviourTimeoutOption = 60.0,
     jobs: JobsOption = 1,
     reports: Annotated[bool, typer.Option("--reports", help="Write a report of each run.")] = False,
     openscenario: Annotated[
@@ -111,7 +122,8 @@ def sweep(
         _show_plan(planned, as_json=as_json)
         return
     own, named = _figures(figure or [])
-    settings = SweepSettings(tuple(safe or ()), named, own, seed, reports, openscenario)
+    driven = behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout)
+    settings = SweepSettings(tuple(safe or ()), named, own, seed, reports, openscenario, driven)
     folder = out or Path(f"{scenarios.scenario_name(scenario)}-sweep")
     with progress("sweeping") as step:
         found = run_sweep(

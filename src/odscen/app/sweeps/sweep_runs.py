@@ -112,7 +112,9 @@ def checked_cases(
 ) -> tuple[list[CheckedRun], dict[str, str]]:
     """Each case as a run, and those that are not possible with the reason."""
     entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
-    given = RunSettings(seed=settings.seed, recording=WATCHES_CLOSENESS)
+    given = RunSettings(
+        seed=settings.seed, recording=WATCHES_CLOSENESS, behaviour=settings.behaviour
+    )
     runs, refused = [], {}
     for name, values in cases.items():
         try:

@@ -112,8 +112,9 @@ def _tracks(table: pl.DataFrame, bodies: Mapping[str, tuple[float, float]]) -> d
     times = {time: step for step, time in enumerate(table["time"].unique().sort().to_list())}
     for (name,), rows in table.sort("time").group_by("id", maintain_order=True):
         steps = np.array([times[time] for time in rows["time"].to_list()], dtype=np.int64)
-        own = (rows[column].to_numpy().astype(np.float64) for column in ("x", "y", "hdg"))
-        found[str(name)] = _Track(steps, *own, *bodies[str(name)])
+        x, y, hdg = (rows[column].to_numpy().astype(np.float64) for column in ("x", "y", "hdg"))
+        length, width = bodies[str(name)]
+        found[str(name)] = _Track(steps, x, y, hdg, length, width)
     return dict(sorted(found.items()))
 
 
