@@ -2,7 +2,8 @@
 
 So that all meet the same machine. ``python -m bench.in_turns RUN HOW`` makes the steps of a run
 that has ended and prints processor seconds, those of programs that it starts included; starting is
-not in them. ``HOW`` is ``run`` (as the run was) or ``sumo`` (SUMO's steps and its outputs alone).
+not in them. ``HOW`` is ``run`` (as the run was), ``sumo`` (SUMO's steps and its outputs
+alone), or what drives, as JSON.
 """
 
 from __future__ import annotations
@@ -63,6 +64,8 @@ def _step_again(run: Path, how: str) -> None:
         copy = Path(shutil.copytree(run, Path(folder) / "run"))
         plan = Plan.from_json((copy / "plan.json").read_text(encoding="utf-8"))
         sumo = copy / "sumo"
+        if how.startswith("{"):
+            (sumo / "behaviour.json").write_text(how, encoding="utf-8")
         story = StoryRun.in_folder(copy, plan) if (sumo / "story.json").is_file() else None
         driven = (sumo / "behaviour.json").is_file()
         behaviour = BehaviourRun.in_folder(copy, plan) if driven else None

@@ -48,7 +48,7 @@ def main() -> None:
         workspace = Workspace.open(root / "workspace")
         loaded = load_map(workspace.add_map(MAP))
         plain, ruled = (_made(workspace, traffic(loaded, rules=r), root / str(r)) for r in (0, 1))
-        mean, ratios = on_the_road(plain), []
+        mean, ratios = _on_the_road(plain), []
         print(f"{'round':>5} {'without, s':>10} {'with, s':>8} {'ratio':>6} {'vehicles':>8}")
         for number in range(ROUNDS + 1):
             seconds = seconds_of([(plain.folder, "run"), (ruled.folder, "run")])
@@ -112,7 +112,7 @@ def _made(workspace: Workspace, scenario: Scenario, folder: Path) -> Run:
     return run
 
 
-def on_the_road(run: Run) -> float:
+def _on_the_road(run: Run) -> float:
     """Vehicles that are there at once, on average."""
     changes = {"departed": 1, "arrived": -1}
     rows = run.events().iter_rows(named=True)
