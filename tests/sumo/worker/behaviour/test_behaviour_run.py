@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,8 +22,6 @@ from tests.sumo.story_case import MIDDLE, document, entry, loaded, node_at
 from tests.sumo.worker.behaviour.models import HERE
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from odscen.sumo.folder.finished_run import Run
 
 MOTORWAY = "motorway_weave"
@@ -148,6 +147,18 @@ def test_a_program_that_dies_or_hangs_fails_the_run_with_a_reason(
     run = driven(tmp_path / "run", until=1.0, command=command, time_limit=limit)
     assert run.status == "failed"
     assert words in run.summary["error"]
+
+
+def test_the_class_and_the_program_of_the_documents_drive(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[4] / "docs" / "behaviour.md").read_text(encoding="utf-8")
+    blocks = [part.partition("```")[0] for part in text.split("```python\n")[1:]]
+    careless, program = tmp_path / "careless.py", tmp_path / "program.py"
+    careless.write_text(blocks[0], encoding="utf-8")
+    program.write_text(blocks[1], encoding="utf-8")
+    one = driven(tmp_path / "one", name=f"{careless}:Careless", until=1.0)
+    assert one.status == "completed", one.summary["error"]
+    other = driven(tmp_path / "other", command=f"{sys.executable} {program}")
+    assert track(other, "ahead")["speed"][-1] < 12.0
 
 
 def test_a_long_run_that_was_killed_ends_with_the_same_bytes(
