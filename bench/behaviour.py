@@ -45,10 +45,10 @@ class Nobody:
     def act(self, seen, state):
         import numpy as np
 
-        from odscen.learning.behaviour.behaviour_model import Action
+        from odscen.learning.behaviour.behaviour_model import DrivingAction
 
         del state
-        return Action(speed=seen.speed), np.zeros(len(seen), dtype=bool)
+        return DrivingAction(speed=seen.speed), np.zeros(len(seen), dtype=bool)
 
 
 def main() -> None:

@@ -34,10 +34,9 @@ from odscen.cli.removal_commands import remove, remove_map, trash
 from odscen.cli.report_command import report
 from odscen.cli.run_commands import resume, run
 from odscen.cli.scenario_commands import check, export, generate, replay
-from odscen.cli.search_command import search
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
-from odscen.cli.sweep_command import sweep
+from odscen.cli.sweep_command import search, sweep
 from odscen.cli.template_command import NewCommand, new
 from odscen.cli.transit_commands import app as transit
 from odscen.cli.variant_command import variant

@@ -10,14 +10,19 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from odscen.base.errors import InputError
-from odscen.cli.behaviour_options import (
+from odscen.cli.console import (
     BehaviourCommandOption,
     BehaviourOption,
     BehaviourSettingOption,
     BehaviourTimeoutOption,
+    JsonOption,
+    WorkspaceOption,
     behaviour_door,
+    log,
+    print_json,
+    print_table,
+    progress,
 )
-from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
 from odscen.cli.cosim_selfcheck import run_selfcheck
 from odscen.results.records.outcomes import RunStatus
 

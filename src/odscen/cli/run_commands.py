@@ -11,20 +11,18 @@ import typer
 
 from odscen.base.durations import clock, parse_duration
 from odscen.base.shown import visible
-from odscen.cli.behaviour_options import (
+from odscen.cli.console import (
     BehaviourCommandOption,
     BehaviourOption,
     BehaviourSettingOption,
     BehaviourTimeoutOption,
-    behaviour_door,
-)
-from odscen.cli.console import (
     IntervalOption,
     JobsOption,
     JsonOption,
     SeedsOption,
     WarmUpOption,
     WorkspaceOption,
+    behaviour_door,
     duration,
     log,
     print_json,

@@ -19,7 +19,7 @@ from tests.sumo.story_case import MIDDLE, document, node_at, workspace
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.app.sweeps.critical_search import Found
+    from odscen.app.sweeps.critical_search import SearchResult
     from odscen.scenario.document.scenario_document import Scenario
 
 MOTORWAY = "motorway_weave"
@@ -54,12 +54,12 @@ def behind() -> Scenario:
 
 
 @pytest.fixture(scope="module")
-def found(behind: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Found:
+def found(behind: Scenario, tmp_path_factory: pytest.TempPathFactory) -> SearchResult:
     out = tmp_path_factory.mktemp("search") / "one"
     return search(workspace(), behind, AXES, out, search_settings=HOW, settings=SETTINGS)
 
 
-def test_what_is_critical_is_what_is_not_safe(found: Found) -> None:
+def test_what_is_critical_is_what_is_not_safe(found: SearchResult) -> None:
     assert found.table["status"].to_list() == ["completed"] * 3
     assert found.table["criticality"].null_count() == 0
     assert found.critical == ("case-001", "case-002", "case-003")
@@ -69,7 +69,7 @@ def test_what_is_critical_is_what_is_not_safe(found: Found) -> None:
 
 
 def test_a_search_ends_with_the_same_files_after_an_interruption(
-    behind: Scenario, found: Found, tmp_path: Path
+    behind: Scenario, found: SearchResult, tmp_path: Path
 ) -> None:
     again = tmp_path / "two"
     shutil.copytree(found.folder, again)

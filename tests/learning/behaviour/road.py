@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from odscen.learning.behaviour.behaviour_model import AHEAD, BehaviourScene, Observation
+from odscen.learning.behaviour.behaviour_model import AHEAD, BehaviourScene, RoadObservation
 from odscen.learning.behaviour.lane_order import LaneOrder
 
 
@@ -37,7 +37,7 @@ def scene(count: int, *, step_length: float = 0.5, **fields: Any) -> BehaviourSc
 
 def seen(
     road: BehaviourScene, lane: list[int], pos: list[float], speed: list[float], **fields: Any
-) -> Observation:
+) -> RoadObservation:
     """All vehicles of the scene."""
     count = len(lane)
     lanes, places = np.array(lane, dtype=np.int32), np.array(pos)
@@ -61,4 +61,4 @@ def seen(
         "can_right": road.lane_right[lanes] >= 0,
         "light": np.zeros(count, dtype=np.int32),
     }
-    return Observation(**{**given, **fields})
+    return RoadObservation(**{**given, **fields})

@@ -10,7 +10,7 @@ import pytest
 
 from odscen.base.errors import InputError
 from odscen.learning.behaviour import behaviour_messages as messages
-from odscen.learning.behaviour.behaviour_model import Action, ActionKind
+from odscen.learning.behaviour.behaviour_model import DrivingAction, DrivingKind
 from odscen.learning.behaviour.intelligent_driver import IntelligentDriver
 from tests.learning.behaviour.road import scene, seen
 
@@ -31,7 +31,7 @@ def test_scene_and_observation_come_back_as_they_were() -> None:
 
 
 def test_an_action_comes_back_with_the_fields_that_it_has() -> None:
-    action = Action(ActionKind.SPEED_UNCHECKED, speed=np.array([1.0, 2.0, 3.0]))
+    action = DrivingAction(DrivingKind.SPEED_UNCHECKED, speed=np.array([1.0, 2.0, 3.0]))
     mask = np.array([True, False, True])
     back, controlled = messages.action_from_bytes(messages.action_bytes(action, mask), 3)
     np.testing.assert_array_equal(controlled, mask)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.learning.behaviour.behaviour_model import Action
+from odscen.learning.behaviour.behaviour_model import DrivingAction
 from odscen.learning.behaviour.imitation_driver import FEATURES, sight
 from odscen.learning.behaviour.intelligent_driver import desired_speeds
 
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from odscen.base.arrays import BoolArray, FloatArray
-    from odscen.learning.behaviour.behaviour_model import BehaviourScene, Observation
+    from odscen.learning.behaviour.behaviour_model import BehaviourScene, RoadObservation
     from odscen.learning.fill import Array
 
-    Reward = Callable[[Observation, BehaviourScene], FloatArray]
+    Reward = Callable[[RoadObservation, BehaviourScene], FloatArray]
     """Reward of each vehicle for the step that led to an observation, ``(N,)``."""
 
 SEES = len(FEATURES)
@@ -27,7 +27,7 @@ HARDEST, STRONGEST = -6.0, 4.0
 """Accelerations, m/s^2."""
 
 
-def progress_reward(seen: Observation, scene: BehaviourScene) -> FloatArray:
+def progress_reward(seen: RoadObservation, scene: BehaviourScene) -> FloatArray:
     """Share of the desired speed, at most 1; -10 where the gap to the vehicle ahead is used up."""
     wanted = desired_speeds(seen, scene, scene.speed_factor)
     share = np.minimum(seen.speed / np.maximum(wanted, 0.1), 1.0)
@@ -35,14 +35,14 @@ def progress_reward(seen: Observation, scene: BehaviourScene) -> FloatArray:
     return found
 
 
-def features(seen: Observation, scene: BehaviourScene) -> Array:
+def features(seen: RoadObservation, scene: BehaviourScene) -> Array:
     """What each vehicle sees, ``(N, SEES)`` float32 from 0 to :data:`HIGHEST`."""
     return np.clip(sight(seen, scene), 0.0, HIGHEST)
 
 
 def accelerated(
-    seen: Observation, scene: BehaviourScene, wanted: Mapping[int, float]
-) -> tuple[Action, BoolArray]:
+    seen: RoadObservation, scene: BehaviourScene, wanted: Mapping[int, float]
+) -> tuple[DrivingAction, BoolArray]:
     """Speeds of rows that accelerate by so much, m/s^2; the others stay SUMO's."""
     controlled = np.zeros(len(seen), dtype=np.bool_)
     speed = seen.speed.copy()
@@ -50,4 +50,4 @@ def accelerated(
         controlled[row] = True
         limited = float(np.clip(faster, HARDEST, STRONGEST))
         speed[row] = max(seen.speed[row] + limited * scene.step_length, 0.0)
-    return Action(speed=speed), controlled
+    return DrivingAction(speed=speed), controlled

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.environments.driving_tasks import Reward
-    from odscen.learning.behaviour.behaviour_model import Observation
+    from odscen.learning.behaviour.behaviour_model import RoadObservation
     from odscen.learning.fill import Array
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.run_settings import RunSettings
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without the extra
     """One episode is one run, from when the ego departs.
 
-    Observation: the 12 numbers of :func:`odscen.learning.behaviour.imitation_driver.sight`. Action:
+    Seen are the 12 numbers of :func:`odscen.learning.behaviour.imitation_driver.sight`; done is
     one acceleration, -6 to 4 m/s^2; right of way and what else SUMO's driver thinks unsafe limits
     it. It is terminated when the ego has arrived, truncated at the end of the run.
 
@@ -75,7 +75,7 @@ class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without 
         self._given = workspace, scenario, settings
         self._reward = reward
         self._run: SteppedRun | None = None
-        self._seen: Observation
+        self._seen: RoadObservation
         self._row = 0
         self._ego = 0
         self._last = np.zeros(SEES, dtype=np.float32)
@@ -132,7 +132,7 @@ class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without 
             self._run.close()
             self._run = None
 
-    def _find(self, seen: Observation) -> bool:
+    def _find(self, seen: RoadObservation) -> bool:
         rows = np.flatnonzero(seen.index == self._ego)
         if len(rows):
             self._seen, self._row = seen, int(rows[0])

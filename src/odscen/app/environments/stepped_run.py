@@ -29,7 +29,11 @@ from odscen.sumo.realize.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray
-    from odscen.learning.behaviour.behaviour_model import Action, BehaviourScene, Observation
+    from odscen.learning.behaviour.behaviour_model import (
+        BehaviourScene,
+        DrivingAction,
+        RoadObservation,
+    )
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run
     from odscen.workspace.store import Workspace
@@ -103,7 +107,7 @@ class SteppedRun:
         self.scene: BehaviourScene = scene_from_bytes(first)[0]
         self._connection.sendall(framed(b""))
 
-    def see(self) -> Observation | None:
+    def see(self) -> RoadObservation | None:
         """Wait for the next step; ``None`` once the run is over.
 
         Raises
@@ -119,7 +123,7 @@ class SteppedRun:
             raise self._why()
         return None
 
-    def drive(self, action: Action, controlled: BoolArray) -> None:
+    def drive(self, action: DrivingAction, controlled: BoolArray) -> None:
         """Let the step be made."""
         self._connection.sendall(framed(action_bytes(action, controlled)))
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.environments.driving_tasks import Reward
-    from odscen.learning.behaviour.behaviour_model import Observation
+    from odscen.learning.behaviour.behaviour_model import RoadObservation
     from odscen.learning.fill import Array
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.run_settings import RunSettings
@@ -73,7 +73,7 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
         self.render_mode = None
         self.agents: list[str] = []
         self._run: SteppedRun | None = None
-        self._seen: Observation | None = None
+        self._seen: RoadObservation | None = None
         first = SteppedRun(workspace, scenario, settings=settings)
         self.possible_agents = [str(name) for name in first.scene.vehicle_id]
         first.close()
@@ -158,10 +158,10 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
             self._run.close()
             self._run, self._seen, self.agents = None, None, []
 
-    def _names(self, seen: Observation) -> list[str]:
+    def _names(self, seen: RoadObservation) -> list[str]:
         return [self.possible_agents[row] for row in seen.index.tolist()]
 
-    def _views(self, seen: Observation) -> dict[str, Array]:
+    def _views(self, seen: RoadObservation) -> dict[str, Array]:
         if self._run is None:
             return {}
         return dict(zip(self._names(seen), features(seen, self._run.scene), strict=True))

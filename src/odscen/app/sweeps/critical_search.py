@@ -79,7 +79,7 @@ class SearchSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class SearchResult:
     """What a search has found.
 
     Attributes
@@ -115,7 +115,7 @@ def search(
     settings: SweepSettings | None = None,
     processes: int = 1,
     done: Callable[[int, int], None] | None = None,
-) -> Found:
+) -> SearchResult:
     """Look for cases that are not safe; what ``out`` has from an interrupted search is kept.
 
     Parameters
@@ -216,7 +216,7 @@ class _Looking:
         self.rows += rows
         return [row["criticality"] for row in rows]
 
-    def found(self) -> Found:
+    def found(self) -> SearchResult:
         """Write the table, the page and the archive."""
         places = np.array(self._places).reshape(len(self.rows), -1)
         critical = [k for k, row in enumerate(self.rows) if row["safe"] is False]
@@ -225,7 +225,7 @@ class _Looking:
         table = write_cases(
             self._out, self._scenario, self._plan.names, rows=self.rows, limits=self._limits
         )
-        found = Found(
+        found = SearchResult(
             folder=self._out,
             table=table,
             critical=tuple(self.rows[k]["case"] for k in critical),

@@ -7,9 +7,9 @@ Each message is eight bytes, its length as a little-endian unsigned number, and 
 3. to the program, before each step: the observation, as ``.npy`` with a row for each vehicle;
 4. from the program: what to do, as ``.npy`` with as many rows.
 
-Rows have the fields of :class:`~odscen.learning.behaviour.behaviour_model.Observation`, with
+Rows have the fields of :class:`~odscen.learning.behaviour.behaviour_model.RoadObservation`, with
 ``time`` in each; rows back have ``controlled`` and those fields of
-:class:`~odscen.learning.behaviour.behaviour_model.Action` that are used.
+:class:`~odscen.learning.behaviour.behaviour_model.DrivingAction` that are used.
 """
 
 from __future__ import annotations
@@ -23,7 +23,12 @@ from typing import IO, TYPE_CHECKING, Any, Final
 import numpy as np
 
 from odscen.base.errors import InputError
-from odscen.learning.behaviour.behaviour_model import AHEAD, Action, BehaviourScene, Observation
+from odscen.learning.behaviour.behaviour_model import (
+    AHEAD,
+    BehaviourScene,
+    DrivingAction,
+    RoadObservation,
+)
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray
@@ -43,8 +48,8 @@ def _form(name: str) -> tuple[Any, ...]:
     return name, "<i4" if name in _WHOLE else "?" if name in _YES_NO else "<f8"
 
 
-_ROWS: Final = np.dtype([_form(one.name) for one in fields(Observation)])
-_ACTIONS: Final = tuple(one.name for one in fields(Action))
+_ROWS: Final = np.dtype([_form(one.name) for one in fields(RoadObservation)])
+_ACTIONS: Final = tuple(one.name for one in fields(DrivingAction))
 
 
 def scene_bytes(scene: BehaviourScene, seed: int) -> bytes:
@@ -64,7 +69,7 @@ def scene_from_bytes(data: bytes) -> tuple[BehaviourScene, int]:
         return BehaviourScene(**found), int(arrays["seed"])
 
 
-def observation_bytes(seen: Observation) -> bytes:
+def observation_bytes(seen: RoadObservation) -> bytes:
     """An observation as rows."""
     rows = np.empty(len(seen), dtype=_ROWS)
     for name in _ROWS.names or ():
@@ -72,15 +77,15 @@ def observation_bytes(seen: Observation) -> bytes:
     return _npy(rows)
 
 
-def observation_from_bytes(data: bytes) -> Observation:
+def observation_from_bytes(data: bytes) -> RoadObservation:
     """Inverse of :func:`observation_bytes`; at least one row."""
     rows = np.load(io.BytesIO(data), allow_pickle=False)
     found: dict[str, Any] = {name: rows[name] for name in _ROWS.names or ()}
     found["time"] = float(rows["time"][0])
-    return Observation(**found)
+    return RoadObservation(**found)
 
 
-def action_bytes(action: Action, controlled: BoolArray) -> bytes:
+def action_bytes(action: DrivingAction, controlled: BoolArray) -> bytes:
     """What to do as rows."""
     used = [name for name in _ACTIONS if getattr(action, name) is not None]
     kinds = {"kind": "u1", "lane": "<i4", "change": "<i4"}
@@ -92,7 +97,7 @@ def action_bytes(action: Action, controlled: BoolArray) -> bytes:
     return _npy(rows)
 
 
-def action_from_bytes(data: bytes, count: int) -> tuple[Action, BoolArray]:
+def action_from_bytes(data: bytes, count: int) -> tuple[DrivingAction, BoolArray]:
     """Inverse of :func:`action_bytes`.
 
     Raises
@@ -115,7 +120,7 @@ def action_from_bytes(data: bytes, count: int) -> tuple[Action, BoolArray]:
         msg = f"its answer has shape {rows.shape}, not ({count},)"
         raise InputError(msg)
     given: dict[str, Array] = {name: rows[name] for name in names if name != "controlled"}
-    return Action(**given), rows["controlled"].astype(bool)
+    return DrivingAction(**given), rows["controlled"].astype(bool)
 
 
 def framed(data: bytes) -> bytes:

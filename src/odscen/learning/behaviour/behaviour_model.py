@@ -23,7 +23,7 @@ AHEAD = 4
 """Lanes along its route that each vehicle is told of, those inside junctions included."""
 
 
-class ActionKind(IntEnum):
+class DrivingKind(IntEnum):
     """How a vehicle is driven in the next step."""
 
     SPEED = 0
@@ -97,7 +97,7 @@ class BehaviourScene:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observation:
+class RoadObservation:
     """The ``N`` vehicles on the road before a step; arrays of shape ``(N,)``, but ``ahead``.
 
     Attributes
@@ -150,7 +150,7 @@ class Observation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Action:
+class DrivingAction:
     """What vehicles do in the next step; arrays of shape ``(N,)`` in the order of the observation.
 
     Values of vehicles that are not controlled are not looked at.
@@ -158,7 +158,7 @@ class Action:
     Attributes
     ----------
     kind
-        One :class:`ActionKind` for all, or an array of them.
+        One :class:`DrivingKind` for all, or an array of them.
     speed
         m/s; needed for speeds, of a place the speed that others see (without it, its own).
     lane, pos
@@ -170,7 +170,7 @@ class Action:
         lanes of controlled vehicles only where their route needs it; without, as it likes.
     """
 
-    kind: ActionKind | Array = ActionKind.SPEED
+    kind: DrivingKind | Array = DrivingKind.SPEED
     speed: FloatArray | None = None
     lane: Array | None = None
     pos: FloatArray | None = None
@@ -189,7 +189,7 @@ class BehaviourModel(Protocol):
         ``rng`` is the only source of chance. Each slice of a long run begins anew.
         """
 
-    def act(self, observation: Observation, state: Any) -> tuple[Action, BoolArray]:
+    def act(self, observation: RoadObservation, state: Any) -> tuple[DrivingAction, BoolArray]:
         """Drive; returns what to do, and a bool for each vehicle: whether it is controlled."""
 
 

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.base.errors import InputError
-from odscen.learning.behaviour.behaviour_model import ActionKind
+from odscen.learning.behaviour.behaviour_model import DrivingKind
 
 if TYPE_CHECKING:
-    from odscen.learning.behaviour.behaviour_model import Action
+    from odscen.learning.behaviour.behaviour_model import DrivingAction
     from odscen.learning.fill import Array
 
 _FASTEST = 150.0
 """m/s; a model that asks for more is mistaken."""
 _NEEDS = {
-    ActionKind.SPEED: ("speed",), ActionKind.SPEED_UNCHECKED: ("speed",),
-    ActionKind.LANE_POSITION: ("lane", "pos"), ActionKind.POSE: ("x", "y", "hdg"),
+    DrivingKind.SPEED: ("speed",), DrivingKind.SPEED_UNCHECKED: ("speed",),
+    DrivingKind.LANE_POSITION: ("lane", "pos"), DrivingKind.POSE: ("x", "y", "hdg"),
 }  # fmt: skip
 
 
@@ -40,7 +40,7 @@ class CheckedAction:
         If shapes, types or values are not possible, or a field is missing.
     """
 
-    def __init__(self, action: Action, controlled: Any, count: int) -> None:
+    def __init__(self, action: DrivingAction, controlled: Any, count: int) -> None:
         mask = np.asarray(controlled)
         if mask.shape != (count,) or mask.dtype != np.bool_:
             msg = f"is_controlled is {mask.dtype} {mask.shape}, not bool ({count},)"
@@ -48,7 +48,7 @@ class CheckedAction:
         self.rows = np.flatnonzero(mask)
         kinds = np.broadcast_to(np.asarray(action.kind), (count,))
         used = np.unique(kinds[mask]).tolist()
-        if unknown := [kind for kind in used if kind not in {*ActionKind}]:
+        if unknown := [kind for kind in used if kind not in {*DrivingKind}]:
             msg = f"there is no kind of action {unknown[0]!r}"
             raise InputError(msg)
         self.kind = kinds.tolist()
@@ -63,9 +63,9 @@ class CheckedAction:
             if getattr(action, name) is not None
         }
         for kind in used:
-            for name in _NEEDS[ActionKind(kind)]:
+            for name in _NEEDS[DrivingKind(kind)]:
                 if name not in self.real and name not in self.whole:
-                    msg = f"an action of kind {ActionKind(kind).name} needs {name}"
+                    msg = f"an action of kind {DrivingKind(kind).name} needs {name}"
                     raise InputError(msg)
         speed = self.real.get("speed")
         if speed is not None and len(self.rows):
@@ -77,7 +77,7 @@ class CheckedAction:
         self.speed = None if speed is None else speed.tolist()
         self.change = self.whole.get("change")
 
-    def _numbers(self, action: Action, name: str, count: int) -> Array:
+    def _numbers(self, action: DrivingAction, name: str, count: int) -> Array:
         try:
             values = np.asarray(getattr(action, name), dtype=np.float64)
         except (TypeError, ValueError) as error:

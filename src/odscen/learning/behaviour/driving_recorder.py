@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.learning.behaviour.behaviour_model import Action
+from odscen.learning.behaviour.behaviour_model import DrivingAction
 from odscen.learning.behaviour.imitation_driver import sight
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
-    from odscen.learning.behaviour.behaviour_model import BehaviourScene, Observation
+    from odscen.learning.behaviour.behaviour_model import BehaviourScene, RoadObservation
     from odscen.learning.fill import Array
 
 
@@ -40,7 +40,9 @@ class DrivingRecorder:
         del rng
         return scene
 
-    def act(self, observation: Observation, state: BehaviourScene) -> tuple[Action, BoolArray]:
+    def act(
+        self, observation: RoadObservation, state: BehaviourScene
+    ) -> tuple[DrivingAction, BoolArray]:
         """Remember what is seen, and in the next step what came of it."""
         seen = observation
         if self._before is not None:
@@ -51,7 +53,7 @@ class DrivingRecorder:
         due = self._steps % max(int(self.every), 1) == 0
         self._before = (seen.index, seen.speed, sight(seen, state)) if due else None
         self._steps += 1
-        return Action(speed=seen.speed), np.zeros(len(seen), dtype=np.bool_)
+        return DrivingAction(speed=seen.speed), np.zeros(len(seen), dtype=np.bool_)
 
     def close(self) -> None:
         """Write it, if there is any."""

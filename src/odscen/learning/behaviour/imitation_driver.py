@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 
 from odscen.base.errors import InputError
-from odscen.learning.behaviour.behaviour_model import Action, LightAhead
+from odscen.learning.behaviour.behaviour_model import DrivingAction, LightAhead
 from odscen.learning.behaviour.intelligent_driver import desired_speeds
 from odscen.learning.reference.small_network import (
     SmallNetwork,
@@ -28,7 +29,7 @@ from odscen.learning.reference.small_network import (
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray
-    from odscen.learning.behaviour.behaviour_model import BehaviourScene, Observation
+    from odscen.learning.behaviour.behaviour_model import BehaviourScene, RoadObservation
     from odscen.learning.fill import Array
 
 BINS = np.arange(-6.0, 4.01, 0.5)
@@ -69,7 +70,9 @@ class ImitationDriver:
         data = Path(self.weights).read_bytes() if self.weights else shipped_weights()
         return network_from_bytes(data, file=self.weights or _SHIPPED), ImitationState(scene, rng)
 
-    def act(self, observation: Observation, state: tuple[Any, ...]) -> tuple[Action, BoolArray]:
+    def act(
+        self, observation: RoadObservation, state: tuple[Any, ...]
+    ) -> tuple[DrivingAction, BoolArray]:
         """Speeds after the next step."""
         network, (scene, rng) = state
         shares = softmax(network(sight(observation, scene)))
@@ -79,10 +82,10 @@ class ImitationDriver:
             place = np.minimum((shares.cumsum(axis=1) < drawn).sum(axis=1), len(BINS) - 1)
             faster = BINS[place]
         speed = np.maximum(observation.speed + faster * scene.step_length, 0.0)
-        return Action(speed=speed.astype(np.float64)), observation.lane >= 0
+        return DrivingAction(speed=speed.astype(np.float64)), observation.lane >= 0
 
 
-def sight(seen: Observation, scene: BehaviourScene) -> Array:
+def sight(seen: RoadObservation, scene: BehaviourScene) -> Array:
     """What each vehicle sees: :data:`FEATURES`, shape ``(N, 12)``, float32."""
     wanted = desired_speeds(seen, scene, scene.speed_factor)
     gap = np.clip(seen.gap, 0.0, _FAR)
@@ -135,7 +138,7 @@ def network_from_bytes(data: bytes, *, file: str) -> SmallNetwork:
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             weights = tuple(arrays[f"w{k}"] for k in range(6))
-    except (ValueError, KeyError, OSError, EOFError) as error:
+    except (ValueError, KeyError, OSError, EOFError, BadZipFile) as error:
         msg = f"no weights of a driver: {error}"
         raise InputError(msg, file=file) from error
     if weights[0].shape[:1] != (len(FEATURES),) or weights[5].shape != (len(BINS),):

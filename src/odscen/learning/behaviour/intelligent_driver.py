@@ -23,12 +23,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.learning.behaviour.behaviour_model import Action, LightAhead
+from odscen.learning.behaviour.behaviour_model import DrivingAction, LightAhead
 from odscen.learning.behaviour.lane_order import LaneOrder
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
-    from odscen.learning.behaviour.behaviour_model import BehaviourScene, Observation
+    from odscen.learning.behaviour.behaviour_model import BehaviourScene, RoadObservation
 
 _STOP_GAP = 1.0
 """Metres before a stop line at which a driver wants to stand."""
@@ -78,7 +78,9 @@ class IntelligentDriver:
         drawn = 1.0 + self.spread * np.clip(rng.standard_normal(len(scene.vehicle_id)), -2.0, 2.0)
         return DriverState(scene, scene.speed_factor * drawn)
 
-    def act(self, observation: Observation, state: DriverState) -> tuple[Action, BoolArray]:
+    def act(
+        self, observation: RoadObservation, state: DriverState
+    ) -> tuple[DrivingAction, BoolArray]:
         """Speeds after the next step, and wishes to change lanes."""
         scene, seen = state.scene, observation
         controlled = seen.lane >= 0
@@ -88,7 +90,7 @@ class IntelligentDriver:
         free = np.minimum(own, self._at_light(seen, scene, wanted))
         speed = np.maximum(seen.speed + free * scene.step_length, 0.0)
         change = self._changes(seen, scene, wanted, own) if self.changes_lanes else None
-        return Action(speed=speed, change=change), controlled
+        return DrivingAction(speed=speed, change=change), controlled
 
     def follow(
         self, speed: FloatArray, wanted: FloatArray, gap: FloatArray, leading: FloatArray
@@ -102,7 +104,9 @@ class IntelligentDriver:
         )
         return found
 
-    def _at_light(self, seen: Observation, scene: BehaviourScene, wanted: FloatArray) -> FloatArray:
+    def _at_light(
+        self, seen: RoadObservation, scene: BehaviourScene, wanted: FloatArray
+    ) -> FloatArray:
         """Acceleration before a light."""
         rest = scene.lane_length[seen.lane] - seen.pos
         stops = seen.speed**2 / (2.0 * self.deceleration) < rest
@@ -112,7 +116,7 @@ class IntelligentDriver:
         return self.follow(seen.speed, wanted, gap, np.zeros(len(seen)))
 
     def _changes(
-        self, seen: Observation, scene: BehaviourScene, wanted: FloatArray, own: FloatArray
+        self, seen: RoadObservation, scene: BehaviourScene, wanted: FloatArray, own: FloatArray
     ) -> Int32Array:
         change = np.zeros(len(seen), dtype=np.int32)
         every = max(round(_EVERY / scene.step_length), 1)
@@ -134,7 +138,7 @@ class IntelligentDriver:
 
     def _gain(
         self,
-        seen: Observation,
+        seen: RoadObservation,
         order: LaneOrder,
         rows: IntArray,
         lane: Int32Array,
@@ -159,7 +163,7 @@ class IntelligentDriver:
         return np.where(unsafe, -np.inf, gain)
 
 
-def desired_speeds(seen: Observation, scene: BehaviourScene, factor: FloatArray) -> FloatArray:
+def desired_speeds(seen: RoadObservation, scene: BehaviourScene, factor: FloatArray) -> FloatArray:
     """Speed of each one in free flow: the limit times a factor ``(V,)``, or its own if lower."""
     limit = np.where(seen.lane >= 0, scene.lane_limit[seen.lane], 13.9) * factor[seen.index]
     own = scene.desired_speed[seen.index]

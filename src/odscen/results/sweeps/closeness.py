@@ -42,7 +42,7 @@ class Closeness(NamedTuple):
     conflict_distance: float | None
 
 
-class _Track(NamedTuple):
+class _BodyTrack(NamedTuple):
     step: IntArray
     x: FloatArray
     y: FloatArray
@@ -107,20 +107,22 @@ def criticality(row: Mapping[str, Any]) -> float:
     return max(near, default=0.0)
 
 
-def _tracks(table: pl.DataFrame, bodies: Mapping[str, tuple[float, float]]) -> dict[str, _Track]:
+def _tracks(
+    table: pl.DataFrame, bodies: Mapping[str, tuple[float, float]]
+) -> dict[str, _BodyTrack]:
     found = {}
     times = {time: step for step, time in enumerate(table["time"].unique().sort().to_list())}
     for (name,), rows in table.sort("time").group_by("id", maintain_order=True):
         steps = np.array([times[time] for time in rows["time"].to_list()], dtype=np.int64)
         x, y, hdg = (rows[column].to_numpy().astype(np.float64) for column in ("x", "y", "hdg"))
         length, width = bodies[str(name)]
-        found[str(name)] = _Track(steps, x, y, hdg, length, width)
+        found[str(name)] = _BodyTrack(steps, x, y, hdg, length, width)
     return dict(sorted(found.items()))
 
 
 def _pairs(
-    tracks: Mapping[str, _Track], watched: Collection[str] | None
-) -> Iterator[tuple[_Track, _Track]]:
+    tracks: Mapping[str, _BodyTrack], watched: Collection[str] | None
+) -> Iterator[tuple[_BodyTrack, _BodyTrack]]:
     names = [*tracks]
     for first, one in enumerate(names):
         for other in names[first + 1 :]:
@@ -128,7 +130,7 @@ def _pairs(
                 yield tracks[one], tracks[other]
 
 
-def _clearance(one: _Track, other: _Track) -> float | None:
+def _clearance(one: _BodyTrack, other: _BodyTrack) -> float | None:
     """Least distance of the discs that cover two bodies, 0 where they overlap."""
     _, rows, others = np.intersect1d(one.step, other.step, return_indices=True)
     if not len(rows):
@@ -139,7 +141,7 @@ def _clearance(one: _Track, other: _Track) -> float | None:
     return max(float(away.min()) - r - s, 0.0)
 
 
-def _discs(track: _Track, rows: IntArray) -> tuple[FloatArray, float]:
+def _discs(track: _BodyTrack, rows: IntArray) -> tuple[FloatArray, float]:
     """Centres ``(rows, discs, 2)`` of discs along a body, and their radius."""
     count = max(math.ceil(track.length / max(track.width, 0.1)), 1)
     along = (np.arange(count) + 0.5) / count * track.length - track.length / 2.0
@@ -149,7 +151,7 @@ def _discs(track: _Track, rows: IntArray) -> tuple[FloatArray, float]:
     return np.stack([x, y], axis=-1), track.width / 2.0
 
 
-def _conflict_distance(one: _Track, other: _Track) -> float | None:
+def _conflict_distance(one: _BodyTrack, other: _BodyTrack) -> float | None:
     from shapely import LineString
 
     lines = []

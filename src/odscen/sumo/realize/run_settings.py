@@ -112,7 +112,7 @@ class RunSettings:
                 raise InputError(msg)
         _refuse_time("interval", self.interval)
         if self.meso and self.behaviour is not None:
-            msg = "in meso nobody can be driven: it has queues, not vehicles"
+            msg = "in meso no model can drive: it has queues, not vehicles"
             raise InputError(msg)
         if self.meso and self.recorded.criticality:
             msg = "criticality cannot be measured in meso: it has queues, not vehicles that meet"

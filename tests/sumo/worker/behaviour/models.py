@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from odscen.learning.behaviour.behaviour_model import Action, ActionKind
+from odscen.learning.behaviour.behaviour_model import DrivingAction, DrivingKind
 
 HERE = "tests.sumo.worker.behaviour.models"
 
@@ -19,9 +19,9 @@ class Nobody:
         rng.random()
         return scene
 
-    def act(self, seen: Any, state: Any) -> tuple[Action, Any]:
+    def act(self, seen: Any, state: Any) -> tuple[DrivingAction, Any]:
         del state
-        return Action(speed=seen.speed), np.zeros(len(seen), dtype=bool)
+        return DrivingAction(speed=seen.speed), np.zeros(len(seen), dtype=bool)
 
 
 @dataclass
@@ -32,15 +32,15 @@ class Only(Nobody):
     kind: float
     value: float
 
-    def act(self, seen: Any, state: Any) -> tuple[Action, Any]:
+    def act(self, seen: Any, state: Any) -> tuple[DrivingAction, Any]:
         mine = (state.vehicle_id[seen.index] == self.vehicle) & (1.0 <= seen.time < 3.0)
-        kind, zero = ActionKind(int(self.kind)), np.zeros(len(seen))
+        kind, zero = DrivingKind(int(self.kind)), np.zeros(len(seen))
         since = seen.time - 1.0
-        if kind in (ActionKind.SPEED, ActionKind.SPEED_UNCHECKED):
-            return Action(kind, speed=zero + self.value), mine
-        if kind == ActionKind.LANE_POSITION:
-            return Action(kind, speed=zero, lane=seen.lane, pos=seen.pos + self.value), mine
-        place = Action(kind, x=zero + self.value + since, y=zero - 20.0, hdg=zero + 0.5)
+        if kind in (DrivingKind.SPEED, DrivingKind.SPEED_UNCHECKED):
+            return DrivingAction(kind, speed=zero + self.value), mine
+        if kind == DrivingKind.LANE_POSITION:
+            return DrivingAction(kind, speed=zero, lane=seen.lane, pos=seen.pos + self.value), mine
+        place = DrivingAction(kind, x=zero + self.value + since, y=zero - 20.0, hdg=zero + 0.5)
         return place, mine
 
 
@@ -57,5 +57,7 @@ class Wrong(Nobody):
             msg = "kaputt"
             raise ZeroDivisionError(msg)
         count = len(seen)
-        place = Action(ActionKind.LANE_POSITION, lane=np.full(count, 10**6), pos=np.zeros(count))
+        place = DrivingAction(
+            DrivingKind.LANE_POSITION, lane=np.full(count, 10**6), pos=np.zeros(count)
+        )
         return place, np.ones(count, dtype=bool)

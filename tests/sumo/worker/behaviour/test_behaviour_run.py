@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.learning.behaviour.behaviour_model import ActionKind, BehaviourDoor
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor, DrivingKind
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner import worker_process
 from odscen.sumo.runner.long_runs import resume
@@ -55,7 +55,7 @@ def track(run: Run, name: str) -> pl.DataFrame:
     return run.trajectories().filter(pl.col("id") == name)
 
 
-def only(kind: ActionKind, value: float, *, vehicle: str = "ahead") -> dict[str, Any]:
+def only(kind: DrivingKind, value: float, *, vehicle: str = "ahead") -> dict[str, Any]:
     options = {"vehicle": vehicle, "kind": float(kind), "value": value}
     return {"name": f"{HERE}:Only", "options": options}
 
@@ -78,7 +78,7 @@ def test_the_same_seed_gives_the_same_bytes_and_idm_drives(tmp_path: Path) -> No
 
 
 def test_an_unchecked_speed_is_the_speed_and_then_sumo_drives_again(tmp_path: Path) -> None:
-    run = driven(tmp_path / "run", **only(ActionKind.SPEED_UNCHECKED, 3.0))
+    run = driven(tmp_path / "run", **only(DrivingKind.SPEED_UNCHECKED, 3.0))
     rows = track(run, "ahead")
     during = rows.filter(pl.col("time").is_between(1.05, 2.95))["speed"].to_numpy()
     np.testing.assert_allclose(during, 3.0, atol=0.011)
@@ -86,20 +86,20 @@ def test_an_unchecked_speed_is_the_speed_and_then_sumo_drives_again(tmp_path: Pa
 
 
 def test_a_checked_speed_does_not_run_into_the_vehicle_ahead(tmp_path: Path) -> None:
-    fast = driven(tmp_path / "checked", **only(ActionKind.SPEED, 40.0, vehicle="behind"))
-    hit = driven(tmp_path / "blind", **only(ActionKind.SPEED_UNCHECKED, 60.0, vehicle="behind"))
+    fast = driven(tmp_path / "checked", **only(DrivingKind.SPEED, 40.0, vehicle="behind"))
+    hit = driven(tmp_path / "blind", **only(DrivingKind.SPEED_UNCHECKED, 60.0, vehicle="behind"))
     assert "collision" not in fast.events()["kind"].to_list()
     assert "collision" in hit.events()["kind"].to_list()
 
 
 def test_a_place_on_the_lane_is_taken(tmp_path: Path) -> None:
-    rows = track(driven(tmp_path / "run", **only(ActionKind.LANE_POSITION, 0.5)), "ahead")
+    rows = track(driven(tmp_path / "run", **only(DrivingKind.LANE_POSITION, 0.5)), "ahead")
     during = rows.filter(pl.col("time").is_between(1.05, 2.95))["x"].to_numpy()
     np.testing.assert_allclose(np.diff(during), 0.5, atol=0.02)
 
 
 def test_a_pose_is_that_of_the_centre_of_the_body_off_the_road_too(tmp_path: Path) -> None:
-    rows = track(driven(tmp_path / "run", **only(ActionKind.POSE, 400.0)), "ahead")
+    rows = track(driven(tmp_path / "run", **only(DrivingKind.POSE, 400.0)), "ahead")
     during = rows.filter(pl.col("time").is_between(1.05, 2.95))
     time = during["time"].to_numpy()
     np.testing.assert_allclose(during["x"].to_numpy(), 400.0 + time - 1.0, atol=0.011)
@@ -127,7 +127,7 @@ def test_a_program_over_a_pipe_drives_as_the_class_does(tmp_path: Path) -> None:
     script = tmp_path / "drive.py"
     script.write_text(SERVE.format("Only('ahead', 1, 3.0)"))
     run = driven(tmp_path / "piped", command=f"{sys.executable} {script}")
-    own = driven(tmp_path / "own", **only(ActionKind.SPEED_UNCHECKED, 3.0))
+    own = driven(tmp_path / "own", **only(DrivingKind.SPEED_UNCHECKED, 3.0))
     for name in RECORDS:
         assert (own.folder / name).read_bytes() == (run.folder / name).read_bytes(), name
 
@@ -197,7 +197,7 @@ def test_a_model_that_cannot_be_made_is_refused_before_the_run(
 
 
 def test_in_meso_nobody_is_driven() -> None:
-    with pytest.raises(InputError, match="in meso nobody can be driven"):
+    with pytest.raises(InputError, match="in meso no model can drive"):
         RunSettings(meso=True, behaviour=BehaviourDoor(name="idm"))
     settings = RunSettings(behaviour=BehaviourDoor(name="idm", options={"headway": 2.0}))
     assert RunSettings.from_dict(settings.to_dict()) == settings

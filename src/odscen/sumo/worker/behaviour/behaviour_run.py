@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError, OdscenError, SimulationError
 from odscen.base.frames import angle_deg_from_hdg
-from odscen.learning.behaviour.behaviour_model import ActionKind, BehaviourDoor
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor, DrivingKind
 from odscen.learning.behaviour.checked_action import CheckedAction
 from odscen.scenario.document.named_random import stream
 from odscen.sumo.folder.layout import BEHAVIOUR_FILE, SUMO_FOLDER
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection
     from pathlib import Path
 
-    from odscen.learning.behaviour.behaviour_model import BehaviourModel, Observation
+    from odscen.learning.behaviour.behaviour_model import BehaviourModel, RoadObservation
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.driven_vehicles import DrivenVehicles
     from odscen.sumo.worker.session import Session
@@ -117,7 +117,7 @@ class BehaviourRun:
             raise SimulationError(msg) from error
 
     def _drive(
-        self, seen: Observation, names: list[str], asked: CheckedAction, taken: Collection[str]
+        self, seen: RoadObservation, names: list[str], asked: CheckedAction, taken: Collection[str]
     ) -> None:
         present = set(names)
         self._earlier &= present
@@ -142,9 +142,9 @@ class BehaviourRun:
                 if name not in taken:
                     self._road.release(name)
 
-    def _act(self, seen: Observation, row: int, name: str, asked: CheckedAction) -> None:
+    def _act(self, seen: RoadObservation, row: int, name: str, asked: CheckedAction) -> None:
         kind = asked.kind[row]
-        mode = kind == ActionKind.SPEED, asked.change is not None
+        mode = kind == DrivingKind.SPEED, asked.change is not None
         if self._modes.get(name) != mode:
             self._road.take_over(name, checked=mode[0], changes=mode[1])
             self._modes[name] = mode
@@ -153,19 +153,19 @@ class BehaviourRun:
             self._road.set_speed(name, asked.speed[row])
         if asked.change is not None and asked.change[row]:
             self._road.change_lane(name, asked.change[row], self._plan.step_length)
-        if kind == ActionKind.LANE_POSITION:
+        if kind == DrivingKind.LANE_POSITION:
             lane = asked.whole["lane"][row]
             if not 0 <= lane < len(self._sight.scene.lane_id):
                 msg = f"vehicle {name!r}: there is no lane {lane}"
                 raise InputError(msg)
             pos = float(asked.real["pos"][row])
             self._road.put_on_lane(name, str(self._sight.scene.lane_id[lane]), pos)
-        elif kind == ActionKind.POSE:
+        elif kind == DrivingKind.POSE:
             x, y, hdg = (float(asked.real[one][row]) for one in ("x", "y", "hdg"))
             half = 0.5 * float(self._sight.scene.vehicle_length[seen.index[row]])
             x += half * math.cos(hdg) + self._plan.net_offset[0]
             y += half * math.sin(hdg) + self._plan.net_offset[1]
             self._road.put(name, x, y, float(angle_deg_from_hdg(hdg)))
 
-    def _failure(self, seen: Observation, words: str) -> SimulationError:
+    def _failure(self, seen: RoadObservation, words: str) -> SimulationError:
         return SimulationError(f"behaviour {self._name} at {seen.time:g} s: {words}")

@@ -31,7 +31,11 @@ if TYPE_CHECKING:
     import numpy as np
 
     from odscen.base.arrays import BoolArray
-    from odscen.learning.behaviour.behaviour_model import Action, BehaviourScene, Observation
+    from odscen.learning.behaviour.behaviour_model import (
+        BehaviourScene,
+        DrivingAction,
+        RoadObservation,
+    )
 
 _LAST_LINES = 5
 _LAST_BYTES = 4000
@@ -56,14 +60,13 @@ class _Peer:
         os.set_blocking(self._back, False)
         self._ask(scene_bytes(scene, self._seed))
 
-    def act(self, observation: Observation, state: Any) -> tuple[Action, BoolArray]:
+    def act(self, observation: RoadObservation, state: Any) -> tuple[DrivingAction, BoolArray]:
         """Ask it."""
         del state
         return action_from_bytes(self._ask(observation_bytes(observation)), len(observation))
 
     def close(self) -> None:
         """Say that the run is over."""
-        raise NotImplementedError
 
     def _connect(self) -> None:
         raise NotImplementedError
@@ -177,7 +180,7 @@ class SocketDriver(_Peer):
         try:
             self._socket.connect(self._path)
         except OSError as error:
-            msg = f"nobody listens at its socket: {error.strerror}"
+            msg = f"no program listens at its socket: {error.strerror}"
             raise InputError(msg) from error
         self._to = self._back = self._socket.fileno()
 

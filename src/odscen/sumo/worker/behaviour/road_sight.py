@@ -11,7 +11,7 @@ from odscen.learning.behaviour.behaviour_model import (
     AHEAD,
     BehaviourScene,
     LightAhead,
-    Observation,
+    RoadObservation,
 )
 from odscen.learning.behaviour.lane_order import LaneOrder
 
@@ -50,7 +50,7 @@ class RoadSight:
         self._link: list[tuple[str, int] | None] = [None] * count
         self._paths: dict[tuple[str, tuple[str, ...], str], tuple[list[int], bool, bool, str]] = {}
 
-    def look(self, time: float) -> tuple[Observation, list[str]]:
+    def look(self, time: float) -> tuple[RoadObservation, list[str]]:
         """Everyone on the road, and their ids."""
         seen = self._road.traffic(self._row)
         rows = [self._row[name] for name in seen.names]
@@ -64,7 +64,7 @@ class RoadSight:
         hdg = np.radians(90.0 - seen.angle_deg)
         ahead, can = self._ahead[index], self._can[index]
         leader, gap = LaneOrder(lanes, seen.pos, length).leaders(ahead, self.scene.lane_length)
-        observation = Observation(
+        observation = RoadObservation(
             time=time,
             index=index,
             x=seen.x - 0.5 * length * np.cos(hdg) - self._offset[0],
