@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -62,4 +62,5 @@ class DrivingRecorder:
         names = ("x", "acceleration", "speed")
         columns = [np.concatenate([row[k] for row in self._rows]) for k in range(3)]
         with Path(self.file).open("wb") as stream:
-            np.savez(stream, **dict(zip(names, columns, strict=True)))
+            arrays: dict[str, Any] = dict(zip(names, columns, strict=True))
+            np.savez(stream, **arrays)
