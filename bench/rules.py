@@ -8,22 +8,15 @@ on the road at once, on average.
 
 from __future__ import annotations
 
-import itertools
-import shutil
-import signal
 import statistics
-import subprocess
-import sys
 import tempfile
-import time
-import typing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bench.in_turns import seconds_of
 from odscen.app.maps import load_map
 from odscen.app.runs import check_run, prepare_run
 from odscen.lanegraph.query import node_id
-from odscen.results.records.run_records import Plan
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.scenario_document import (
     Actor,
@@ -33,13 +26,8 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Simulation,
 )
-from odscen.sumo.folder.layout import CONFIG_FILE
-from odscen.sumo.outputs.output_tables import outputs_to
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.sumo.worker.session import open_session
-from odscen.sumo.worker.stepping import Stepper
-from odscen.sumo.worker.story.story_run import StoryRun
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
@@ -49,8 +37,6 @@ if TYPE_CHECKING:
 MAP = Path(__file__).parents[1] / "maps" / "town_5x5.xodr"
 ACTORS, ROUNDS = 20, 5
 UNTIL = 80.0
-TURN = 0.05
-"""Seconds."""
 PER_KM = 27.5
 """Vehicles per kilometre of lane, which are about 300 on the map."""
 
@@ -65,7 +51,7 @@ def main() -> None:
         mean, ratios = _on_the_road(plain), []
         print(f"{'round':>5} {'without, s':>10} {'with, s':>8} {'ratio':>6} {'vehicles':>8}")
         for number in range(ROUNDS + 1):
-            seconds = _stepped(plain.folder, ruled.folder)
+            seconds = seconds_of([(plain.folder, "run"), (ruled.folder, "run")])
             if number:  # the first round warms up
                 ratios.append(seconds[1] / seconds[0])
                 line = f"{number:>5} {seconds[0]:>10.2f} {seconds[1]:>8.2f} {ratios[-1]:>6.3f}"
@@ -126,54 +112,8 @@ def _made(workspace: Workspace, scenario: Scenario, folder: Path) -> Run:
     return run
 
 
-def _stepped(*runs: Path) -> list[float]:
-    """Processor seconds of the steps of each run, all made once more, in turns."""
-    started = [
-        subprocess.Popen(
-            [sys.executable, "-m", "bench.rules", str(run)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-        )
-        for run in runs
-    ]  # fmt: skip
-    outs = [typing.cast("typing.TextIO", one.stdout) for one in started]
-    for one, out in zip(started, outs, strict=True):
-        out.readline()
-        one.send_signal(signal.SIGSTOP)
-        typing.cast("typing.TextIO", one.stdin).close()
-    for one in itertools.cycle(started):
-        one.send_signal(signal.SIGCONT)
-        time.sleep(TURN)
-        if one.poll() is None:
-            one.send_signal(signal.SIGSTOP)
-        elif all(other.poll() is not None for other in started):
-            break
-    return [float(out.read().split()[-1]) for out in outs]
-
-
-def _step_again(run: Path) -> None:
-    """Make the steps of a run in this process, and print the seconds."""
-    with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
-        copy = Path(shutil.copytree(run, Path(folder) / "run"))
-        plan = Plan.from_json((copy / "plan.json").read_text(encoding="utf-8"))
-        story = copy / "sumo" / "story.json"
-        stepper = Stepper(plan, lambda _: None, None,
-                          StoryRun.in_folder(copy, plan) if story.is_file() else None)  # fmt: skip
-        sumo = copy / "sumo"
-        arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(copy, sumo)]
-        with open_session(arguments) as session:
-            print("ready", flush=True)
-            sys.stdin.read()
-            begin = time.process_time()
-            stepper.run(session, plan.until)
-            print(time.process_time() - begin)
-
-
 def _on_the_road(run: Run) -> float:
     """Vehicles that are there at once, on average."""
     changes = {"departed": 1, "arrived": -1}
     rows = run.events().iter_rows(named=True)
     return sum(changes.get(one["kind"], 0) * (UNTIL - one["time"]) for one in rows) / UNTIL
-
-
-if __name__ == "__main__":
-    main() if len(sys.argv) < 2 else _step_again(Path(sys.argv[1]))

@@ -8,18 +8,17 @@ An installed package offers one in its ``pyproject.toml``::
 
 from __future__ import annotations
 
-import importlib
 import shlex
 import subprocess
 import tempfile
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.errors import InputError, OdscenError
 from odscen.learning.fill import Fill, FillRequest, fill_from_arrays, fill_from_bytes, request_bytes
 from odscen.learning.fill_check import CheckedFill, checked_fill
+from odscen.learning.named_objects import named_object
 from odscen.scenario.document.named_random import stream
 
 if TYPE_CHECKING:
@@ -226,28 +225,5 @@ def _found(name: str) -> Any:
         from odscen.learning.reference.reference_generator import ReferenceGenerator
 
         return ReferenceGenerator
-    module, colon, attribute = name.partition(":")
-    if not colon:
-        points = [*entry_points(group=GROUP, name=name)]
-        if not points:
-            known = sorted(one.name for one in entry_points(group=GROUP))
-            offered = (
-                f"installed packages offer {', '.join(known)}"
-                if known
-                else "no installed package offers one"
-            )
-            msg = (
-                f"there is no generator {name!r}; {REFERENCE!r} ships with odscen, {offered}, and "
-                "package.module:Class is one"
-            )
-            raise InputError(msg, element="generator")
-        try:
-            return points[0].load()
-        except Exception as error:  # whatever an import may raise
-            msg = f"it cannot be imported from {points[0].value}: {error!r}"
-            raise InputError(msg, element=name) from error
-    try:
-        return getattr(importlib.import_module(module), attribute)
-    except Exception as error:  # whatever an import may raise
-        msg = f"it cannot be imported: {error!r}"
-        raise InputError(msg, element=name) from error
+    shipped = f"{REFERENCE!r} ships"
+    return named_object(name, group=GROUP, what="generator", shipped=shipped)

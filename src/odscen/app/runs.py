@@ -28,6 +28,7 @@ from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.runner.assignment import prepare_assigned
 from odscen.sumo.runner.run_jobs import RunJob, run_prepared
 from odscen.sumo.runner.run_jobs import run_many as run_jobs
+from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -109,7 +110,11 @@ def check_run(
         With every error of the scenario.
     NotFoundError
         If the workspace does not have its map.
+    InputError
+        If the behaviour model of the settings cannot be made.
     """
+    if settings.behaviour is not None:
+        open_behaviour(settings.behaviour, 0)  # what cannot be made is refused before the run
     if entry is None:
         entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
     loaded, assets = load_map(entry), workspace.assets()

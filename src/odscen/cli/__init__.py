@@ -38,7 +38,7 @@ from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
 from odscen.cli.study_commands import app as study
 from odscen.cli.study_commands import dataset
-from odscen.cli.sweep_command import sweep
+from odscen.cli.sweep_command import search, sweep
 from odscen.cli.template_command import NewCommand, new
 from odscen.cli.transit_commands import app as transit
 
@@ -83,6 +83,7 @@ app.command()(resume)
 app.command()(report)
 app.command()(sweep)
 app.command()(dataset)
+app.command()(search)
 app.command("test")(gate)
 app.command()(compare)
 app.command("diff")(diff_scenarios)

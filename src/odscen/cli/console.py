@@ -8,13 +8,16 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from odscen.base.durations import parse_duration
 from odscen.base.errors import InputError, OdscenError
 from odscen.base.shown import visible
+
+if TYPE_CHECKING:
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 
 WorkspaceOption = Annotated[
     Path | None,
@@ -46,6 +49,31 @@ BuildMinutesOption = Annotated[
         help="Minutes of computing time that building a map may use. "
         "[default: $ODSCEN_BUILD_MINUTES, else by the size of the map]",
         show_default=False,
+    ),
+]
+
+BehaviourOption = Annotated[
+    str | None,
+    typer.Option(
+        help="What drives vehicles instead of SUMO: idm, imitation, an entry point, "
+        "package.module:Class or FILE.py:Class.",
+        metavar="NAME",
+    ),
+]
+BehaviourSettingOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--behaviour-set", help="A setting of it: headway=0.8; repeatable.", metavar="NAME=VALUE"
+    ),
+]
+BehaviourCommandOption = Annotated[
+    str | None,
+    typer.Option("--behaviour-cmd", help="A program that drives, over a pipe.", metavar="COMMAND"),
+]
+BehaviourTimeoutOption = Annotated[
+    float,
+    typer.Option(
+        "--behaviour-timeout", min=0.001, help="Wall seconds that it may take for one step."
     ),
 ]
 
@@ -207,3 +235,36 @@ def progress(title: str) -> Iterator[Callable[[str, float], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=1.0, what="")
         yield lambda what, share: bar.update(task, completed=share, what=what)
+
+
+def behaviour_door(
+    name: str | None, given: list[str] | None, command: str | None, time_limit: float
+) -> BehaviourDoor | None:
+    """Where the model comes from; ``None`` if SUMO drives.
+
+    Raises
+    ------
+    InputError
+        If a setting has no name, or belongs to nothing.
+    """
+    if name is None and command is None:
+        if given:
+            msg = "--behaviour-set needs --behaviour"
+            raise InputError(msg)
+        return None
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
+
+    options: dict[str, float | str] = {}
+    for text in given or ():
+        key, sign, value = text.partition("=")
+        if not sign or not key.isidentifier():
+            msg = f"{text!r} sets nothing; write for example headway=0.8"
+            raise InputError(msg, element="--behaviour-set")
+        try:
+            options[key] = float(value)
+        except ValueError:
+            options[key] = value
+    if name is not None and name.partition(":")[0].endswith(".py"):
+        file, _, attribute = name.rpartition(":")
+        name = f"{Path(file).resolve()}:{attribute}"  # runs may go on in another folder
+    return BehaviourDoor(name=name, command=command, time_limit=time_limit, options=options)

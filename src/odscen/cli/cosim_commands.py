@@ -10,7 +10,19 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from odscen.base.errors import InputError
-from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.cli.console import (
+    BehaviourCommandOption,
+    BehaviourOption,
+    BehaviourSettingOption,
+    BehaviourTimeoutOption,
+    JsonOption,
+    WorkspaceOption,
+    behaviour_door,
+    log,
+    print_json,
+    print_table,
+    progress,
+)
 from odscen.cli.cosim_selfcheck import run_selfcheck
 from odscen.results.records.outcomes import RunStatus
 
@@ -154,6 +166,10 @@ def cosim(
             help="Run nothing: measure on the server what the mirror relies on, as one page.",
         ),
     ] = False,
+    behaviour: BehaviourOption = None,
+    behaviour_set: BehaviourSettingOption = None,
+    behaviour_cmd: BehaviourCommandOption = None,
+    behaviour_timeout: BehaviourTimeoutOption = 60.0,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -181,7 +197,13 @@ def cosim(
         address = context.with_resource(recorded_protocol(address, record_protocol))
     if check or scenario is None:
         run_selfcheck(address, scenario, out=out, workspace=workspace, as_json=as_json)
-    settings = RunSettings(seed=seed, until=until, step_length=step_length, weather=weather)
+    settings = RunSettings(
+        seed=seed,
+        until=until,
+        step_length=step_length,
+        weather=weather,
+        behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout),
+    )
     options = CosimOptions(
         address=address,
         tick=tick,
@@ -199,6 +221,9 @@ def cosim(
     )
     if native and follow:
         msg = "--native drives with the Traffic Manager, which has to tick: leave --follow out"
+        raise InputError(msg)
+    if native and settings.behaviour is not None:
+        msg = "--native drives with the Traffic Manager: leave --behaviour out"
         raise InputError(msg)
     if native:
         _run_native(

@@ -146,6 +146,42 @@ def evaluate(
         print_table(title, ["", *(one.source for one in own)], _rows(own))
 
 
+@app.command()
+def driver(
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="File of weights to write.", metavar="FILE")
+    ],
+    maps: Annotated[
+        list[str] | None, typer.Option("--map", help="Only this map; may be given again.")
+    ] = None,
+    hold_out: Annotated[
+        list[str] | None,
+        typer.Option(help="Town to measure on only, as in Town04; repeatable.", metavar="TOWN"),
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, help="Of each map.")] = 3,
+    until: Annotated[float, typer.Option(help="Seconds of each run.")] = 200.0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Learn from SUMO's drivers how to accelerate: weights of the behaviour model imitation."""
+    from odscen.app.learned.learned_driving import learn_driving
+    from odscen.workspace.store import Workspace
+
+    store = Workspace.open(workspace)
+    names = maps or [entry.name for entry in store.maps()]
+    found = learn_driving(
+        store, names, out, hold_out=hold_out or (), runs=runs, duration=until, seed=seed, told=log
+    )
+    log(f"wrote {out}: {out.stat().st_size:,} bytes")
+    if as_json:
+        print_json({"file": str(out), "maps": [one._asdict() for one in found]})
+        return
+    rows = [(one.map_name, one.rows, f"{one.learned:.3f}", f"{one.constant:.3f}") for one in found]
+    columns = ("map", "accelerations", "off by, m/s2", "if speeds were kept")
+    print_table("root mean square error", columns, rows)
+
+
 def _rows(found: list[TrafficQuality]) -> list[list[str]]:
     return [
         [column.replace("_", " "), *(_cell(one, column) for one in found)]

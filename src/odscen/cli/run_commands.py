@@ -12,12 +12,17 @@ import typer
 from odscen.base.durations import clock, parse_duration
 from odscen.base.shown import visible
 from odscen.cli.console import (
+    BehaviourCommandOption,
+    BehaviourOption,
+    BehaviourSettingOption,
+    BehaviourTimeoutOption,
     IntervalOption,
     JobsOption,
     JsonOption,
     SeedsOption,
     WarmUpOption,
     WorkspaceOption,
+    behaviour_door,
     duration,
     log,
     print_json,
@@ -134,6 +139,10 @@ def run(
     ] = False,
     warm_up: WarmUpOption = None,
     interval: IntervalOption = None,
+    behaviour: BehaviourOption = None,
+    behaviour_set: BehaviourSettingOption = None,
+    behaviour_cmd: BehaviourCommandOption = None,
+    behaviour_timeout: BehaviourTimeoutOption = 60.0,
     reports: Annotated[
         bool | None,
         typer.Option(
@@ -196,6 +205,7 @@ def run(
         expectations=tuple(parse_expectation(text) for text in expect or ()),
         warm_up=warm_up,
         interval=interval,
+        behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout),
     )
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)

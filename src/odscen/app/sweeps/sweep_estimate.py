@@ -71,7 +71,7 @@ def estimate(
     InputError
         If a parameter, limit or figure is unknown, or no case that was tried is possible.
     """
-    refuse_unknown(plan, scenario)
+    refuse_unknown(plan.names, scenario)
     limits_of(settings)
     with TemporaryDirectory(prefix="odscen-sweep-") as folder:
         began = time.monotonic()

@@ -8,12 +8,13 @@ It holds ``sweep.json`` (what is swept), ``scenario.json`` (the scenario with it
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.errors import ConflictError, InputError, in_file
 from odscen.base.stored_files import read_document
 from odscen.base.text_files import write_text
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
 
@@ -48,6 +49,8 @@ class SweepSettings:
         Whether each run has a report.
     openscenario
         Version of OpenSCENARIO in which each case is written as well, ``1.0`` to ``1.3``.
+    behaviour
+        What drives vehicles instead of SUMO.
     """
 
     safe: Sequence[str] = ()
@@ -56,19 +59,27 @@ class SweepSettings:
     seed: int | None = None
     reports: bool = False
     openscenario: str | None = None
+    behaviour: BehaviourDoor | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready; columns of one's own by name."""
-        return {
+        said = {
             "safe": list(self.safe),
             "figures": [*self.figures, *self.own],
             "seed": self.seed,
         }
+        return said if self.behaviour is None else said | {"behaviour": asdict(self.behaviour)}
 
 
 def settings_from_dict(data: Mapping[str, Any]) -> SweepSettings:
     """Read what :meth:`SweepSettings.to_dict` writes, of a sweep without columns of one's own."""
-    return SweepSettings(tuple(data["safe"]), tuple(data["figures"]), seed=data["seed"])
+    given = data.get("behaviour")
+    return SweepSettings(
+        tuple(data["safe"]),
+        tuple(data["figures"]),
+        seed=data["seed"],
+        behaviour=None if given is None else BehaviourDoor(**given),
+    )
 
 
 def read_plan(out: Path) -> tuple[SweepPlan, dict[str, Any]]:
@@ -115,13 +126,27 @@ def begin_sweep(out: Path, scenario: Scenario, plan: SweepPlan, settings: SweepS
     """
     head = {"format": FORMAT, "version": VERSION}
     said = head | {"plan": plan.to_dict(), "settings": settings.to_dict()}
-    text = json.dumps(said, indent=2, ensure_ascii=False) + "\n"
-    own = dumps(scenario)
-    files = {SWEEP_FILE: text, SCENARIO_FILE: own}
+    begin_folder(out, {SWEEP_FILE: said}, scenario, what="sweep")
+
+
+def begin_folder(
+    out: Path, said: Mapping[str, Mapping[str, Any]], scenario: Scenario, *, what: str
+) -> None:
+    """Write what the folder of a sweep or a search is about, by file, and its scenario.
+
+    Raises
+    ------
+    ConflictError
+        If the folder holds another one.
+    """
+    files = {
+        name: json.dumps(data, indent=2, ensure_ascii=False) + "\n" for name, data in said.items()
+    }
+    files[SCENARIO_FILE] = dumps(scenario)
     there = {name: out / name for name in files if (out / name).is_file()}
     for name, file in there.items():
         if file.read_text(encoding="utf-8") != files[name]:
-            msg = f"{out} holds another sweep ({name} differs); name another folder"
+            msg = f"{out} holds another {what} ({name} differs); name another folder"
             raise ConflictError(msg)
     for name in files.keys() - there.keys():
         write_text(out / name, files[name])

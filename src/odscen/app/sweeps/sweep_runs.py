@@ -77,12 +77,15 @@ def sweep(
     limits = limits_of(settings)
     if settings.openscenario is not None:
         Dialect.of(settings.openscenario)  # an unknown version is refused before anything runs
-    refuse_unknown(plan, scenario)
+    refuse_unknown(plan.names, scenario)
     with disk_errors(f"sweep {out}"), locked(out, what=f"sweep {out.name!r}"):
         cases = named_cases(plan)
         begin_sweep(out, scenario, plan, settings)
-        checked, refused = _checked(workspace, scenario, cases, out, settings)
-        left = [run for run in checked if not _is_done(run.folder)]
+        checked, refused = checked_cases(workspace, scenario, cases, out, settings)
+        if not checked:
+            msg = f"no case of the sweep can be run: {next(iter(refused.values()))}"
+            raise InputError(msg)
+        left = [run for run in checked if not has_completed(run.folder)]
         if tell is not None:
             tell(_first_words(len(cases), len(refused), len(left), plan))
         _run(left, len(checked), processes, settings, tell=tell, progress=progress, done=done)
@@ -91,16 +94,16 @@ def sweep(
         return write_table(out, scenario, plan, rows=rows, limits=limits)
 
 
-def refuse_unknown(plan: SweepPlan, scenario: Scenario) -> None:
-    """Raise :class:`InputError` if a plan varies what is no parameter of the scenario."""
-    for name in plan.names:
+def refuse_unknown(names: Sequence[str], scenario: Scenario) -> None:
+    """Raise :class:`InputError` if what is varied is no parameter of the scenario."""
+    for name in names:
         if name not in scenario.parameters:
             known = ", ".join(scenario.parameters) or "none"
             msg = f"the scenario has no parameter {name!r}; it has {known}"
             raise InputError(msg)
 
 
-def _checked(
+def checked_cases(
     workspace: Workspace,
     scenario: Scenario,
     cases: Mapping[str, Mapping[str, float]],
@@ -109,7 +112,9 @@ def _checked(
 ) -> tuple[list[CheckedRun], dict[str, str]]:
     """Each case as a run, and those that are not possible with the reason."""
     entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
-    given = RunSettings(seed=settings.seed, recording=WATCHES_CLOSENESS)
+    given = RunSettings(
+        seed=settings.seed, recording=WATCHES_CLOSENESS, behaviour=settings.behaviour
+    )
     runs, refused = [], {}
     for name, values in cases.items():
         try:
@@ -124,10 +129,6 @@ def _checked(
         if not file.is_file():
             write_text(file, dumps(case))
         runs.append(run)
-    if not runs:
-        first = next(iter(refused.values()))
-        msg = f"no case of the sweep can be run: {first}"
-        raise InputError(msg)
     return runs, refused
 
 
@@ -191,7 +192,8 @@ def _export(
         export(workspace, file, folder, to="openscenario", options={"version": version})
 
 
-def _is_done(folder: Path) -> bool:
+def has_completed(folder: Path) -> bool:
+    """Whether a folder holds a run that has completed."""
     try:
         return Run.open(folder).status is RunStatus.COMPLETED
     except InputError:

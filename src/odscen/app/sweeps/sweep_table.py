@@ -138,19 +138,32 @@ def write_table(
     limits: Sequence[Limit],
 ) -> Sweep:
     """Write table and page of all cases."""
+    table = write_cases(out, scenario, plan.names, rows=rows, limits=limits)
+    return Sweep(out, table, _boundary(plan, rows))
+
+
+def write_cases(
+    out: Path,
+    scenario: Scenario,
+    names: Sequence[str],
+    *,
+    rows: Sequence[Mapping[str, Any]],
+    limits: Sequence[Limit],
+) -> pl.DataFrame:
+    """Write the table and the page of cases; ``names`` are the parameters that are varied."""
     table = _as_table(rows)
     part = out / f".{TABLE_FILE}.part"
     table.write_parquet(part)
     part.replace(out / TABLE_FILE)
     shown = SweepShown(
         scenario_name(scenario),
-        {name: scenario.parameters[name].unit for name in plan.names},
+        {name: scenario.parameters[name].unit for name in names},
         ["no collision", *map(str, limits)],
         rows,
         {row["case"]: _links(out, row["case"]) for row in rows},
     )
     write_text(out / PAGE_FILE, sweep_page(shown))
-    return Sweep(out, table, _boundary(plan, rows))
+    return table
 
 
 def read_table(out: Path) -> Sweep:

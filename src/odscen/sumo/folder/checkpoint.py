@@ -65,6 +65,8 @@ class Checkpoint:
     story
         What rules remember, see :meth:`odscen.sumo.worker.story.story_run.StoryRun.state`; nothing
         if there are none.
+    driven
+        Ids of vehicles that a behaviour model has driven.
     """
 
     number: int
@@ -81,6 +83,7 @@ class Checkpoint:
     files: dict[str, str]
     lanes: dict[str, int] = field(default_factory=dict)
     story: dict[str, Any] = field(default_factory=dict)
+    driven: list[str] = field(default_factory=list)
 
 
 def slice_folder(run: Path, number: int) -> Path:

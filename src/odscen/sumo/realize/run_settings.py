@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from odscen.base.errors import InputError
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.judging.criteria import criteria_of
 from odscen.results.judging.expectations import Expectation, needs_criticality, parse_expectation
@@ -70,6 +71,8 @@ class RunSettings:
         if ``None``.
     interval
         Of figures over time, in whole seconds; the scenario's own if ``None``.
+    behaviour
+        What drives vehicles instead of SUMO; ``None``: nothing does.
 
     Raises
     ------
@@ -89,6 +92,7 @@ class RunSettings:
     expectations: tuple[Expectation, ...] = ()
     warm_up: float | None = None
     interval: float | None = None
+    behaviour: BehaviourDoor | None = None
 
     def __post_init__(self) -> None:
         if self.seed is not None and not 0 <= self.seed < _SEEDS:
@@ -107,6 +111,9 @@ class RunSettings:
                 msg = f"{name} must be whole seconds, not {seconds:g}"
                 raise InputError(msg)
         _refuse_time("interval", self.interval)
+        if self.meso and self.behaviour is not None:
+            msg = "in meso no model can drive: it has queues, not vehicles"
+            raise InputError(msg)
         if self.meso and self.recorded.criticality:
             msg = "criticality cannot be measured in meso: it has queues, not vehicles that meet"
             raise InputError(msg)
@@ -168,7 +175,9 @@ class RunSettings:
             for name, value in data["recording"].items()
         }
         expectations = tuple(parse_expectation(text) for text in data["expectations"])
-        own = {"recording": Recording(**recording), "expectations": expectations}
+        own: dict[str, Any] = {"recording": Recording(**recording), "expectations": expectations}
+        if data.get("behaviour") is not None:
+            own["behaviour"] = BehaviourDoor(**data["behaviour"])
         values: dict[str, Any] = {**data, **own}
         return cls(**values)
 

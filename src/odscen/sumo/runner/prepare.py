@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from odscen.scenario.document.json_form import dumps
+from odscen.sumo.folder.layout import BEHAVIOUR_FILE
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.realize.sumo_lane_places import lane_places
@@ -16,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.arrays import Int32Array
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.road_users.free_flow import ModelSizes
     from odscen.sumo.realize.run_settings import RunSettings
@@ -65,7 +69,7 @@ def prepare(
     plan = realization.plan
     return PreparedRun(
         plan=plan,
-        sumo_files=realization.files,
+        sumo_files=_with_behaviour(realization.files, settings.behaviour),
         net=net,
         settings=settings,
         scenario_json=dumps(scenario),
@@ -78,7 +82,8 @@ def prepare(
             "map": scenario.map.name,
             "map_sha256": scenario.map.sha256,
             "meso": settings.meso,
-        },
+        }
+        | ({} if settings.behaviour is None else {"behaviour": settings.behaviour.shown}),
         expected=forecast(
             plan,
             realization.files,
@@ -86,3 +91,11 @@ def prepare(
             lanes=len(sumo_map.net.lanes),
         ),
     )
+
+
+def _with_behaviour(files: Mapping[str, str], door: BehaviourDoor | None) -> Mapping[str, str]:
+    """SUMO's files, and what drives instead of it."""
+    if door is None:
+        return files
+    said = {name: value for name, value in asdict(door).items() if value is not None}
+    return {**files, BEHAVIOUR_FILE: json.dumps(said, indent=2) + "\n"}

@@ -60,6 +60,8 @@ class LockstepWatch:
         Whether the run has been ended before its time.
     rules
         Whether rules may come between steps; they act when the next step is asked for.
+    placed
+        Vehicle that another program drives, if there is one.
     heard
         Rules that have come and not been taken: texts of story files.
     """
@@ -71,7 +73,7 @@ class LockstepWatch:
         self.rules = how.rules
         self.heard: list[str] = []
         self._row = {actor.id: row for row, actor in enumerate(plan.actors)}
-        self._placed = plan.actors[how.placed].id if how.placed >= 0 else None
+        self.placed = plan.actors[how.placed].id if how.placed >= 0 else None
         self._step_length = plan.step_length
         self._commands = commands
         self._rest = b""
@@ -88,8 +90,8 @@ class LockstepWatch:
         while True:
             command = self._next()
             if isinstance(command, EgoPose):
-                if self._placed is not None:
-                    session.place(self._placed, command)
+                if self.placed is not None:
+                    session.place(self.placed, command)
             elif isinstance(command, Outside):
                 session.foreign_traffic().show(command.users)
                 session.foreign_lights.show(command.lights)

@@ -20,6 +20,7 @@ import numpy as np
 
 from odscen.base.errors import SimulationError
 from odscen.sumo.worker.detours import LaneLink
+from odscen.sumo.worker.driven_vehicles import DrivenVehicles
 from odscen.sumo.worker.foreign_traffic import ForeignLights, ForeignTraffic, is_foreign
 from odscen.sumo.worker.moved_actors import MovedActors
 from odscen.sumo.worker.observed import (
@@ -251,6 +252,11 @@ class Session:
         """Hand of rules on single road users."""
         native = partial(_native, self._sumo)
         return MovedActors(self._sumo, self._errors, self._lanes_of_edge, self._admits, native)
+
+    def driven_vehicles(self) -> DrivenVehicles:
+        """Hand of behaviour models on all vehicles."""
+        native = partial(_native, self._sumo)
+        return DrivenVehicles(self._sumo, self._errors, native, self._lanes_of_edge)
 
     def place(self, vehicle: str, at: EgoPose, *, again: bool = False) -> bool:
         """Put a vehicle where another program has driven it; false if SUMO cannot.

@@ -30,6 +30,7 @@ from odscen.results.measures.summary import Outcomes
 from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.run_records import Plan, event_line
 from odscen.sumo.folder.layout import (
+    BEHAVIOUR_FILE,
     CONFIG_FILE,
     LIGHTS_FILE,
     LOG_FILE,
@@ -67,6 +68,7 @@ from odscen.sumo.worker.watch import Watch
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
     from odscen.sumo.worker.story.story_run import StoryRun
 
 
@@ -134,10 +136,14 @@ def simulate(
     SimulationError
         If SUMO refuses to start or stops with an error.
     """
-    stepper = Stepper(plan, send, watch, _story(plan, folder))
-    if plan.slice_length is not None:
-        return run_slice(plan, folder, stepper)
-    done = _in_one_piece(plan, folder, stepper, raw=raw and not plan.parking)
+    stepper = Stepper(plan, send, watch, _story(plan, folder), _behaviour(plan, folder))
+    try:
+        if plan.slice_length is not None:
+            return run_slice(plan, folder, stepper)
+        done = _in_one_piece(plan, folder, stepper, raw=raw and not plan.parking)
+    finally:
+        if stepper.behaviour is not None:
+            stepper.behaviour.close()
     events = stepper.recorder.events
     outcomes = Outcomes(plan)
     made = done.lengths is None
@@ -154,6 +160,15 @@ def _story(plan: Plan, folder: Path) -> StoryRun | None:
     from odscen.sumo.worker.story.story_run import StoryRun
 
     return StoryRun.in_folder(folder, plan)
+
+
+def _behaviour(plan: Plan, folder: Path) -> BehaviourRun | None:
+    """What drives instead of SUMO; without it, nothing of it is imported."""
+    if not (folder / SUMO_FOLDER / BEHAVIOUR_FILE).is_file():
+        return None
+    from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
+
+    return BehaviourRun.in_folder(folder, plan)
 
 
 def _begin_anew(watch: Watch | LockstepWatch | None) -> None:

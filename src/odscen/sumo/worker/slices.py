@@ -66,6 +66,8 @@ def run_slice(plan: Plan, run: Path, stepper: Stepper) -> Done | None:
         stepper.steps = done.steps
         if stepper.story is not None:
             stepper.story.restore(done.story)
+        if stepper.behaviour is not None:
+            stepper.behaviour.restore(done.driven)
     routes = RouteSlices(run / layout.SUMO_FOLDER / layout.ROUTES_FILE)
     with Completion(run) as completion:
         if done is None or not done.last:
@@ -131,6 +133,7 @@ class _RunningSlice:
             lanes=lanes,
             files={},
             story={} if stepper.story is None else stepper.story.state(),
+            driven=[] if stepper.behaviour is None else stepper.behaviour.state(),
         )
         parked = frozenset(before.recorder["parked"]) if before else frozenset()
         return Written(part, checkpoint, events, lengths, before.lanes if before else {}, parked)

@@ -11,9 +11,10 @@ from odscen.sumo.worker.protocol import Progress
 from odscen.sumo.worker.recorder import Recorder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
     from odscen.results.records.run_records import Plan
+    from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.session import Session
     from odscen.sumo.worker.story.story_run import StoryRun
@@ -44,6 +45,8 @@ class Stepper:
         Made so far.
     story
         The rules of the run, if it has any.
+    behaviour
+        What drives vehicles instead of SUMO, if anything does.
     """
 
     def __init__(
@@ -52,8 +55,10 @@ class Stepper:
         send: Callable[[Message], None],
         watch: Watch | LockstepWatch | None,
         story: StoryRun | None = None,
+        behaviour: BehaviourRun | None = None,
     ) -> None:
         self.story = story
+        self.behaviour = behaviour
         self.recorder = Recorder(plan)
         self.steps = 0
         self._plan = plan
@@ -111,6 +116,8 @@ class Stepper:
         recorder = self.recorder
         if self._diversions is not None:
             recorder.add(self._diversions.before_step(session, now, self._plan.step_length))
+        if self.behaviour is not None:
+            self.behaviour.before_step(session, self._taken())
         after = session.step()
         recorder.record(session, now)
         if self.story is not None or self._led is not None:
@@ -119,6 +126,12 @@ class Stepper:
             self._take_rules(session)
         self.steps += 1
         return after
+
+    def _taken(self) -> Collection[str]:
+        """Who is moved by rules or by another program."""
+        moved = frozenset() if self.story is None else self.story.moved
+        placed = self._watch.placed if isinstance(self._watch, LockstepWatch) else None
+        return moved if placed is None else moved | {placed}
 
     def _take_rules(self, session: Session) -> None:
         """Let rules act on the last step: at once, or when a program has given others."""

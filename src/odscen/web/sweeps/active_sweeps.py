@@ -130,7 +130,7 @@ class Sweeps:
             If another sweep is under way.
         """
         plan, settings = plan_from_data(wish.plan), _settings(wish)
-        refuse_unknown(plan, scenario)
+        refuse_unknown(plan.names, scenario)
         limits_of(settings)
         plan.cases()
         with self._lock:

@@ -111,6 +111,11 @@ class StoryRun:
             self._hands.held(rule.actor) and self._engine.may_fire(rule.id) for rule in self._rules
         )
 
+    @property
+    def moved(self) -> frozenset[str]:
+        """Who is moved by rules now."""
+        return frozenset(name for name, move in self._moves.items() if move != _FREE)
+
     def after_step(self, time: float, recorder: Recorder) -> None:
         """Look at the road as it is at ``time``, say what rules do, and act for the next step."""
         road = self._road

@@ -1,0 +1,165 @@
+"""A run that waits before each step for what a program of the same process wants.
+
+The simulation has a process of its own, as every run; its behaviour model is this process, at a
+socket in a folder of its own.
+"""
+
+from __future__ import annotations
+
+import socket
+import tempfile
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from odscen.app.runs import carry_out, check_given, prepare_run
+from odscen.base.errors import SimulationError
+from odscen.learning.behaviour.behaviour_messages import (
+    HEAD,
+    action_bytes,
+    framed,
+    observation_from_bytes,
+    scene_from_bytes,
+)
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
+from odscen.results.records.outcomes import RunStatus
+from odscen.sumo.realize.recording import Recording
+from odscen.sumo.realize.run_settings import RunSettings
+
+if TYPE_CHECKING:
+    from odscen.base.arrays import BoolArray
+    from odscen.learning.behaviour.behaviour_model import (
+        BehaviourScene,
+        DrivingAction,
+        RoadObservation,
+    )
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.folder.finished_run import Run
+    from odscen.workspace.store import Workspace
+
+LEAN = RunSettings(recording=Recording(emissions=False), slice_length=None)
+"""How such a run is made if nothing else is said."""
+_PATIENCE = 3600.0
+"""Wall seconds that the simulation waits for a step."""
+_LISTEN = 0.2
+"""Wall seconds after which a wait looks whether the run is over."""
+
+
+class SteppedRun:
+    """One run; :meth:`see` and :meth:`drive` in turn.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file.
+    settings
+        How it is run; its behaviour is this one.
+
+    Attributes
+    ----------
+    scene
+        Of the run.
+
+    Raises
+    ------
+    SimulationError
+        If it fails before its first step.
+    InputError
+        If the scenario or its file cannot be used.
+    """
+
+    def __init__(
+        self, workspace: Workspace, scenario: Scenario | Path, *, settings: RunSettings = LEAN
+    ) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="odscen-env-")
+        self._failure: BaseException | None = None
+        self._run: Run | None = None
+        path = Path(self._folder.name) / "drive"
+        door = BehaviourDoor(socket=str(path), time_limit=_PATIENCE)
+        checked = check_given(
+            workspace,
+            scenario,
+            name="run",
+            out=Path(self._folder.name),
+            settings=replace(settings, behaviour=door),
+        )
+        prepared = prepare_run(checked)
+
+        def carry() -> None:
+            try:
+                self._run = carry_out(checked, prepared)
+            except BaseException as error:
+                self._failure = error
+
+        self._thread = threading.Thread(target=carry, daemon=True)
+        with socket.socket(socket.AF_UNIX) as listener:
+            listener.bind(str(path))
+            listener.listen(1)
+            listener.settimeout(_LISTEN)
+            self._thread.start()
+            self._connection = self._accepted(listener)
+        first = self._message()
+        if first is None:
+            raise self._why()
+        self.scene: BehaviourScene = scene_from_bytes(first)[0]
+        self._connection.sendall(framed(b""))
+
+    def see(self) -> RoadObservation | None:
+        """Wait for the next step; ``None`` once the run is over.
+
+        Raises
+        ------
+        SimulationError
+            If it has failed.
+        """
+        data = self._message()
+        if data is not None:
+            return observation_from_bytes(data)
+        self._thread.join()
+        if self._run is None or self._run.status is not RunStatus.COMPLETED:
+            raise self._why()
+        return None
+
+    def drive(self, action: DrivingAction, controlled: BoolArray) -> None:
+        """Let the step be made."""
+        self._connection.sendall(framed(action_bytes(action, controlled)))
+
+    def close(self) -> None:
+        """End the run, wherever it is, and remove its files."""
+        self._connection.close()
+        self._thread.join()
+        self._folder.cleanup()
+
+    def _accepted(self, listener: socket.socket) -> socket.socket:
+        while True:
+            try:
+                found, _ = listener.accept()
+            except TimeoutError:
+                if not self._thread.is_alive():
+                    raise self._why() from None
+            else:
+                found.settimeout(None)
+                return found
+
+    def _message(self) -> bytes | None:
+        head = self._bytes(HEAD.size)
+        return None if head is None else self._bytes(HEAD.unpack(head)[0])
+
+    def _bytes(self, size: int) -> bytes | None:
+        blocks = bytearray()
+        while len(blocks) < size:
+            block = self._connection.recv(size - len(blocks))
+            if not block:
+                return None
+            blocks += block
+        return bytes(blocks)
+
+    def _why(self) -> BaseException:
+        self._thread.join()
+        if self._failure is not None:
+            return self._failure
+        said = "it ended before its first step" if self._run is None else self._run.summary["error"]
+        return SimulationError(str(said or "it ended before its first step"))

@@ -1,0 +1,127 @@
+"""Drivers learned from SUMO's: runs that record what they see and do, training, and the error."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.app.learned.snapshot_data import town_of, traffic_scenario
+from odscen.app.maps import load_map
+from odscen.app.runs import check_run, run_all
+from odscen.base.errors import InputError, SimulationError
+from odscen.base.text_files import write_file
+from odscen.base.version import __version__
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
+from odscen.learning.behaviour.imitation_driver import BINS, learned_driver, network_bytes
+from odscen.learning.reference.small_network import softmax
+from odscen.results.records.outcomes import RunStatus
+from odscen.scenario.document.named_random import stream
+from odscen.sumo.realize.recording import Recording
+from odscen.sumo.realize.run_settings import RunSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from odscen.base.arrays import FloatArray
+    from odscen.learning.fill import Array
+    from odscen.workspace.store import Workspace
+
+RECORDER = "odscen.learning.behaviour.driving_recorder:DrivingRecorder"
+_DENSITY = (4.0, 14.0)
+"""Vehicles per kilometre of lane."""
+
+
+class DrivingError(NamedTuple):
+    """How far accelerations are off, root mean square, m/s^2, on one map.
+
+    ``constant``: of a driver that keeps its speed.
+    """
+
+    map_name: str
+    rows: int
+    learned: float
+    constant: float
+
+
+def learn_driving(
+    workspace: Workspace,
+    maps: Sequence[str],
+    out: Path,
+    *,
+    hold_out: Sequence[str] = (),
+    runs: int = 3,
+    duration: float = 200.0,
+    seed: int = 0,
+    told: Callable[[str], None] | None = None,
+) -> tuple[DrivingError, ...]:
+    """Record SUMO's drivers on maps, learn from them, and write the weights.
+
+    Parameters
+    ----------
+    maps
+        Of the workspace.
+    out
+        File of weights.
+    hold_out
+        Towns that are only recorded to measure the error on; without any it is that of training.
+    runs, duration
+        Of each map, and seconds of each.
+
+    Raises
+    ------
+    InputError
+        If nothing is left to learn from.
+    SimulationError
+        If a run fails.
+    """
+    recorded = {}
+    for name in maps:
+        recorded[name] = [_recorded(workspace, name, seed + k, duration) for k in range(runs)]
+        if told is not None:
+            told(f"{name}: {sum(len(x) for x, _ in recorded[name]):,} seen")
+    kept = [name for name in maps if town_of(name) not in hold_out]
+    rows = [one for name in kept for one in recorded[name] if len(one[0])]
+    if not rows:
+        msg = "nothing is left to learn from: no maps, or all are held out"
+        raise InputError(msg, element="hold-out")
+    x, acceleration = (np.concatenate([one[k] for one in rows]) for k in (0, 1))
+    network = learned_driver(x, acceleration, np.random.default_rng(seed))
+    about = {"maps": kept, "runs": runs, "rows": len(x), "seed": seed, "odscen": __version__}
+    write_file(out, network_bytes(network, about))
+    measured = [name for name in maps if name not in kept] or kept
+    found = []
+    for name in measured:
+        x, acceleration = (np.concatenate([one[k] for one in recorded[name]]) for k in (0, 1))
+        guess = softmax(network(x)) @ BINS
+        found.append(DrivingError(name, len(x), _rms(guess - acceleration), _rms(acceleration)))
+    return tuple(found)
+
+
+def _recorded(
+    workspace: Workspace, name: str, seed: int, duration: float
+) -> tuple[Array, FloatArray]:
+    """What drivers of a run with background traffic saw, and how they accelerated."""
+    density = float(stream(seed, "density", name).uniform(*_DENSITY))
+    loaded = load_map(workspace.map(name))
+    scenario = traffic_scenario(loaded, seed=seed, density=density, duration=duration)
+    with tempfile.TemporaryDirectory(prefix="odscen-learn-") as folder:
+        file = Path(folder) / "seen.npz"
+        settings = RunSettings(
+            recording=Recording(emissions=False),
+            behaviour=BehaviourDoor(name=RECORDER, options={"file": str(file)}),
+        )
+        checked = check_run(
+            workspace, scenario, name=f"{name}-{seed:04d}", out=Path(folder), settings=settings
+        )
+        (run,) = run_all([checked], reports=False)
+        if run.status is not RunStatus.COMPLETED:
+            raise SimulationError(f"{name}: {run.summary['error']}")  # noqa: EM102
+        with np.load(file) as arrays:
+            return arrays["x"].astype(np.float32), arrays["acceleration"]
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

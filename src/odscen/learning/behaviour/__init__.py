@@ -1,0 +1,1 @@
+"""Behaviour models: what drives vehicles instead of SUMO, and the two that ship."""

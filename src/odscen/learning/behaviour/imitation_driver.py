@@ -1,0 +1,153 @@
+"""A driver that has learned from SUMO's how to accelerate: a small network, with numpy alone.
+
+From what each vehicle sees (:func:`sight`) two hidden layers give the shares of accelerations in
+bins of 0.5 m/s^2; it takes their mean, and with ``sampled`` one drawn by these shares. Lane changes
+and right of way stay SUMO's. ``odscen learn driver`` makes the weights.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+
+from odscen.base.errors import InputError
+from odscen.learning.behaviour.behaviour_model import DrivingAction, LightAhead
+from odscen.learning.behaviour.intelligent_driver import desired_speeds
+from odscen.learning.reference.small_network import (
+    SmallNetwork,
+    new_network,
+    softmax,
+    trained,
+)
+
+if TYPE_CHECKING:
+    from odscen.base.arrays import BoolArray, FloatArray
+    from odscen.learning.behaviour.behaviour_model import BehaviourScene, RoadObservation
+    from odscen.learning.fill import Array
+
+BINS = np.arange(-6.0, 4.01, 0.5)
+"""Middles of the bins of accelerations, m/s^2."""
+FEATURES = (
+    "speed", "desired speed", "gap", "speed of the leader", "near", "distance to the lane's end",
+    "red", "yellow", "green", "limit of the next lane", "length of the body", "standing",
+)  # fmt: skip
+"""Of :func:`sight`, each about 0 to 1."""
+_SHIPPED = "imitation_driver.npz"
+_FAR, _FAST, _HIDDEN = 100.0, 20.0, 32
+
+
+class ImitationState(NamedTuple):
+    """The scene, and what chance there is."""
+
+    scene: BehaviourScene
+    rng: np.random.Generator
+
+
+@dataclass(frozen=True, slots=True)
+class ImitationDriver:
+    """The model.
+
+    Attributes
+    ----------
+    weights
+        File of weights; those that ship if not given.
+    sampled
+        1 to draw accelerations, 0 to take their mean.
+    """
+
+    weights: str = ""
+    sampled: float = 0.0
+
+    def init(self, rng: np.random.Generator, scene: BehaviourScene) -> tuple[Any, ...]:
+        """Read the weights."""
+        data = Path(self.weights).read_bytes() if self.weights else shipped_weights()
+        return network_from_bytes(data, file=self.weights or _SHIPPED), ImitationState(scene, rng)
+
+    def act(
+        self, observation: RoadObservation, state: tuple[Any, ...]
+    ) -> tuple[DrivingAction, BoolArray]:
+        """Speeds after the next step."""
+        network, (scene, rng) = state
+        shares = softmax(network(sight(observation, scene)))
+        faster = shares @ BINS
+        if self.sampled:
+            drawn = rng.random(len(observation))[:, None]
+            place = np.minimum((shares.cumsum(axis=1) < drawn).sum(axis=1), len(BINS) - 1)
+            faster = BINS[place]
+        speed = np.maximum(observation.speed + faster * scene.step_length, 0.0)
+        return DrivingAction(speed=speed.astype(np.float64)), observation.lane >= 0
+
+
+def sight(seen: RoadObservation, scene: BehaviourScene) -> Array:
+    """What each vehicle sees: :data:`FEATURES`, shape ``(N, 12)``, float32."""
+    wanted = desired_speeds(seen, scene, scene.speed_factor)
+    gap = np.clip(seen.gap, 0.0, _FAR)
+    leading = np.where(seen.leader >= 0, np.append(seen.speed, 0.0)[seen.leader], _FAST)
+    rest = np.clip(np.where(seen.lane >= 0, scene.lane_length[seen.lane] - seen.pos, _FAR), 0, _FAR)
+    onward = seen.ahead[:, 0]
+    following = np.where(onward >= 0, scene.lane_limit[onward], 0.0)
+    columns = (
+        seen.speed / _FAST,
+        wanted / _FAST,
+        gap / _FAR,
+        leading / _FAST,
+        np.exp(-gap / 10.0),
+        rest / _FAR,
+        (seen.light == LightAhead.RED) * np.exp(-rest / 30.0),
+        (seen.light == LightAhead.YELLOW) * np.exp(-rest / 30.0),
+        (seen.light == LightAhead.GREEN) * np.exp(-rest / 30.0),
+        following / _FAST,
+        scene.vehicle_length[seen.index] / 10.0,
+        seen.speed < 0.1,
+    )
+    return np.stack(columns, axis=1).astype(np.float32)
+
+
+def learned_driver(
+    x: Array, acceleration: FloatArray, rng: np.random.Generator, *, epochs: int = 12
+) -> SmallNetwork:
+    """Train a network on what drivers saw and how they then accelerated, m/s^2."""
+    target = np.clip(np.round((acceleration - BINS[0]) / 0.5), 0, len(BINS) - 1).astype(np.int64)
+    network = new_network(x.shape[1], _HIDDEN, len(BINS), rng)
+    return trained(network, x, target, rng, epochs=epochs)
+
+
+def network_bytes(network: SmallNetwork, about: dict[str, Any]) -> bytes:
+    """Weights as a file."""
+    stream = io.BytesIO()
+    arrays: dict[str, Any] = {f"w{k}": one for k, one in enumerate(network.weights)}
+    np.savez(stream, about=np.array(json.dumps(about)), **arrays)
+    return stream.getvalue()
+
+
+def network_from_bytes(data: bytes, *, file: str) -> SmallNetwork:
+    """Inverse of :func:`network_bytes`.
+
+    Raises
+    ------
+    InputError
+        If they are no weights of this model.
+    """
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            weights = tuple(arrays[f"w{k}"] for k in range(6))
+    except (ValueError, KeyError, OSError, EOFError, BadZipFile) as error:
+        msg = f"no weights of a driver: {error}"
+        raise InputError(msg, file=file) from error
+    if weights[0].shape[:1] != (len(FEATURES),) or weights[5].shape != (len(BINS),):
+        shapes = f"{weights[0].shape} and {weights[5].shape}"
+        msg = f"weights {shapes}, not ({len(FEATURES)}, ...) and ({len(BINS)},)"
+        raise InputError(msg, file=file)
+    return SmallNetwork(weights)
+
+
+def shipped_weights() -> bytes:
+    """Weights that ship."""
+    return files("odscen.learning.behaviour").joinpath(_SHIPPED).read_bytes()

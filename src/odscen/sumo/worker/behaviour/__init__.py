@@ -1,0 +1,1 @@
+"""Behaviour models in a running simulation."""

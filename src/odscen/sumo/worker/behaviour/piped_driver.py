@@ -1,0 +1,193 @@
+"""A behaviour model in another process, over its stdin and stdout or a socket.
+
+Messages are those of :mod:`odscen.learning.behaviour.behaviour_messages`.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import subprocess
+import tempfile
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.errors import InputError
+from odscen.learning.behaviour.behaviour_messages import (
+    HEAD,
+    MOST_BYTES,
+    action_from_bytes,
+    framed,
+    observation_bytes,
+    scene_bytes,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import BinaryIO
+
+    import numpy as np
+
+    from odscen.base.arrays import BoolArray
+    from odscen.learning.behaviour.behaviour_model import (
+        BehaviourScene,
+        DrivingAction,
+        RoadObservation,
+    )
+
+_LAST_LINES = 5
+_LAST_BYTES = 4000
+_BLOCK = 1 << 16
+_PATIENCE = 5.0
+"""Wall seconds that a program has to end when its input is over."""
+
+
+class _Peer:
+    """Asks and waits, over two descriptors that do not block."""
+
+    def __init__(self, seed: int, time_limit: float) -> None:
+        self._seed = seed
+        self._time_limit = time_limit
+        self._to = self._back = -1
+
+    def init(self, rng: np.random.Generator, scene: BehaviourScene) -> None:
+        """Start it, and tell it the scene."""
+        del rng  # it has the seed
+        self._connect()
+        os.set_blocking(self._to, False)
+        os.set_blocking(self._back, False)
+        self._ask(scene_bytes(scene, self._seed))
+
+    def act(self, observation: RoadObservation, state: Any) -> tuple[DrivingAction, BoolArray]:
+        """Ask it."""
+        del state
+        return action_from_bytes(self._ask(observation_bytes(observation)), len(observation))
+
+    def close(self) -> None:
+        """Say that the run is over."""
+
+    def _connect(self) -> None:
+        raise NotImplementedError
+
+    def _ended(self) -> str:
+        """Why it has ended."""
+        raise NotImplementedError
+
+    def _ask(self, message: bytes) -> bytes:
+        end = time.monotonic() + self._time_limit
+        self._write(framed(message), end)
+        size = HEAD.unpack(self._read(HEAD.size, end))[0]
+        if size > MOST_BYTES:
+            msg = f"its answer has {size:,} bytes; {MOST_BYTES:,} are the most"
+            raise InputError(msg)
+        return self._read(size, end)
+
+    def _write(self, data: bytes, end: float) -> None:
+        left = memoryview(data)
+        while left:
+            self._wait([], [self._to], end)
+            try:
+                left = left[os.write(self._to, left) :]
+            except OSError as error:
+                raise InputError(self._ended()) from error
+
+    def _read(self, size: int, end: float) -> bytes:
+        blocks: list[bytes] = []
+        while size:
+            self._wait([self._back], [], end)
+            try:
+                block = os.read(self._back, min(size, _BLOCK))
+            except OSError as error:
+                raise InputError(self._ended()) from error
+            if not block:
+                raise InputError(self._ended())
+            blocks.append(block)
+            size -= len(block)
+        return b"".join(blocks)
+
+    def _wait(self, read: list[int], write: list[int], end: float) -> None:
+        left = end - time.monotonic()
+        ready = select.select(read, write, [], max(left, 0.0))
+        if not any(ready):
+            self._stop()
+            msg = f"it took more than {self._time_limit:g} s for a step"
+            raise InputError(msg)
+
+    def _stop(self) -> None:
+        """End it."""
+
+
+class PipedDriver(_Peer):
+    """A program that is started with the run and ends with it."""
+
+    def __init__(self, words: Sequence[str], seed: int, time_limit: float) -> None:
+        super().__init__(seed, time_limit)
+        self._words = words
+        self._process: subprocess.Popen[bytes] | None = None
+        self._said: BinaryIO
+
+    def _connect(self) -> None:
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
+        try:
+            self._process = subprocess.Popen(
+                self._words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said
+            )
+        except OSError as error:
+            msg = f"it cannot be started: {error.strerror}"
+            raise InputError(msg, element=self._words[0]) from error
+        if self._process.stdin is not None and self._process.stdout is not None:
+            self._to, self._back = self._process.stdin.fileno(), self._process.stdout.fileno()
+
+    def close(self) -> None:
+        """Let it end: its input is over."""
+        if self._process is not None and self._process.stdin is not None:
+            with suppress(OSError):
+                self._process.stdin.close()
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(_PATIENCE)
+            if self._process.poll() is None:
+                self._process.kill()
+                self._process.wait()
+
+    def _ended(self) -> str:
+        code = None
+        if self._process is not None:
+            with suppress(subprocess.TimeoutExpired):
+                code = self._process.wait(1.0)
+        self._said.seek(max(0, self._said.seek(0, os.SEEK_END) - _LAST_BYTES))
+        lines = self._said.read().decode("utf-8", "replace").strip().splitlines()[-_LAST_LINES:]
+        said = f": {' / '.join(lines)}" if lines else ""
+        how = "it has closed its output" if code is None else f"it ended with exit code {code}"
+        return f"{how}{said}"
+
+    def _stop(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+
+
+class SocketDriver(_Peer):
+    """A program that listens at a socket, and waits for the run."""
+
+    def __init__(self, path: str, seed: int, time_limit: float) -> None:
+        super().__init__(seed, time_limit)
+        self._path = path
+        self._socket: socket.socket
+
+    def _connect(self) -> None:
+        self._socket = socket.socket(socket.AF_UNIX)
+        try:
+            self._socket.connect(self._path)
+        except OSError as error:
+            msg = f"no program listens at its socket: {error.strerror}"
+            raise InputError(msg) from error
+        self._to = self._back = self._socket.fileno()
+
+    def close(self) -> None:
+        """Hang up."""
+        if hasattr(self, "_socket"):
+            self._socket.close()
+
+    def _ended(self) -> str:
+        return "it has closed its socket"

@@ -1,0 +1,63 @@
+"""Behaviour models of tests, named by ``tests.sumo.worker.behaviour.models:NAME``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from odscen.learning.behaviour.behaviour_model import DrivingAction, DrivingKind
+
+HERE = "tests.sumo.worker.behaviour.models"
+
+
+class Nobody:
+    """Looks, and controls nobody."""
+
+    def init(self, rng: Any, scene: Any) -> Any:
+        rng.random()
+        return scene
+
+    def act(self, seen: Any, state: Any) -> tuple[DrivingAction, Any]:
+        del state
+        return DrivingAction(speed=seen.speed), np.zeros(len(seen), dtype=bool)
+
+
+@dataclass
+class Only(Nobody):
+    """Controls one vehicle, by one kind of action, from 1 s to 3 s."""
+
+    vehicle: str
+    kind: float
+    value: float
+
+    def act(self, seen: Any, state: Any) -> tuple[DrivingAction, Any]:
+        mine = (state.vehicle_id[seen.index] == self.vehicle) & (1.0 <= seen.time < 3.0)
+        kind, zero = DrivingKind(int(self.kind)), np.zeros(len(seen))
+        since = seen.time - 1.0
+        if kind in (DrivingKind.SPEED, DrivingKind.SPEED_UNCHECKED):
+            return DrivingAction(kind, speed=zero + self.value), mine
+        if kind == DrivingKind.LANE_POSITION:
+            return DrivingAction(kind, speed=zero, lane=seen.lane, pos=seen.pos + self.value), mine
+        place = DrivingAction(kind, x=zero + self.value + since, y=zero - 20.0, hdg=zero + 0.5)
+        return place, mine
+
+
+@dataclass
+class Wrong(Nobody):
+    """Does something wrong from 1 s on."""
+
+    what: str
+
+    def act(self, seen: Any, state: Any) -> tuple[Any, Any]:
+        if seen.time < 1.0:
+            return super().act(seen, state)
+        if self.what == "raise":
+            msg = "kaputt"
+            raise ZeroDivisionError(msg)
+        count = len(seen)
+        place = DrivingAction(
+            DrivingKind.LANE_POSITION, lane=np.full(count, 10**6), pos=np.zeros(count)
+        )
+        return place, np.ones(count, dtype=bool)
