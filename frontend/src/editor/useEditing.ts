@@ -82,9 +82,10 @@ export function useEditing(
     () => (selection.length === 1 ? (ones.find(({ id }) => id === selection[0]) ?? null) : null),
     [ones, selection],
   );
-  const { goals, route: planned } = useGoals(name, one, roiKey, graph);
+  const { goals, legs } = useGoals(name, one, roiKey, graph);
   const trial = (hover?.is === "place" && hover.trial) || null;
   const tried = useTrial(name, trial);
+  const route = useMemo(() => (trial ? tried.points : legs.flat()), [trial, tried, legs]);
   const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
   const sights = useMemo(() => sightsOf(handle, graph, () => lights), [graph, lights]);
   const { roi } = document;
@@ -119,6 +120,7 @@ export function useEditing(
     selection,
     one,
     goals,
+    legs,
     lights,
     showLight: (junction) => {
       const middle = lights?.middle(junction);
@@ -154,7 +156,7 @@ export function useEditing(
     hover,
     setHover,
     inside,
-    route: trial ? tried.points : planned,
+    route,
     unreachable: trial !== null && tried.possible === false,
     sights,
     handle,

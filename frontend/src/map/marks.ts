@@ -231,6 +231,26 @@ export function drawGoal(context: CanvasRenderingContext2D, [x, y]: [number, num
   context.stroke();
 }
 
+/** Waypoints are squares with their numbers. */
+export function drawWaypoint(
+  context: CanvasRenderingContext2D,
+  [x, y]: [number, number],
+  number: number,
+): void {
+  context.beginPath();
+  context.roundRect(x - 9, y - 9, 18, 18, 3);
+  context.fillStyle = ROI_BASE;
+  context.fill();
+  context.lineWidth = 2;
+  context.strokeStyle = "#ffffff";
+  context.stroke();
+  context.font = "700 11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillStyle = "#ffffff";
+  context.fillText(String(number), x, y + 0.5);
+}
+
 export function body(
   context: CanvasRenderingContext2D,
   x: number,

@@ -77,6 +77,8 @@ export interface Scene {
   chosenGoal: Place | null;
   /** Points of the route to the goal that is chosen. */
   route: readonly (readonly [number, number])[];
+  /** Waypoints of that route, in their order. */
+  waypoints: readonly Place[];
   hover: Place | null;
   /** What is said beside the place under the pointer. */
   hoverText: string | null;
@@ -96,6 +98,7 @@ export const EMPTY_SCENE: Scene = {
   goals: [],
   chosenGoal: null,
   route: [],
+  waypoints: [],
   hover: null,
   hoverText: null,
   hoverCategory: null,

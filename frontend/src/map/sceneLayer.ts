@@ -28,6 +28,7 @@ import {
   drawPin,
   drawRoute,
   drawWalkEdges,
+  drawWaypoint,
   spot,
   tag,
 } from "./marks";
@@ -106,6 +107,7 @@ export class SceneLayer {
     ];
     for (const goal of scene.goals) drawGoal(context, at(goal.x, goal.y), false);
     if (scene.chosenGoal) drawGoal(context, at(scene.chosenGoal.x, scene.chosenGoal.y), true);
+    scene.waypoints.forEach((place, n) => drawWaypoint(context, at(place.x, place.y), n + 1));
     if (scene.hover) this.drawHover(context, at, view, scene.hover, scene.hoverCategory);
     const plain = scene.actors.length > MANY && view.scale < NODES_FROM;
     const named = scene.actors.reduce((n, actor) => n + Number(actor.selected), 0) <= FEW;
