@@ -104,6 +104,12 @@ export const EMPTY_SCENE: Scene = {
   hoverCategory: null,
 };
 
+/** A colour for each road user, by its number among some. */
+export interface Tint {
+  group: Uint8Array;
+  colors: readonly string[];
+}
+
 /** Road users at one moment: columns, so that thousands cost little. */
 export interface Moving {
   count: number;
@@ -111,6 +117,8 @@ export interface Moving {
   pose: Float64Array;
   category: Uint8Array;
   flags: Uint8Array;
+  /** Colours that say something else than the kind. */
+  tint?: Tint | null;
   /** Row of the road user to be marked as ego, or -1. */
   ego: number;
   followed: number;

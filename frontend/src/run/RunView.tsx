@@ -29,6 +29,8 @@ import { SafeSlices } from "./LongRun";
 import { Plots } from "./Plots";
 import { Result } from "./Result";
 import { RoadUsers } from "./RoadUsers";
+import { MapTools } from "./MapTools";
+import { SpeedChart } from "./SpeedChart";
 import { LiveStrip, ReplayStrip } from "./Strip";
 import { useCounts } from "./useCounts";
 import { useIncidents } from "./useIncidents";
@@ -103,6 +105,11 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     if (ground.bounds) handle.current?.show(ground.bounds);
   }, [ground.bounds]);
   const known = player.replay?.crowd ?? crowd;
+  const recorded = useMemo(
+    () => (player.replay && followed ? player.replay.speedsOf(followed) : null),
+    [player.replay, followed],
+  );
+  const speeds = recorded ?? picture.speeds;
   const categories = useMemo(
     () => new Map<string, Category>(known?.all().map((one) => [one.id, one.category]) ?? []),
     [known],
@@ -198,7 +205,18 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                 lights={lights.known && (map?.lights.length ?? 0) > 0}
                 lamps={mode === "live"}
                 marks={marks}
+                by={picture.by}
               />
+              <MapTools by={picture.by} live={mode === "live"} onBy={picture.colourBy}>
+                {followed && speeds.length > 1 && (
+                  <SpeedChart
+                    name={followed}
+                    points={speeds}
+                    time={mode === "replay" ? player.time : now.time}
+                    gap={Math.max(1, 1.5 * (player.replay?.spacing ?? 0))}
+                  />
+                )}
+              </MapTools>
             </MapCanvas>
           ) : (
             <div className="empty">

@@ -7,7 +7,7 @@ import { chosenGoalAt, goalCarrier } from "./goal";
 import { type Editing, type Handler, LOOKING, onFoot } from "./handler";
 import { routeHover, waypointGrab } from "./waypoint";
 
-/** Without a tool: a click selects or sets the goal, a drag takes road users, a goal or a route along, or frames some. */
+/** Without a tool: a click selects or sets the goal; a drag takes road users, a goal or a route along. */
 export const selectHandler = (editing: Editing): Handler => ({
   ...LOOKING,
   walks: editing.one ? onFoot(editing, editing.one.id) : null,
