@@ -123,6 +123,7 @@ export function Editor({
         onFind={() => setFinding(true)}
         onHelp={() => setHelp(true)}
         onTour={() => setTour(true)}
+        onPicture={() => now.handle.current?.picture() ?? null}
       />
       <div className="side">
         <EditorSteps store={store} now={now} drawing={drawing} assets={assets} />

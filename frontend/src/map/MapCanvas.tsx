@@ -22,6 +22,7 @@ import { CanvasRenderer, type MapRenderer } from "./renderer";
 import type { Mark, Moving, Scene } from "./scene";
 import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
+import { keep, parseKept } from "../ui/kept";
 
 /** Where the pointer is, in metres, and how far a touch reaches. */
 export interface Pointed {
@@ -40,6 +41,8 @@ export interface MapHandle {
   centre(x: number, y: number, aside?: number): void;
   /** The rectangle that is in sight. */
   seen(): Bounds;
+  /** What is seen now, in one canvas: the given one, or a new one. */
+  picture(into?: HTMLCanvasElement): HTMLCanvasElement | null;
   /** Acts on the middle, as Enter does. */
   pickMiddle(): void;
 }
@@ -119,6 +122,7 @@ export function MapCanvas({
         queued.current = requestAnimationFrame(() => {
           queued.current = 0;
           setShown(view.current);
+          keep({ at: view.current });
         });
       }
     },
@@ -138,7 +142,9 @@ export function MapCanvas({
       size.current = { width: box.width, height: box.height };
       made.setSize(size.current, window.devicePixelRatio || 1);
       least.current = fit(drawing.bounds, size.current).scale * 0.6;
-      if (first) showAll();
+      const { at } = parseKept(location.hash);
+      if (first && at) apply(at);
+      else if (first) showAll();
       else made.setView(view.current);
       first = false;
     };
@@ -170,6 +176,7 @@ export function MapCanvas({
         const scale = Math.max(view.current.scale, 8);
         apply({ x: x + aside / scale, y, scale });
       },
+      picture: (into) => renderer.current?.picture(into) ?? null,
       seen: () => visible(view.current, size.current),
       pickMiddle: () =>
         onPick?.({

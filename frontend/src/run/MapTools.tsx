@@ -8,12 +8,15 @@ export function MapTools({
   by,
   live,
   onBy,
+  share,
   children,
 }: {
   by: ColourBy;
   /** Whether the run is watched while it runs. */
   live: boolean;
   onBy: (by: ColourBy) => void;
+  /** What the picture is taken away with. */
+  share?: ReactNode;
   children?: ReactNode;
 }) {
   return (
@@ -22,19 +25,22 @@ export function MapTools({
       onPointerDown={(event) => event.stopPropagation()}
       onPointerMove={(event) => event.stopPropagation()}
     >
-      <Select
-        size="xs"
-        w={176}
-        aria-label="Colour by"
-        leftSection={<span aria-hidden="true">Colour</span>}
-        leftSectionWidth={54}
-        allowDeselect={false}
-        data={coloursFor(live)}
-        value={by}
-        onChange={(next) => {
-          if (next) onBy(next as ColourBy);
-        }}
-      />
+      <div className="map-tools-row">
+        <Select
+          size="xs"
+          w={176}
+          aria-label="Colour by"
+          leftSection={<span aria-hidden="true">Colour</span>}
+          leftSectionWidth={54}
+          allowDeselect={false}
+          data={coloursFor(live)}
+          value={by}
+          onChange={(next) => {
+            if (next) onBy(next as ColourBy);
+          }}
+        />
+        {share}
+      </div>
       {children}
     </div>
   );

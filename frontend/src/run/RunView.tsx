@@ -16,6 +16,7 @@ import { useRunLights } from "../signals/useSignals";
 import { RunBar } from "../time/RunBar";
 import { useNearest } from "../time/useNearest";
 import { go } from "../ui/address";
+import { keep, parseKept } from "../ui/kept";
 import { CountsFit } from "./CountsFit";
 import { EarlierRuns } from "./EarlierRuns";
 import { hasEnded } from "./figures";
@@ -30,6 +31,7 @@ import { Plots } from "./Plots";
 import { Result } from "./Result";
 import { RoadUsers } from "./RoadUsers";
 import { MapTools } from "./MapTools";
+import { ShareMenu } from "./ShareMenu";
 import { SpeedChart } from "./SpeedChart";
 import { LiveStrip, ReplayStrip } from "./Strip";
 import { useCounts } from "./useCounts";
@@ -47,6 +49,8 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
 /** A run, live or as it was recorded; the scenario itself is not touched. */
 function Watched({ scenario, run, onResume }: { scenario: string; run: string; onResume: () => void }) {
   const handle = useRef<MapHandle | null>(null);
+  // What the address kept when the run was opened.
+  const [linked] = useState(() => parseKept(location.hash));
   const { info, failure, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
   const picture = usePicture(handle);
@@ -102,8 +106,18 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     if (cleared) clear();
   }, [cleared, clear]);
   useEffect(() => {
-    if (ground.bounds) handle.current?.show(ground.bounds);
-  }, [ground.bounds]);
+    if (ground.bounds && !linked.at) handle.current?.show(ground.bounds);
+  }, [ground.bounds, linked]);
+  const { replay, seek } = player;
+  useEffect(() => {
+    if (!replay) return;
+    const { time: at, chosen } = linked;
+    if (at !== undefined) seek(at);
+    if (chosen?.[0]) follow(chosen[0]);
+  }, [replay, seek, follow, linked]);
+  useEffect(() => {
+    if (replay) keep({ time: player.time, chosen: followed ? [followed] : [] });
+  }, [replay, player.time, followed]);
   const known = player.replay?.crowd ?? crowd;
   const recorded = useMemo(
     () => (player.replay && followed ? player.replay.speedsOf(followed) : null),
@@ -207,7 +221,19 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                 marks={marks}
                 by={picture.by}
               />
-              <MapTools by={picture.by} live={mode === "live"} onBy={picture.colourBy}>
+              <MapTools
+                by={picture.by}
+                live={mode === "live"}
+                onBy={picture.colourBy}
+                share={
+                  <ShareMenu
+                    run={run}
+                    handle={handle}
+                    playing={mode === "replay" ? player.playing : null}
+                    onPlay={player.play}
+                  />
+                }
+              >
                 {followed && speeds.length > 1 && (
                   <SpeedChart
                     name={followed}
