@@ -29,6 +29,7 @@ ALL = (
     "carla_mirror",
     "canvas",
     "in_browser",
+    "editing",
 )
 
 

@@ -61,7 +61,7 @@ export function RegionStep({
       <Button size="compact-sm" variant="default" onClick={onSeen}>
         Take all that I see
       </Button>
-      <Group gap={6} align="center" wrap="nowrap">
+      <Group gap={6} align="center">
         <Button
           size="compact-sm"
           variant="default"
