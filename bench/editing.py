@@ -15,7 +15,6 @@ from playwright.sync_api import expect
 
 from bench.canvas import TOWN
 from bench.common import shared_maps
-from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, generate
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Scenario
@@ -65,11 +64,12 @@ def main() -> None:
                 base_url=server.url, viewport={"width": 1360, "height": 850}
             )
             context.set_default_timeout(120_000)
+            expect.set_options(timeout=120_000)
             context.add_init_script(f"localStorage.setItem({tool.TOUR_SEEN!r}, 'seen')")
             context.add_init_script(_PROBE)
             user = OdscenPage(context.new_page())
             user.open_editor(scenario)
-            expect(user.names.first).to_be_visible(timeout=120_000)
+            expect(user.names.first).to_be_visible()
             print(f"{Path(TOWN).stem}: {number} road users (wanted {ACTORS})")
             _measure(user)
 
@@ -81,7 +81,6 @@ def _crowd(workspace: Workspace) -> tuple[str, int]:
     made = loads(path.read_text(encoding="utf-8"))
     assert isinstance(made, Scenario)
     kept = made.model_copy(update={"actors": made.actors[:ACTORS]})
-    load_map(workspace.map(Path(TOWN).stem))
     path.write_text(dumps(kept), encoding="utf-8")
     return path.name.removesuffix(SUFFIX), len(kept.actors)
 

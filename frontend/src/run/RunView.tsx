@@ -31,6 +31,7 @@ import { Plots } from "./Plots";
 import { Result } from "./Result";
 import { RoadUsers } from "./RoadUsers";
 import { MapTools } from "./MapTools";
+import { RunHint } from "./RunHint";
 import { ShareMenu } from "./ShareMenu";
 import { SpeedChart } from "./SpeedChart";
 import { LiveStrip, ReplayStrip } from "./Strip";
@@ -195,24 +196,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               label={mode === "replay" ? "Recording of the run" : "Live view of the run"}
               onPick={pick}
             >
-              {info.state === "preparing" ? (
-                <div className="map-hint" role="status">
-                  <span className="waiting">
-                    <Loader size={16} aria-hidden="true" />
-                    {crowd
-                      ? "Preparing, step 2 of 2: starting the simulation …"
-                      : `Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
-                  </span>
-                </div>
-              ) : (
-                followed && (
-                  <div className="map-hint" role="status">
-                    {now.there
-                      ? `Following ${followed}. Click on the empty map to stop.`
-                      : `${followed} is not on the road now.`}
-                  </div>
-                )
-              )}
+              <RunHint info={info} planned={crowd !== null} followed={followed} there={now.there} />
               <Legend
                 categories={kinds}
                 ego={(known?.egos().length ?? 0) > 0}
