@@ -9,6 +9,7 @@ from __future__ import annotations
 import statistics
 import tempfile
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 from playwright.sync_api import expect
@@ -134,7 +135,7 @@ def _frames(user: OdscenPage, what: str, move: Callable[[], None]) -> None:
     begun = page.evaluate("odscenFrames.length")
     move()
     times: list[float] = page.evaluate(f"odscenFrames.slice({begun})")
-    pauses = [after - before for before, after in zip(times, times[1:], strict=False)]
+    pauses = [after - before for before, after in pairwise(times)]
     print(
         f"  {what:20} {1000 * len(pauses) / sum(pauses):5.1f} frames/s (aim 50),"
         f" longest pause {max(pauses):.0f} ms"

@@ -1,7 +1,7 @@
 import type { Bounds } from "../api/types";
 import { nth } from "../lists";
 
-/** An area of the map, told by whether a point lies in it; metres. */
+/** An area of the map: whether a point lies in it; metres. */
 export type Area = (x: number, y: number) => boolean;
 
 export const inBounds =

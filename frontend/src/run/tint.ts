@@ -9,7 +9,7 @@ export type ColourBy = "kind" | "speed" | "delay" | "lamps";
 /** Below this speed one is stopped, as in the figures of a run; m/s. */
 export const STOPPED = 0.1;
 
-/** From blue to red, told apart by the colour-blind too (RdYlBu of ColorBrewer). */
+/** From blue to red, distinct for the colour-blind too (RdYlBu of ColorBrewer). */
 const COLD_TO_HOT = ["#4575b4", "#91bfdb", "#fee090", "#fc8d59", "#d73027"] as const;
 
 interface Scale {

@@ -42,7 +42,7 @@ export interface Picture {
 /** Points of the chart of speeds that are kept. */
 const MOST_POINTS = 2400;
 
-/** One more point of the speeds that were seen, unless time stands still. */
+/** One more point of the speeds that were seen, unless no time has passed. */
 function note(points: SpeedPoint[], time: number, speed: number | null): void {
   if (speed === null || time <= (points.at(-1)?.time ?? -1)) return;
   points.push({ time, speed });

@@ -27,7 +27,7 @@ const BANDS = 34;
 const RECENT = 3;
 /** Below this width of the window the bar is closed to begin with. */
 const NARROW = 761;
-/** Share of what is in sight that lies before the moment when it has moved on. */
+/** Share of what is in sight that lies before the moment that it follows. */
 const LEAD = 0.1;
 
 /** What happened when in a run: rules, incidents, what a light showed, and the ego's time to collision. */
