@@ -32,6 +32,7 @@ ALL = (
     "carla_mirror",
     "canvas",
     "in_browser",
+    "editing",
 )
 
 

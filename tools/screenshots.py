@@ -42,6 +42,8 @@ COUNTED, LONG, LIT, RULED, TIMED = "morning", "night", "signals", "mid-block", "
 SWEPT = "cut-in"
 SIZE = {"width": 1280, "height": 800}
 LARGEST = 400_000
+PATIENCE = 60_000
+"""Milliseconds that a view may take to come about on a busy machine."""
 
 
 class Camera:
@@ -65,6 +67,7 @@ class Camera:
 def main() -> None:
     folder = Path(sys.argv[1]) if sys.argv[1:] else IMAGES
     folder.mkdir(parents=True, exist_ok=True)
+    expect.set_options(timeout=PATIENCE)
     with tempfile.TemporaryDirectory() as name:
         workspace = Workspace.open(Path(name))
         for path in shipped_maps():

@@ -1,5 +1,6 @@
 import { afterEach, expect, test, vi } from "vitest";
 
+import { inBounds } from "../src/map/areas";
 import type { Edit, ScenarioDocument, ScenarioState } from "../src/api/types";
 import {
   boundsOfProblem,
@@ -129,7 +130,7 @@ test("a road user is picked within reach or on its body, several in a rectangle"
   );
   expect(nearestOne(actors, 1.9, 0.5, 0.1)?.id).toBe("a");
   expect(nearestOne(actors, 0, 3, 0.1)).toBeNull();
-  expect(inFrame(actors, [3, -1, 5, 1])).toEqual(["b"]);
+  expect(inFrame(actors, inBounds([3, -1, 5, 1]))).toEqual(["b"]);
 });
 
 const startsOf = (document: ScenarioDocument, ...inside: number[]): Starts =>

@@ -1,7 +1,11 @@
-"""A real browser on a real server. What fails leaves a picture and a trace under build/browser/."""
+"""A real browser on a real server. What fails leaves a picture and a trace under build/browser/.
+
+With ``ODSCEN_TRACE`` in the environment the trace has the page at each step, too.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
@@ -93,7 +97,8 @@ def open_page(
             options.setdefault("viewport", {"width": 1360, "height": 850})
             context = browser.new_context(base_url=url, **options)
             context.set_default_timeout(PATIENCE)
-            context.tracing.start(snapshots=True)
+            # Pictures of each step double the time of tests by keyboard.
+            context.tracing.start(snapshots="ODSCEN_TRACE" in os.environ)
             if not tour:
                 context.add_init_script(f"localStorage.setItem({tool.TOUR_SEEN!r}, 'seen')")
             contexts.append(context)

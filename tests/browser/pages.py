@@ -159,7 +159,7 @@ class OdscenPage:
     @property
     def scenario(self) -> str:
         """Name of the scenario that the address tells."""
-        found = re.search(r"#/(?:edit|run)/([^/]+)", self.page.url)
+        found = re.search(r"#/(?:edit|run)/([^/?]+)", self.page.url)
         assert found, self.page.url
         return found[1]
 

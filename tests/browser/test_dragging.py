@@ -78,7 +78,7 @@ def test_all_that_is_in_a_rectangle_is_selected_dragged_copied_and_removed(
     assert cars.document()["actors"] == []
 
 
-def test_a_goal_is_set_anywhere_and_its_flag_is_dragged_with_a_live_route(
+def test_a_goal_is_set_anywhere_and_its_flag_and_its_route_are_dragged_with_a_live_route(
     cars: OdscenPage,
 ) -> None:
     actor = cars.document()["actors"][1]
@@ -102,6 +102,14 @@ def test_a_goal_is_set_anywhere_and_its_flag_is_dragged_with_a_live_route(
     with cars.changing():
         cars.undo.click()
     assert cars.document()["actors"][1]["goal"] == chosen
+    quarter = len(path) // 4
+    with (
+        cars.page.expect_response(lambda answer: "/path?" in answer.url),
+        cars.changing(),
+    ):
+        cars.map.drag(*(cars.graph.place(path[quarter + by]) for by in (0, 3)))
+    (passed,) = cars.document()["actors"][1]["via"]
+    assert away(cars.graph.place(passed), cars.graph.place(path[quarter + 3])) < 3
 
 
 def test_a_goal_that_cannot_be_reached_is_said_before_the_click_and_not_set(

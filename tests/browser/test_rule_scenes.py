@@ -154,8 +154,7 @@ def run_until_fired(user: OdscenPage, hand: Hand, actor: str) -> None:
     hand.press(user.step("Run"))
     hand.press(user.run)
     user.wait_until_moving()
-    if isinstance(hand, Mouse):
-        user.choose_speed("As fast")
+    hand.choose("Speed", "As fast as possible")
     expect(user.result).to_contain_text("finished", timeout=90_000)
     hand.open_tab("Incidents")
     fired = user.page.get_by_role("list", name="Incidents").get_by_role("button")

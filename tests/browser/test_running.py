@@ -25,7 +25,7 @@ def stand_still(user: OdscenPage) -> None:
     user.control("Pause").click()
     expect(user.control("Resume")).to_be_enabled()
     expect(user.control("One step")).to_be_enabled()
-    run = user.page.url.rsplit("/", 1)[1]
+    run = user.page.url.partition("?")[0].rsplit("/", 1)[1]
     while user.get(f"/runs/{run}")["state"] != "paused":
         pass
     # The last picture comes after the word that the run stands.

@@ -6,6 +6,7 @@ import type { Graph, Place } from "../map/graph";
 import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
 import { CATEGORY_WORD, flowWord } from "../ui/words";
 import { ActorForm, ManyForm } from "./ActorForm";
+import { ArrangeForm } from "./ArrangeForm";
 import type { Profiles } from "./DayProfiles";
 import { FillForm } from "./FillForm";
 import { FlowForm } from "./FlowForm";
@@ -15,6 +16,7 @@ import type { Tool } from "./handlers/handler";
 import { goalTool } from "./handlers/goal";
 import { moveTool } from "./handlers/move";
 import { placeTool } from "./handlers/place";
+import { waypointTool } from "./handlers/waypoint";
 import { isFlow, type Starts } from "./placing";
 import { StartAndGoal } from "./StartAndGoal";
 
@@ -119,6 +121,7 @@ export function ActorStep(props: Props) {
               }}
               onStart={(spawn) => props.onStart(one, spawn)}
               onGoal={(goal) => props.onGoal(one, goal)}
+              onPickVia={() => onTool(waypointTool(one.id))}
               onVia={(via) => onEdit({ kind: "change_actor", actor: one.id, via })}
             />
           )}
@@ -134,6 +137,15 @@ export function ActorStep(props: Props) {
                 onEdit={onEdit}
               />
             ))}
+          {!one && actors.length > 1 && (
+            <ArrangeForm
+              key={actors.map(({ id }) => id).join(" ")}
+              actors={actors}
+              graph={graph}
+              starts={starts}
+              onEdit={onEdit}
+            />
+          )}
           {!one && actors.length > 0 && (
             <ManyForm
               actors={actors}

@@ -13,6 +13,7 @@ import { flowTool } from "./handlers/flow";
 import { goalTool } from "./handlers/goal";
 import { moveTool } from "./handlers/move";
 import { placeTool } from "./handlers/place";
+import { waypointTool } from "./handlers/waypoint";
 import { FindDialog } from "./FindDialog";
 import { HeadTools } from "./HeadTools";
 import { HelpSheet } from "./HelpSheet";
@@ -92,6 +93,9 @@ export function Editor({
     goal: () => {
       if (now.one) arm(goalTool(now.one.id));
     },
+    waypoint: () => {
+      if (now.one && !isFlow(now.one)) arm(waypointTool(now.one.id));
+    },
     along: (by) => {
       const start = now.one && now.graph.place(now.one.spawn);
       moveTo(start ? now.starts.along(start, by) : null);
@@ -119,6 +123,7 @@ export function Editor({
         onFind={() => setFinding(true)}
         onHelp={() => setHelp(true)}
         onTour={() => setTour(true)}
+        onPicture={() => now.handle.current?.picture() ?? null}
       />
       <div className="side">
         <EditorSteps store={store} now={now} drawing={drawing} assets={assets} />

@@ -2,6 +2,7 @@ import { Button, Loader, Text } from "@mantine/core";
 import { useMemo, useState } from "react";
 
 import type { Assets, Edit } from "../api/types";
+import { inBounds, inCircle } from "../map/areas";
 import type { PackedDrawing } from "../map/drawing";
 import { count } from "../ui/words";
 import { ActorStep } from "./ActorStep";
@@ -103,7 +104,11 @@ export function EditorSteps({
               onWhole={() => changes.extendRegion(graph.columns.segments.map((_, row) => row))}
               onSeen={() => {
                 const seen = sights.seen();
-                if (seen) changes.extendRegion(rowsWithin(graph, seen));
+                if (seen) changes.extendRegion(rowsWithin(graph, inBounds(seen)));
+              }}
+              onWithin={(metres) => {
+                const middle = sights.middle();
+                if (middle) changes.extendRegion(rowsWithin(graph, inCircle(middle, metres)));
               }}
               onBegin={sights.pickMiddle}
             />

@@ -5,11 +5,19 @@ import { api } from "../api/client";
 import { ExportDialog } from "../exchange/ExportDialog";
 import { type Format, FORMATS } from "../exchange/formats";
 import { IconDown } from "../ui/icons";
+import { copyLink, savePicture } from "../ui/share";
 
 const DIALOGS: Format[] = ["openscenario", "sumo"];
 
 /** The formats that the scenario can be taken away in, in the head of the page. */
-export function ExportMenu({ name }: { name: string }) {
+export function ExportMenu({
+  name,
+  onPicture,
+}: {
+  name: string;
+  /** What the map shows now. */
+  onPicture: () => HTMLCanvasElement | null;
+}) {
   const [format, setFormat] = useState<Format | null>(null);
   return (
     <>
@@ -32,6 +40,17 @@ export function ExportMenu({ name }: { name: string }) {
           <Menu.Item component="a" href={api.downloadUrl(name, "graphml")} download>
             Graph (GraphML)
           </Menu.Item>
+          <Menu.Divider />
+          <Menu.Item onClick={copyLink}>Copy the link to this view</Menu.Item>
+          <Menu.Item
+            onClick={() => {
+              const canvas = onPicture();
+              if (canvas) savePicture(canvas, name);
+            }}
+          >
+            Picture of the map (PNG)
+          </Menu.Item>
+          <Menu.Item onClick={() => print()}>Print</Menu.Item>
         </Menu.Dropdown>
       </Menu>
       {format && <ExportDialog name={name} format={format} onClose={() => setFormat(null)} />}

@@ -23,11 +23,14 @@ export function HeadTools({
   onFind,
   onHelp,
   onTour,
+  onPicture,
 }: {
   store: EditorStore;
   onFind: () => void;
   onHelp: () => void;
   onTour: () => void;
+  /** What the map shows now. */
+  onPicture: () => HTMLCanvasElement | null;
 }) {
   const { scenario, saving, undo, redo, name, edit } = store();
   const [slot, setSlot] = useState<HTMLElement | null>(null);
@@ -111,7 +114,7 @@ export function HeadTools({
           )}
         </Menu.Dropdown>
       </Menu>
-      <ExportMenu name={name} />
+      <ExportMenu name={name} onPicture={onPicture} />
       <input
         ref={file}
         type="file"

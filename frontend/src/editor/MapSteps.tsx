@@ -1,11 +1,14 @@
-import { Button, Group, Text } from "@mantine/core";
-import { useCallback } from "react";
+import { Button, Group, NumberInput, Text } from "@mantine/core";
+import { useCallback, useState } from "react";
 
 import { api } from "../api/client";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { count, mapFacts } from "../ui/words";
 import type { Region } from "./asked";
+
+/** Metres that are suggested for the surroundings of a place. */
+const NEAR = 300;
 
 export function MapStep({ name, onShow }: { name: string; onShow: () => void }) {
   const load = useCallback(() => api.map(name), [name]);
@@ -32,6 +35,7 @@ export function RegionStep({
   onAll,
   onWhole,
   onSeen,
+  onWithin,
   onBegin,
   onShow,
 }: {
@@ -43,9 +47,12 @@ export function RegionStep({
   onWhole: () => void;
   /** Adds what is in sight. */
   onSeen: () => void;
+  /** Adds what lies within so many metres of the middle of what is in sight. */
+  onWithin: (metres: number) => void;
   onBegin: () => void;
   onShow: () => void;
 }) {
+  const [metres, setMetres] = useState<number | string>(NEAR);
   const many = (
     <>
       <Button size="compact-sm" variant="default" onClick={onWhole}>
@@ -54,6 +61,29 @@ export function RegionStep({
       <Button size="compact-sm" variant="default" onClick={onSeen}>
         Take all that I see
       </Button>
+      <Group gap={6} align="center">
+        <Button
+          size="compact-sm"
+          variant="default"
+          disabled={typeof metres !== "number"}
+          onClick={() => onWithin(Number(metres))}
+        >
+          Take all within
+        </Button>
+        <NumberInput
+          size="xs"
+          w={92}
+          aria-label="Distance from the middle of what is in sight"
+          suffix=" m"
+          min={10}
+          max={20_000}
+          step={50}
+          allowDecimal={false}
+          value={metres}
+          onChange={setMetres}
+        />
+        <Text size="sm">of the middle</Text>
+      </Group>
     </>
   );
   if (segments === 0) {
@@ -61,7 +91,7 @@ export function RegionStep({
       <>
         <Text size="sm">
           Click the road or junction where your scenario begins. It turns dark blue; then let the region grow
-          around it. Or drag a rectangle with Shift held down.
+          around it. Or drag a rectangle with Shift held down, or a line around it with Ctrl.
         </Text>
         <Group>
           <Button size="compact-sm" variant="default" onClick={onBegin}>
@@ -76,7 +106,7 @@ export function RegionStep({
     <>
       <Text size="sm">
         Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again. A
-        rectangle, dragged with Shift held down, adds all in it.
+        rectangle, dragged with Shift held down, adds all in it; so does a line around it, with Ctrl.
       </Text>
       <Group>
         {(!region.current || region.candidates.length > 0) && (

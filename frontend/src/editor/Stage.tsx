@@ -13,6 +13,8 @@ import { useSlow } from "../ui/useSlow";
 import type { EditorNow } from "./useEditing";
 import { useScene } from "./useScene";
 
+const NO_ROUTE = "No route leads from the start to this point inside the region";
+
 /** What is below the map. */
 type Dock = "table" | "time";
 
@@ -39,11 +41,7 @@ export function Stage({
   const view = usePlannedView(now, dock === "time" && open);
   const starts = useScene(now);
   const scene = useMemo(() => (view.shown ? withoutStarts(starts) : starts), [starts, view.shown]);
-  const hint = view.shown
-    ? view.hint
-    : now.unreachable
-      ? "No route leads from the start to this point inside the region"
-      : (carried?.hint ?? handler.hint(hover));
+  const hint = view.shown ? view.hint : now.unreachable ? NO_ROUTE : (carried?.hint ?? handler.hint(hover));
   const head = (
     <SegmentedControl
       size="xs"
@@ -83,7 +81,8 @@ export function Stage({
             return taken !== null;
           }}
           onDrop={(at) => {
-            if (at) carried?.drop(at);
+            if (at && carried?.needsRoute && now.unreachable) now.say(NO_ROUTE);
+            else if (at) carried?.drop(at);
             setCarried(null);
             setHover(null);
           }}

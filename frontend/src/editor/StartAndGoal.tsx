@@ -4,7 +4,7 @@ import type { Actor, Flow } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { IconTrash } from "../ui/icons";
 import { placeWord } from "./placeWords";
-import { type Starts, viasOf } from "./placing";
+import { isFlow, type Starts } from "./placing";
 
 /** Start and goal: all that a click on the map does, without the map. */
 export function StartAndGoal({
@@ -16,6 +16,7 @@ export function StartAndGoal({
   onGoal,
   onPickGoal,
   onVia,
+  onPickVia,
 }: {
   one: Actor | Flow;
   graph: Graph;
@@ -27,6 +28,8 @@ export function StartAndGoal({
   onPickGoal: () => void;
   /** Changes the places that the route leads through; flows have none. */
   onVia: (via: string[]) => void;
+  /** Lets one more of them be chosen. */
+  onPickVia: () => void;
 }) {
   const start = graph.place(one.spawn);
   const moves: [string, () => Place | null][] = start
@@ -63,7 +66,7 @@ export function StartAndGoal({
           ))}
         </Group>
       </div>
-      <Passed via={viasOf(one)} graph={graph} onVia={onVia} />
+      {!isFlow(one) && <Passed via={one.via} graph={graph} onVia={onVia} onPickVia={onPickVia} />}
       {goals?.length === 0 && !one.goal ? (
         <Text size="sm" c="red">
           No goal can be reached from here. Move the start or extend the region.
@@ -105,28 +108,36 @@ function Passed({
   via,
   graph,
   onVia,
+  onPickVia,
 }: {
   via: readonly string[];
   graph: Graph;
   onVia: (via: string[]) => void;
+  onPickVia: () => void;
 }) {
-  if (via.length === 0) return null;
   return (
-    <div role="group" aria-label="Passes">
-      <Text size="sm" fw={500}>
-        Passes
-      </Text>
+    <div role="group" aria-label="Waypoints">
+      <Group gap={6} justify="space-between">
+        <Text size="sm" fw={500}>
+          Waypoints{via.length === 0 && ": none"}
+        </Text>
+        <Button size="compact-xs" variant="default" onClick={onPickVia}>
+          Add a waypoint
+        </Button>
+      </Group>
       {via.map((id, index) => (
         // The same place may be passed twice.
         <Group key={`${index} ${id}`} gap={6} justify="space-between" wrap="nowrap">
           <Tooltip label={id} position="top-start">
-            <Text size="sm">{placeWord(graph, id)}</Text>
+            <Text size="sm">
+              {index + 1}. {placeWord(graph, id)}
+            </Text>
           </Tooltip>
           <ActionIcon
             size="sm"
             variant="subtle"
             color="red"
-            aria-label={`Do not pass ${placeWord(graph, id)}`}
+            aria-label={`Remove waypoint ${index + 1}, ${placeWord(graph, id)}`}
             onClick={() => onVia(via.filter((_, other) => other !== index))}
           >
             <IconTrash size={14} />

@@ -8,7 +8,7 @@ import type { Graph, Place } from "../map/graph";
 import { tellError } from "../ui/notices";
 import { go } from "../ui/address";
 import type { Trial } from "./handlers/handler";
-import { viasOf } from "./placing";
+import { stationsOf, viasOf } from "./placing";
 
 const NO_ROI: Roi = { inside: [], candidates: [], removable: [] };
 
@@ -35,19 +35,17 @@ export function useRegion(name: string, roiKey: string): Region {
 export interface Goals {
   /** Null until they are known. */
   goals: Place[] | null;
-  /** Points of the route to the goal that is chosen. */
-  route: [number, number][];
+  /** Points of the route to the goal that is chosen, from each station to the next. */
+  legs: [number, number][][];
 }
 
 /** Where the selected one can go, and its route to its goal. */
 export function useGoals(name: string, one: Actor | Flow | null, roiKey: string, graph: Graph): Goals {
   const [goals, setGoals] = useState<Place[] | null>(null);
-  const [route, setRoute] = useState<[number, number][]>([]);
-  const goal = one?.goal ?? null;
-  const legs = one ? [one.spawn, ...viasOf(one)] : [];
+  const [legs, setLegs] = useState<[number, number][][]>([]);
   // A text, as the same places are another array with every edit.
-  const stations = JSON.stringify(legs);
-  const last = legs.at(-1) ?? null;
+  const stations = JSON.stringify(one ? stationsOf(one) : []);
+  const last = one ? (viasOf(one).at(-1) ?? one.spawn) : null;
   useEffect(() => {
     setGoals(null);
     if (last === null) return;
@@ -65,24 +63,28 @@ export function useGoals(name: string, one: Actor | Flow | null, roiKey: string,
     };
   }, [name, last, roiKey, graph]);
   useEffect(() => {
-    setRoute([]);
-    const passed = JSON.parse(stations) as string[];
-    const places = goal === null ? passed : [...passed, goal];
+    setLegs([]);
+    const places = JSON.parse(stations) as string[];
     if (places.length < 2) return;
     let current = true;
-    const parts = places.slice(1).map((place, index) => api.path(name, nth(places, index), place));
-    Promise.all(parts).then(
+    legsOf(name, places).then(
       (found) => {
-        if (current) setRoute(found.flatMap(({ points }) => points));
+        if (current) setLegs(found);
       },
       () => undefined,
     );
     return () => {
       current = false;
     };
-  }, [name, stations, goal, roiKey]);
-  return { goals, route };
+  }, [name, stations, roiKey]);
+  return { goals, legs };
 }
+
+/** Points of a route from each station to the next; none where no route leads. */
+const legsOf = async (name: string, stations: readonly string[]): Promise<[number, number][][]> =>
+  (
+    await Promise.all(stations.slice(1).map((place, index) => api.path(name, nth(stations, index), place)))
+  ).map(({ points }) => points);
 
 /** The route of a {@link Trial}, as far as the server has answered. */
 export interface TrialRoute {
@@ -99,22 +101,21 @@ export function useTrial(name: string, trial: Trial | null): TrialRoute {
   const [found, setFound] = useState<TrialRoute & { key: string }>({ ...NO_ROUTE, key: "" });
   const wanted = useRef<Trial | null>(null);
   const busy = useRef(false);
-  const key = trial ? `${trial.spawn} ${trial.goal}` : "";
+  const key = trial ? trial.join("\n") : "";
   useEffect(() => {
     wanted.current = trial;
     const ask = (): void => {
       const now = wanted.current;
       if (!now || busy.current) return;
       busy.current = true;
-      const asked = `${now.spawn} ${now.goal}`;
+      const asked = now.join("\n");
       const learn = (route: TrialRoute): void => {
         busy.current = false;
         setFound({ ...route, key: asked });
         if (wanted.current && wanted.current !== now) ask();
       };
-      api.path(name, now.spawn, now.goal).then(
-        // Without a route the answer has no points.
-        ({ points }) => learn({ points, possible: points.length > 0 }),
+      legsOf(name, now).then(
+        (legs) => learn({ points: legs.flat(), possible: legs.every(({ length }) => length > 0) }),
         () => learn({ points: [], possible: false }),
       );
     };

@@ -11,6 +11,7 @@ export interface KeyActions {
   move: () => void;
   paste: () => void;
   goal: () => void;
+  waypoint: () => void;
   /** The next free point along the lane, or the one before. */
   along: (step: 1 | -1) => void;
   /** A free point of the next lane. */
@@ -66,6 +67,7 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
     "?": actions.sheet,
     m: actions.move,
     g: actions.goal,
+    w: actions.waypoint,
     l: actions.lane,
     ".": () => actions.along(1),
     ",": () => actions.along(-1),
@@ -85,10 +87,12 @@ export const SHORTCUTS: readonly (readonly [keys: string, what: string])[] = [
   [", / .", "Move the start of what is selected back or on along its lane"],
   ["L", "Move the start of what is selected to another lane"],
   ["G", "Choose the goal of what is selected on the map"],
-  ["Drag", "Move road users, or the flag of a goal"],
+  ["W", "Add a waypoint to the route of what is selected"],
+  ["Drag", "Move road users, the flag of a goal, or the route through another place"],
   ["Ctrl+A", "Select all"],
   ["Shift + click", "Select several"],
   ["Shift + drag", "Select all in a rectangle"],
+  ["Ctrl + drag", "Select all inside a line that is drawn"],
   ["Delete", "Remove what is selected"],
   ["Escape", "Stop placing, clear the selection"],
   ["Arrow keys", "On the map: move it (with Shift: a little)"],

@@ -9,6 +9,12 @@ export type Moves = readonly (readonly [id: string, spawn: string])[];
 export const isFlow = (one: Actor | Flow): one is Flow => "per_hour" in one;
 /** The places that a route leads through before its goal; those of flows lead through none. */
 export const viasOf = (one: Actor | Flow): readonly string[] => (isFlow(one) ? [] : one.via);
+/** Where a route begins, the places that it leads through, and its goal if that is chosen. */
+export const stationsOf = (one: Actor | Flow): string[] => [
+  one.spawn,
+  ...viasOf(one),
+  ...(one.goal === null ? [] : [one.goal]),
+];
 export const everyone = (document: ScenarioDocument): (Actor | Flow)[] => [
   ...document.actors,
   ...document.flows,
@@ -105,6 +111,20 @@ export class Starts {
       wrapped ??= place;
     }
     return wrapped;
+  }
+
+  /** The free start on the lane of `from` that is nearest to a point, or `from` itself if that is as near. */
+  onLane(from: Place, x: number, y: number, besides: ReadonlySet<string>): Place {
+    const [first, end] = this.graph.lanePlaces(from);
+    const { segment } = from.walk ? this.graph.columns.walks : this.graph.columns;
+    const away = (place: Place): number => Math.hypot(place.x - x, place.y - y);
+    let best = from;
+    for (let i = first; i < end; i++) {
+      if (!this.inside.has(nth(segment, i)) || !this.free(i, from.walk, besides)) continue;
+      const place = this.at(i, from.walk);
+      if (away(place) < away(best)) best = place;
+    }
+    return best;
   }
 
   /**

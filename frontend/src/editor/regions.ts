@@ -1,15 +1,15 @@
-import type { Bounds } from "../api/types";
 import { nth } from "../lists";
+import type { Area } from "../map/areas";
 import type { Graph } from "../map/graph";
 
-/** Rows of the segments of which at least half lies in a rectangle. */
-export function rowsWithin({ columns }: Graph, [x0, y0, x1, y1]: Bounds): number[] {
+/** Rows of the segments of which at least half lies in an area. */
+export function rowsWithin({ columns }: Graph, area: Area): number[] {
   const all = new Uint32Array(columns.segments.length);
   const within = new Uint32Array(columns.segments.length);
   for (let i = 0; i < columns.x.length; i++) {
     const [x, y, row] = [nth(columns.x, i), nth(columns.y, i), nth(columns.segment, i)];
     all[row] = (all[row] ?? 0) + 1;
-    if (x >= x0 && x <= x1 && y >= y0 && y <= y1) within[row] = (within[row] ?? 0) + 1;
+    if (area(x, y)) within[row] = (within[row] ?? 0) + 1;
   }
   return columns.segments.flatMap((_, row) => {
     const inside = within[row] ?? 0;

@@ -1,4 +1,5 @@
 import type { Actor, Assets, Bounds, Flow, Problem, ScenarioDocument } from "../api/types";
+import type { Area } from "../map/areas";
 import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
 import type { SceneActor, SceneFlow, SegmentStyle } from "../map/scene";
@@ -117,13 +118,9 @@ export function sceneFlows(
   });
 }
 
-/** Ids of all whose start lies in a rectangle. */
-export function inFrame(
-  ones: readonly { id: string; x: number; y: number }[],
-  [x0, y0, x1, y1]: Bounds,
-): string[] {
-  return ones.filter(({ x, y }) => x >= x0 && x <= x1 && y >= y0 && y <= y1).map((one) => one.id);
-}
+/** Ids of all whose start lies in an area. */
+export const inFrame = (ones: readonly { id: string; x: number; y: number }[], area: Area): string[] =>
+  ones.filter(({ x, y }) => area(x, y)).map((one) => one.id);
 
 /** Who is under the pointer: on the body, or within reach of the middle. */
 export function nearestOne<T extends { x: number; y: number; length?: number }>(

@@ -26,6 +26,8 @@ export interface Sights {
   problem: (problem: Problem, document: ScenarioDocument) => void;
   /** The rectangle that is in sight. */
   seen: () => Bounds | null;
+  /** The point in the middle of it. */
+  middle: () => { x: number; y: number } | null;
   /** Acts on what is in the middle, as a click there does. */
   pickMiddle: () => void;
 }
@@ -68,6 +70,10 @@ export function sightsOf(
     },
     problem: (problem, document) => show(boundsOfProblem(problem, graph, document)),
     seen: () => handle.current?.seen() ?? null,
+    middle: () => {
+      const seen = handle.current?.seen();
+      return seen ? { x: (seen[0] + seen[2]) / 2, y: (seen[1] + seen[3]) / 2 } : null;
+    },
     pickMiddle: () => handle.current?.pickMiddle(),
   };
 }

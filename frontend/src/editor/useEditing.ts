@@ -1,10 +1,11 @@
-import { type RefObject, useMemo, useRef, useState } from "react";
+import { type RefObject, useEffect, useMemo, useRef, useState } from "react";
 
 import type { Assets, MapDetails, Problem, ScenarioDocument, ScenarioState } from "../api/types";
 import type { LoadedGraph } from "../map/loaded";
 import type { MapHandle } from "../map/MapCanvas";
 import type { LightProgram } from "../api/signals";
 import { Heads } from "../signals/heads";
+import { keep, parseKept } from "../ui/kept";
 import { tell } from "../ui/notices";
 import { useGoals, useRegion, useTrial } from "./asked";
 import { changesOf } from "./changes";
@@ -13,7 +14,7 @@ import type { Editing, Handler, Hover, Tool } from "./handlers/handler";
 import { usePick } from "./pick";
 import type { Draft } from "./rules/draft";
 import { everyone } from "./placing";
-import { firstStep, ofProblem, type Step } from "./scene";
+import { firstStep, ofProblem, type Step, STEPS } from "./scene";
 import { type Sights, sightsOf } from "./sights";
 import type { EditorStore } from "./store";
 import { useShown } from "./useShown";
@@ -66,7 +67,16 @@ export function useEditing(
   const { scenario, selection, name, edit, select } = store();
   if (!scenario) throw new Error("the editor is only shown with a scenario");
   const { document, problems } = scenario;
-  const [step, setStep] = useState<Step>(() => firstStep(document));
+  const [step, setStep] = useState<Step>(() => keptStep() ?? firstStep(document));
+  // A link selects who was selected when it was copied.
+  useEffect(() => {
+    const known = new Set(everyone(document).map(({ id }) => id));
+    const chosen = parseKept(location.hash).chosen?.filter((id) => known.has(id)) ?? [];
+    if (chosen.length > 0) select(chosen);
+    // Only when the editor is opened.
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, []);
+  useEffect(() => keep({ step, chosen: selection }), [step, selection]);
   const [tool, setTool] = useState<Tool | null>(null);
   const [hover, setHover] = useState<Hover | null>(null);
   const handle = useRef<MapHandle | null>(null);
@@ -82,9 +92,10 @@ export function useEditing(
     () => (selection.length === 1 ? (ones.find(({ id }) => id === selection[0]) ?? null) : null),
     [ones, selection],
   );
-  const { goals, route: planned } = useGoals(name, one, roiKey, graph);
+  const { goals, legs } = useGoals(name, one, roiKey, graph);
   const trial = (hover?.is === "place" && hover.trial) || null;
   const tried = useTrial(name, trial);
+  const route = useMemo(() => (trial ? tried.points : legs.flat()), [trial, tried, legs]);
   const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
   const sights = useMemo(() => sightsOf(handle, graph, () => lights), [graph, lights]);
   const { roi } = document;
@@ -119,6 +130,7 @@ export function useEditing(
     selection,
     one,
     goals,
+    legs,
     lights,
     showLight: (junction) => {
       const middle = lights?.middle(junction);
@@ -154,7 +166,7 @@ export function useEditing(
     hover,
     setHover,
     inside,
-    route: trial ? tried.points : planned,
+    route,
     unreachable: trial !== null && tried.possible === false,
     sights,
     handle,
@@ -176,6 +188,9 @@ export function useEditing(
     },
   };
 }
+
+/** The step that the address names, if it names one. */
+const keptStep = (): Step | undefined => STEPS.find((one) => one === parseKept(location.hash).step);
 
 /** Where a problem is solved that is not about one road user. */
 function stepOf({ where }: Problem): Step | null {

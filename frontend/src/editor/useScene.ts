@@ -6,6 +6,7 @@ import { ruleShapes } from "./rules/ruleShapes";
 import { laneFacts } from "./placeWords";
 import { segmentStyles, type Step } from "./scene";
 import { measureShapes, stationPins, transitPins } from "./sceneParts";
+import { viasOf } from "./placing";
 import type { EditorNow } from "./useEditing";
 
 /** Steps in which measures are drawn, and stops and lines. */
@@ -73,6 +74,7 @@ export function useScene(now: EditorNow): Scene {
       goals: placing && (tool?.goals ?? true) ? (goals ?? []) : [],
       chosenGoal: placing && one?.goal ? (graph.place(one.goal) ?? null) : null,
       route: placing ? route : [],
+      waypoints: placing && one ? viasOf(one).flatMap((id) => graph.place(id) ?? []) : [],
       hover: pointing ? place : null,
       hoverText: placing && place ? laneFacts(graph, place.id) : null,
       hoverCategory: badge,

@@ -13,6 +13,7 @@ import {
 
 import type { Bounds } from "../api/types";
 import type { Head } from "../signals/heads";
+import { type Area, inBounds, inRing } from "./areas";
 import type { PackedDrawing } from "./drawing";
 import type { Graph } from "./graph";
 import { Minimap } from "./Minimap";
@@ -21,6 +22,7 @@ import { CanvasRenderer, type MapRenderer } from "./renderer";
 import type { Mark, Moving, Scene } from "./scene";
 import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
+import { keep, parseKept } from "../ui/kept";
 
 /** Where the pointer is, in metres, and how far a touch reaches. */
 export interface Pointed {
@@ -39,6 +41,8 @@ export interface MapHandle {
   centre(x: number, y: number, aside?: number): void;
   /** The rectangle that is in sight. */
   seen(): Bounds;
+  /** What is seen now, in one canvas: the given one, or a new one. */
+  picture(into?: HTMLCanvasElement): HTMLCanvasElement | null;
   /** Acts on the middle, as Enter does. */
   pickMiddle(): void;
 }
@@ -58,17 +62,21 @@ interface Props {
   onGrab?: (at: Pointed) => boolean;
   /** What was taken along is put down; null if it was not moved. */
   onDrop?: (at: Pointed | null) => void;
-  /** A drag with Shift held down has drawn a rectangle. */
-  onFrame?: (bounds: Bounds) => void;
+  /** A drag has drawn a rectangle, with Shift held down, or a line around something, with Ctrl. */
+  onFrame?: (area: Area) => void;
   children?: ReactNode;
 }
+
+type Pixels = readonly [x: number, y: number];
 
 /** A button held down: where it was pressed, where the pointer was last, and what the drag does. */
 interface Drag {
   from: [number, number];
   last: [number, number];
   moved: boolean;
-  does: "pan" | "carry" | "frame";
+  does: "pan" | "carry" | "frame" | "lasso";
+  /** What it has drawn so far, pixels. */
+  line: readonly Pixels[];
 }
 
 const KEYS = "Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.";
@@ -98,9 +106,8 @@ export function MapCanvas({
   const size = useRef<Size>({ width: 1, height: 1 });
   const least = useRef(0.01);
   const drag = useRef<Drag | null>(null);
-  const [frame, setFrame] = useState<readonly [x: number, y: number, width: number, height: number] | null>(
-    null,
-  );
+  // What a drag draws, pixels: two corners of a rectangle, or the points of a line.
+  const [drawn, setDrawn] = useState<readonly Pixels[] | null>(null);
   const [shown, setShown] = useState<View>(view.current);
   const [crosshair, setCrosshair] = useState(false);
   const [ready, setReady] = useState<MapRenderer | null>(null);
@@ -115,6 +122,7 @@ export function MapCanvas({
         queued.current = requestAnimationFrame(() => {
           queued.current = 0;
           setShown(view.current);
+          keep({ at: view.current });
         });
       }
     },
@@ -134,7 +142,9 @@ export function MapCanvas({
       size.current = { width: box.width, height: box.height };
       made.setSize(size.current, window.devicePixelRatio || 1);
       least.current = fit(drawing.bounds, size.current).scale * 0.6;
-      if (first) showAll();
+      const { at } = parseKept(location.hash);
+      if (first && at) apply(at);
+      else if (first) showAll();
       else made.setView(view.current);
       first = false;
     };
@@ -166,6 +176,7 @@ export function MapCanvas({
         const scale = Math.max(view.current.scale, 8);
         apply({ x: x + aside / scale, y, scale });
       },
+      picture: (into) => renderer.current?.picture(into) ?? null,
       seen: () => visible(view.current, size.current),
       pickMiddle: () =>
         onPick?.({
@@ -256,8 +267,9 @@ export function MapCanvas({
         event.currentTarget.setPointerCapture(event.pointerId);
         const [x, y] = local(event);
         const shift = event.shiftKey;
-        const does = shift && onFrame ? "frame" : !shift && onGrab?.(pointed(x, y, false)) ? "carry" : "pan";
-        drag.current = { from: [x, y], last: [x, y], moved: false, does };
+        const draws = onFrame && (shift ? "frame" : event.ctrlKey || event.metaKey ? "lasso" : null);
+        const does = draws || (!shift && onGrab?.(pointed(x, y, false)) ? "carry" : "pan");
+        drag.current = { from: [x, y], last: [x, y], moved: false, does, line: [] };
       }}
       onPointerMove={(event) => {
         const [x, y] = local(event);
@@ -269,48 +281,37 @@ export function MapCanvas({
         if (!held.moved && Math.hypot(x - held.from[0], y - held.from[1]) < CLICK_SLACK) return;
         if (held.does === "pan") apply(panBy(view.current, x - held.last[0], y - held.last[1]));
         else if (held.does === "carry") onPoint?.(pointed(x, y, false));
-        else
-          setFrame([
-            Math.min(x, held.from[0]),
-            Math.min(y, held.from[1]),
-            Math.abs(x - held.from[0]),
-            Math.abs(y - held.from[1]),
-          ]);
-        drag.current = { ...held, last: [x, y], moved: true };
+        const line = lineOf(held, [x, y]);
+        if (held.does === "frame" || held.does === "lasso") setDrawn(line);
+        drag.current = { ...held, last: [x, y], moved: true, line };
       }}
       onPointerUp={(event) => {
         const held = drag.current;
         drag.current = null;
-        setFrame(null);
+        setDrawn(null);
         if (!held) return;
+        const line = lineOf(held, local(event)).map(([x, y]) => toWorld(view.current, size.current, x, y));
         if (held.does === "carry" && (!held.moved || event.button !== 0)) onDrop?.(null);
         if (event.button !== 0) return;
         if (!held.moved) onPick?.(pointed(...held.from, event.shiftKey));
         else if (held.does === "carry") onDrop?.(pointed(...local(event), false));
-        else if (held.does === "frame") {
-          const [a, b] = [
-            toWorld(view.current, size.current, ...held.from),
-            toWorld(view.current, size.current, ...local(event)),
-          ];
-          onFrame?.([Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[0], b[0]), Math.max(a[1], b[1])]);
-        }
+        else if (held.does === "frame") onFrame?.(inBounds(boundsOf(line)));
+        else if (held.does === "lasso") onFrame?.(inRing(line));
       }}
       onPointerCancel={() => {
         if (drag.current?.does === "carry") onDrop?.(null);
         drag.current = null;
-        setFrame(null);
+        setDrawn(null);
       }}
       onPointerLeave={() => {
         if (!drag.current) onPoint?.(null);
       }}
     >
       <div ref={layers} className="map-layers" />
-      {frame && (
-        <div
-          className="map-frame"
-          aria-hidden="true"
-          style={{ left: frame[0], top: frame[1], width: frame[2], height: frame[3] }}
-        />
+      {drawn && (
+        <svg className="map-frame" aria-hidden="true">
+          <polygon points={(drawn.length === 2 ? corners(boundsOf(drawn)) : drawn).join(" ")} />
+        </svg>
       )}
       {crosshair && <div className="map-crosshair" aria-hidden="true" />}
       {/* Controls lie on the map but are not the map. */}
@@ -350,6 +351,22 @@ export function MapCanvas({
     </div>
   );
 }
+
+/** Two corners of a rectangle, or all points of a line. */
+const lineOf = ({ does, from, line }: Drag, to: Pixels): Pixels[] =>
+  does === "lasso" ? [from, ...line.slice(1), to] : [from, to];
+
+const boundsOf = (points: readonly Pixels[]): Bounds => {
+  const [xs, ys] = [points.map(([x]) => x), points.map(([, y]) => y)];
+  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+};
+
+const corners = ([x0, y0, x1, y1]: Bounds): [number, number][] => [
+  [x0, y0],
+  [x1, y0],
+  [x1, y1],
+  [x0, y1],
+];
 
 function MapButton({
   label,

@@ -231,6 +231,50 @@ export function drawGoal(context: CanvasRenderingContext2D, [x, y]: [number, num
   context.stroke();
 }
 
+/** Several signs that would hide each other: their number, twice ringed. */
+export function drawCluster(
+  context: CanvasRenderingContext2D,
+  [x, y]: [number, number],
+  number: number,
+  palette: Palette,
+): void {
+  for (const [radius, color] of [
+    [15, palette.paper],
+    [13, palette.ink],
+    [11, palette.paper],
+  ] as const) {
+    context.beginPath();
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.fillStyle = color;
+    context.fill();
+  }
+  context.font = "700 11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillStyle = palette.ink;
+  context.fillText(String(number), x, y + 0.5);
+}
+
+/** Waypoints are squares with their numbers. */
+export function drawWaypoint(
+  context: CanvasRenderingContext2D,
+  [x, y]: [number, number],
+  number: number,
+): void {
+  context.beginPath();
+  context.roundRect(x - 9, y - 9, 18, 18, 3);
+  context.fillStyle = ROI_BASE;
+  context.fill();
+  context.lineWidth = 2;
+  context.strokeStyle = "#ffffff";
+  context.stroke();
+  context.font = "700 11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillStyle = "#ffffff";
+  context.fillText(String(number), x, y + 0.5);
+}
+
 export function body(
   context: CanvasRenderingContext2D,
   x: number,

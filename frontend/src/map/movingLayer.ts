@@ -15,7 +15,10 @@ const LEAST = 5;
 const OUTLINE_FROM = 4;
 const DETAIL_FROM = 6;
 
-/** Road users of a run, drawn many at once: one path per category. */
+const KIND_COLORS = CATEGORIES.map((category) => CATEGORY_COLOR[category]);
+const ON_FOOT = CATEGORIES.indexOf("pedestrian");
+
+/** Road users of a run, drawn many at once: one path per colour. */
 export class MovingLayer {
   heads: readonly Head[] = [];
   marks: readonly Mark[] = [];
@@ -43,11 +46,12 @@ export class MovingLayer {
     palette: Palette,
     moving: Moving,
   ): void {
-    const rows = byCategory(moving, view, size);
-    for (const [n, category] of CATEGORIES.entries()) {
+    const { group, colors } = moving.tint ?? { group: moving.category, colors: KIND_COLORS };
+    const rows = byGroup(moving, group, colors.length, view, size);
+    for (const [n, color] of colors.entries()) {
       const of = nth(rows, n);
       if (of.length === 0) continue;
-      context.fillStyle = CATEGORY_COLOR[category];
+      context.fillStyle = color;
       context.beginPath();
       for (const row of of) outline(context, moving, row, view, size);
       context.fill();
@@ -56,8 +60,8 @@ export class MovingLayer {
         context.lineWidth = 1;
         context.stroke();
       }
-      if (view.scale >= DETAIL_FROM && category !== "pedestrian") {
-        for (const row of of) details(context, moving, row, view, size);
+      if (view.scale >= DETAIL_FROM) {
+        for (const row of of) if (moving.category[row] !== ON_FOOT) details(context, moving, row, view, size);
       }
     }
     if (moving.ego >= 0) mark(context, moving, moving.ego, view, size, EGO);
@@ -65,15 +69,15 @@ export class MovingLayer {
   }
 }
 
-function byCategory(moving: Moving, view: View, size: Size): number[][] {
+function byGroup(moving: Moving, group: Uint8Array, groups: number, view: View, size: Size): number[][] {
   const [x0, y0, x1, y1] = visible(view, size);
   const slack = 12;
-  const rows: number[][] = CATEGORIES.map(() => []);
+  const rows: number[][] = Array.from({ length: groups }, () => []);
   for (let i = 0; i < moving.count; i++) {
     const x = nth(moving.pose, 5 * i);
     const y = nth(moving.pose, 5 * i + 1);
     if (x > x0 - slack && x < x1 + slack && y > y0 - slack && y < y1 + slack) {
-      nth(rows, nth(moving.category, i)).push(i);
+      nth(rows, nth(group, i)).push(i);
     }
   }
   return rows;

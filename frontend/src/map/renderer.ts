@@ -18,6 +18,8 @@ export interface MapRenderer {
   setMoving(moving: Moving | null): void;
   setHeads(heads: readonly Head[]): void;
   setMarks(marks: readonly Mark[]): void;
+  /** What is seen now, in one canvas: the given one, or a new one. */
+  picture(into?: HTMLCanvasElement): HTMLCanvasElement;
   /** Draws the whole map small, for the minimap. */
   drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean): void;
   destroy(): void;
@@ -111,6 +113,21 @@ export class CanvasRenderer implements MapRenderer {
     canvas.height = Math.round(size.height * pixelRatio);
     const context = canvas.getContext("2d");
     if (context) this.base.draw(context, view, size, pixelRatio, dark ? DARK : LIGHT, false);
+  }
+
+  picture(into = document.createElement("canvas")): HTMLCanvasElement {
+    const [first] = this.canvases;
+    const [width, height] = [first?.width ?? 1, first?.height ?? 1];
+    // To give a canvas a size empties it.
+    if (into.width !== width) into.width = width;
+    if (into.height !== height) into.height = height;
+    const context = into.getContext("2d");
+    if (this.pending) {
+      cancelAnimationFrame(this.pending);
+      this.frame();
+    }
+    for (const canvas of this.canvases) context?.drawImage(canvas, 0, 0);
+    return into;
   }
 
   destroy(): void {

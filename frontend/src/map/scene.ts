@@ -77,6 +77,8 @@ export interface Scene {
   chosenGoal: Place | null;
   /** Points of the route to the goal that is chosen. */
   route: readonly (readonly [number, number])[];
+  /** Waypoints of that route, in their order. */
+  waypoints: readonly Place[];
   hover: Place | null;
   /** What is said beside the place under the pointer. */
   hoverText: string | null;
@@ -96,10 +98,17 @@ export const EMPTY_SCENE: Scene = {
   goals: [],
   chosenGoal: null,
   route: [],
+  waypoints: [],
   hover: null,
   hoverText: null,
   hoverCategory: null,
 };
+
+/** A colour for each road user, by its number among some. */
+export interface Tint {
+  group: Uint8Array;
+  colors: readonly string[];
+}
 
 /** Road users at one moment: columns, so that thousands cost little. */
 export interface Moving {
@@ -108,6 +117,8 @@ export interface Moving {
   pose: Float64Array;
   category: Uint8Array;
   flags: Uint8Array;
+  /** Colours that say something else than the kind. */
+  tint?: Tint | null;
   /** Row of the road user to be marked as ego, or -1. */
   ego: number;
   followed: number;

@@ -11,6 +11,7 @@ import {
   ROI_MEMBER,
   VEHICLE_NODE,
 } from "./colors";
+import { clustered } from "./clusters";
 import { detectorNames, drawDetectors } from "./detectorMarks";
 import { nth } from "../lists";
 import { GLYPHS } from "./glyphs";
@@ -20,6 +21,7 @@ import {
   body,
   brackets,
   dots,
+  drawCluster,
   drawFlow,
   drawGoal,
   drawLane,
@@ -28,6 +30,7 @@ import {
   drawPin,
   drawRoute,
   drawWalkEdges,
+  drawWaypoint,
   spot,
   tag,
 } from "./marks";
@@ -106,6 +109,7 @@ export class SceneLayer {
     ];
     for (const goal of scene.goals) drawGoal(context, at(goal.x, goal.y), false);
     if (scene.chosenGoal) drawGoal(context, at(scene.chosenGoal.x, scene.chosenGoal.y), true);
+    scene.waypoints.forEach((place, n) => drawWaypoint(context, at(place.x, place.y), n + 1));
     if (scene.hover) this.drawHover(context, at, view, scene.hover, scene.hoverCategory);
     const plain = scene.actors.length > MANY && view.scale < NODES_FROM;
     const named = scene.actors.reduce((n, actor) => n + Number(actor.selected), 0) <= FEW;
@@ -118,7 +122,11 @@ export class SceneLayer {
       } else this.drawActor(context, at(actor.x, actor.y), view, actor, palette, named);
     }
     const namedPins = view.scale >= NAMED_FROM || scene.pins.length <= FEW_PINS;
-    for (const pin of scene.pins) drawPin(context, at(pin.x, pin.y), pin, namedPins);
+    for (const { x, y, pins } of clustered(scene.pins, namedPins ? Infinity : view.scale)) {
+      const [pin] = pins;
+      if (pin && pins.length === 1) drawPin(context, at(pin.x, pin.y), pin, namedPins);
+      else drawCluster(context, at(x, y), pins.length, palette);
+    }
     if (view.scale >= NODES_FROM)
       for (const { x, y, label } of detectorNames(scene.detectors)) {
         const [px, py] = at(x, y);

@@ -4,6 +4,7 @@ import type { MarkKind } from "../map/scene";
 import { CategoryGlyph } from "../ui/icons";
 import { CATEGORY_WORD } from "../ui/words";
 import { MARK_WORD } from "./incidents";
+import { type ColourBy, SCALES } from "./tint";
 
 /** What the picture's colours and signs mean; only what can be in it. */
 export function Legend({
@@ -12,6 +13,7 @@ export function Legend({
   lights,
   lamps,
   marks,
+  by = "kind",
 }: {
   categories: ReadonlySet<Category>;
   ego: boolean;
@@ -20,11 +22,22 @@ export function Legend({
   /** Whether brake lights and indicators are shown: a recording has none. */
   lamps: boolean;
   marks: ReadonlySet<MarkKind>;
+  /** What the colours of road users say. */
+  by?: ColourBy;
 }) {
   if (categories.size === 0) return null;
   return (
     <ul className="map-legend" aria-label="What is shown" style={{ listStyle: "none", margin: 0 }}>
-      {CATEGORIES.filter((one) => categories.has(one)).map((kind) => (
+      {by !== "kind" &&
+        SCALES[by].legend.map((words, n) => (
+          <li key={words}>
+            <span>
+              <i style={{ background: SCALES[by].colors[n] }} />
+              {words}
+            </span>
+          </li>
+        ))}
+      {CATEGORIES.filter((one) => by === "kind" && categories.has(one)).map((kind) => (
         <li key={kind}>
           <span>
             <i style={{ background: CATEGORY_COLOR[kind] }} />

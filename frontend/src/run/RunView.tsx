@@ -16,6 +16,7 @@ import { useRunLights } from "../signals/useSignals";
 import { RunBar } from "../time/RunBar";
 import { useNearest } from "../time/useNearest";
 import { go } from "../ui/address";
+import { keep, parseKept } from "../ui/kept";
 import { CountsFit } from "./CountsFit";
 import { EarlierRuns } from "./EarlierRuns";
 import { hasEnded } from "./figures";
@@ -29,6 +30,10 @@ import { SafeSlices } from "./LongRun";
 import { Plots } from "./Plots";
 import { Result } from "./Result";
 import { RoadUsers } from "./RoadUsers";
+import { MapTools } from "./MapTools";
+import { RunHint } from "./RunHint";
+import { ShareMenu } from "./ShareMenu";
+import { SpeedChart } from "./SpeedChart";
 import { LiveStrip, ReplayStrip } from "./Strip";
 import { useCounts } from "./useCounts";
 import { useIncidents } from "./useIncidents";
@@ -45,6 +50,8 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
 /** A run, live or as it was recorded; the scenario itself is not touched. */
 function Watched({ scenario, run, onResume }: { scenario: string; run: string; onResume: () => void }) {
   const handle = useRef<MapHandle | null>(null);
+  // What the address kept when the run was opened.
+  const [linked] = useState(() => parseKept(location.hash));
   const { info, failure, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
   const picture = usePicture(handle);
@@ -100,9 +107,24 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     if (cleared) clear();
   }, [cleared, clear]);
   useEffect(() => {
-    if (ground.bounds) handle.current?.show(ground.bounds);
-  }, [ground.bounds]);
+    if (ground.bounds && !linked.at) handle.current?.show(ground.bounds);
+  }, [ground.bounds, linked]);
+  const { replay, seek } = player;
+  useEffect(() => {
+    if (!replay) return;
+    const { time: at, chosen } = linked;
+    if (at !== undefined) seek(at);
+    if (chosen?.[0]) follow(chosen[0]);
+  }, [replay, seek, follow, linked]);
+  useEffect(() => {
+    if (replay) keep({ time: player.time, chosen: followed ? [followed] : [] });
+  }, [replay, player.time, followed]);
   const known = player.replay?.crowd ?? crowd;
+  const recorded = useMemo(
+    () => (player.replay && followed ? player.replay.speedsOf(followed) : null),
+    [player.replay, followed],
+  );
+  const speeds = recorded ?? picture.speeds;
   const categories = useMemo(
     () => new Map<string, Category>(known?.all().map((one) => [one.id, one.category]) ?? []),
     [known],
@@ -174,31 +196,37 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               label={mode === "replay" ? "Recording of the run" : "Live view of the run"}
               onPick={pick}
             >
-              {info.state === "preparing" ? (
-                <div className="map-hint" role="status">
-                  <span className="waiting">
-                    <Loader size={16} aria-hidden="true" />
-                    {crowd
-                      ? "Preparing, step 2 of 2: starting the simulation …"
-                      : `Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
-                  </span>
-                </div>
-              ) : (
-                followed && (
-                  <div className="map-hint" role="status">
-                    {now.there
-                      ? `Following ${followed}. Click on the empty map to stop.`
-                      : `${followed} is not on the road now.`}
-                  </div>
-                )
-              )}
+              <RunHint info={info} planned={crowd !== null} followed={followed} there={now.there} />
               <Legend
                 categories={kinds}
                 ego={(known?.egos().length ?? 0) > 0}
                 lights={lights.known && (map?.lights.length ?? 0) > 0}
                 lamps={mode === "live"}
                 marks={marks}
+                by={picture.by}
               />
+              <MapTools
+                by={picture.by}
+                live={mode === "live"}
+                onBy={picture.colourBy}
+                share={
+                  <ShareMenu
+                    run={run}
+                    handle={handle}
+                    playing={mode === "replay" ? player.playing : null}
+                    onPlay={player.play}
+                  />
+                }
+              >
+                {followed && speeds.length > 1 && (
+                  <SpeedChart
+                    name={followed}
+                    points={speeds}
+                    time={mode === "replay" ? player.time : now.time}
+                    gap={Math.max(1, 1.5 * (player.replay?.spacing ?? 0))}
+                  />
+                )}
+              </MapTools>
             </MapCanvas>
           ) : (
             <div className="empty">

@@ -2,6 +2,7 @@ import type { LiveActor } from "../api/runs";
 import { CATEGORIES } from "../api/types";
 import { nth } from "../lists";
 import type { Moving } from "../map/scene";
+import { type ColourBy, tintOf } from "./tint";
 
 /** A road user as the server introduces it, once. */
 export type Introduced = Pick<LiveActor, "index" | "id" | "category" | "length" | "width" | "ego">;
@@ -15,6 +16,8 @@ export interface Frame {
   pace: number;
   arrived: number;
   rows: Float32Array;
+  /** How long each row has been stopped so far, seconds, where that is known. */
+  stopped?: Float32Array;
 }
 
 const HEADER = 5;
@@ -52,6 +55,7 @@ function floats(data: ArrayBuffer): Float32Array {
 export class Crowd {
   private readonly known = new Map<number, Introduced>();
   private readonly rowOf = new Map<string, number>();
+  private speeds = new Float32Array(0);
   /** Added to all places of frames, which are too short for maps far from zero; metres. */
   origin: readonly [number, number] = [0, 0];
 
@@ -79,11 +83,19 @@ export class Crowd {
     return id === null ? -1 : (this.rowOf.get(id) ?? -1);
   }
 
+  /** Speed of a road user in the last frame that was {@link arrange}d, m/s; null if it was not in it. */
+  speed(id: string): number | null {
+    const row = this.row(id);
+    return row < 0 ? null : (this.speeds[row] ?? null);
+  }
+
   /** The frame as it is drawn; those not introduced yet are left out. */
-  arrange(frame: Frame, ego: string | null, followed: string | null): Moving {
+  arrange(frame: Frame, ego: string | null, followed: string | null, by: ColourBy = "kind"): Moving {
     const pose = new Float64Array(5 * frame.count);
     const category = new Uint8Array(frame.count);
     const flags = new Uint8Array(frame.count);
+    const drawn = new Uint32Array(frame.count);
+    this.speeds = new Float32Array(frame.count);
     let count = 0;
     this.rowOf.clear();
     for (let i = 0; i < frame.count; i++) {
@@ -97,9 +109,12 @@ export class Crowd {
       pose[5 * count + 4] = who.width;
       category[count] = Math.max(CATEGORIES.indexOf(who.category), 0);
       flags[count] = nth(frame.rows, at + 5);
+      this.speeds[count] = nth(frame.rows, at + 4);
+      drawn[count] = i;
       this.rowOf.set(who.id, count);
       count += 1;
     }
-    return { count, pose, category, flags, ego: this.row(ego), followed: this.row(followed) };
+    const tint = tintOf(by, frame, drawn.subarray(0, count));
+    return { count, pose, category, flags, tint, ego: this.row(ego), followed: this.row(followed) };
   }
 }

@@ -1,6 +1,8 @@
 import type { ReplayColumns } from "../api/runs";
 import { nth } from "../lists";
 import { Crowd, type Frame } from "./frames";
+import type { SpeedPoint } from "./SpeedChart";
+import { STOPPED } from "./tint";
 
 const ROW = 6;
 
@@ -13,6 +15,8 @@ export class Replay {
   readonly spacing: number;
   /** The same road user's row in the next moment, or -1. */
   private readonly next: Int32Array;
+  /** How long each row's road user has been stopped before, seconds. */
+  private readonly stopped: Float32Array;
 
   constructor(private readonly columns: ReplayColumns) {
     const { times, x, y } = columns;
@@ -20,6 +24,7 @@ export class Replay {
     this.end = times[times.length - 1] ?? 0;
     this.spacing = times.length > 1 ? (this.end - this.begin) / (times.length - 1) : 0;
     this.next = following(columns);
+    this.stopped = stoppedSoFar(columns, this.next);
     this.crowd.origin = [Math.round(x[0] ?? 0), Math.round(y[0] ?? 0)];
     this.crowd.introduce(columns.actors.map((actor, index) => ({ ...actor, index })));
   }
@@ -37,6 +42,7 @@ export class Replay {
     const i = momentAt(times, time);
     const count = nth(first, i + 1) - nth(first, i);
     const rows = new Float32Array(ROW * count);
+    const stopped = this.stopped.slice(nth(first, i), nth(first, i) + count);
     const span = i + 1 < times.length ? nth(times, i + 1) - nth(times, i) : 0;
     const share = span > 0 ? Math.min(1, Math.max(0, (time - nth(times, i)) / span)) : 0;
     for (let k = 0; k < count; k++) {
@@ -62,7 +68,18 @@ export class Replay {
         ROW * k,
       );
     }
-    return { step: i, time, count, pace: 0, arrived: 0, rows };
+    return { step: i, time, count, pace: 0, arrived: 0, rows, stopped };
+  }
+
+  /** Speeds of a road user at all moments at which it is on the road. */
+  speedsOf(id: string): SpeedPoint[] {
+    const { times, first, actor, actors, speed } = this.columns;
+    const wanted = actors.findIndex((one) => one.id === id);
+    const points: SpeedPoint[] = [];
+    for (let i = 0; i < times.length; i++)
+      for (let row = nth(first, i); row < nth(first, i + 1); row++)
+        if (actor[row] === wanted) points.push({ time: nth(times, i), speed: nth(speed, row) });
+    return points;
   }
 }
 
@@ -101,6 +118,19 @@ export function momentAt(times: readonly number[], time: number): number {
     else high = middle - 1;
   }
   return low;
+}
+
+/** Of each row, for how long its road user was stopped up to then; moments not recorded do not count. */
+function stoppedSoFar({ times, first, speed }: ReplayColumns, next: Int32Array): Float32Array {
+  const seconds = new Float32Array(next.length);
+  for (let i = 0; i + 1 < times.length; i++) {
+    const span = nth(times, i + 1) - nth(times, i);
+    for (let row = nth(first, i); row < nth(first, i + 1); row++) {
+      const after = nth(next, row);
+      if (after >= 0) seconds[after] = nth(seconds, row) + (nth(speed, after) < STOPPED ? span : 0);
+    }
+  }
+  return seconds;
 }
 
 function following({ first, actor, actors }: ReplayColumns): Int32Array {

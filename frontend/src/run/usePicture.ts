@@ -4,6 +4,8 @@ import { nth } from "../lists";
 import type { MapHandle, Pointed } from "../map/MapCanvas";
 import type { Moving } from "../map/scene";
 import type { Crowd, Frame } from "./frames";
+import type { SpeedPoint } from "./SpeedChart";
+import { type ColourBy, StoppedDelay } from "./tint";
 
 /** Wall milliseconds between two updates of the figures; the map itself is drawn with every frame. */
 const READABLE = 150;
@@ -28,8 +30,23 @@ export interface Picture {
   follow: (id: string | null) => void;
   /** The road user near a point. */
   near: (at: Pointed) => string | null;
+  /** What colours say. */
+  by: ColourBy;
+  colourBy: (by: ColourBy) => void;
+  /** Speeds of the one that is followed, as they were seen. */
+  speeds: readonly SpeedPoint[];
   /** The newest frame, read when it is needed. */
   latest: () => { frame: Frame; crowd: Crowd } | null;
+}
+
+/** Points of the chart of speeds that are kept. */
+const MOST_POINTS = 2400;
+
+/** One more point of the speeds that were seen, unless no time has passed. */
+function note(points: SpeedPoint[], time: number, speed: number | null): void {
+  if (speed === null || time <= (points.at(-1)?.time ?? -1)) return;
+  points.push({ time, speed });
+  if (points.length > MOST_POINTS) points.splice(0, points.length - MOST_POINTS);
 }
 
 export function usePicture(handle: RefObject<MapHandle | null>): Picture {
@@ -37,11 +54,17 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
   const [followed, setFollowed] = useState<string | null>(null);
   const last = useRef<{ frame: Frame; crowd: Crowd; moving: Moving } | null>(null);
   const watched = useRef<string | null>(null);
+  const [by, setBy] = useState<ColourBy>("kind");
+  const colours = useRef<ColourBy>("kind");
+  const delays = useRef(new StoppedDelay());
+  const speeds = useRef<SpeedPoint[]>([]);
   const pending = useRef(0);
 
   const show = useCallback(
-    (frame: Frame, crowd: Crowd) => {
-      const moving = crowd.arrange(frame, crowd.egos()[0] ?? null, watched.current);
+    (seen: Frame, crowd: Crowd) => {
+      const frame = delays.current.learn(seen);
+      const moving = crowd.arrange(frame, crowd.egos()[0] ?? null, watched.current, colours.current);
+      note(speeds.current, frame.time, watched.current === null ? null : crowd.speed(watched.current));
       last.current = { frame, crowd, moving };
       handle.current?.setMoving(moving);
       const row = moving.followed;
@@ -69,6 +92,7 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
   const follow = useCallback(
     (id: string | null) => {
       watched.current = id;
+      speeds.current = [];
       setFollowed(id);
       redraw();
     },
@@ -87,9 +111,29 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     }
     return best;
   }, []);
+  const colourBy = useCallback(
+    (next: ColourBy) => {
+      colours.current = next;
+      setBy(next);
+      redraw();
+    },
+    [redraw],
+  );
   const latest = useCallback(() => last.current, []);
   return useMemo(
-    () => ({ now, followed, show, redraw, clear, follow, near, latest }),
-    [now, followed, show, redraw, clear, follow, near, latest],
+    () => ({
+      now,
+      followed,
+      show,
+      redraw,
+      clear,
+      follow,
+      near,
+      latest,
+      by,
+      colourBy,
+      speeds: speeds.current,
+    }),
+    [now, followed, show, redraw, clear, follow, near, latest, by, colourBy],
   );
 }

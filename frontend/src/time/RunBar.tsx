@@ -1,7 +1,7 @@
 import "./time.css";
 
 import { Button } from "@mantine/core";
-import { type MouseEvent, type ReactNode, useMemo, useState } from "react";
+import { type MouseEvent, type ReactNode, useEffect, useMemo, useState } from "react";
 
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
@@ -10,7 +10,8 @@ import { MARK_WORD, markKind, sentence } from "../run/incidents";
 import type { Shown } from "../signals/heads";
 import { clock } from "../ui/words";
 import { Axis, Lines } from "./Axis";
-import { type Sight, toTime, toX } from "./sight";
+import { ZoomButtons } from "./ZoomButtons";
+import { panned, type Sight, toTime, toX, zoomed } from "./sight";
 import { type Band, bandsOf, type History, shownWords } from "./bands";
 import { linePath, pointAt, SEEN, SERIOUS } from "./collision";
 import { firingsOf, GLYPH, isRule, nearestIncident, neighbour, thinnedMarks } from "./fired";
@@ -26,6 +27,8 @@ const BANDS = 34;
 const RECENT = 3;
 /** Below this width of the window the bar is closed to begin with. */
 const NARROW = 761;
+/** Share of what is in sight that lies before the moment that it follows. */
+const LEAD = 0.1;
 
 /** What happened when in a run: rules, incidents, what a light showed, and the ego's time to collision. */
 export function RunBar({
@@ -61,8 +64,20 @@ export function RunBar({
   const [open, setOpen] = useState(() => innerWidth >= NARROW);
   const [box, width] = useWidth();
   const seconds = Math.max(end, 1);
-  const sight = useMemo<Sight>(() => ({ begin: 0, seconds, width }), [seconds, width]);
-  const apart = (3 * seconds) / width;
+  const [chosen, setChosen] = useState<{ begin: number; seconds: number } | null>(null);
+  const sight = useMemo<Sight>(() => ({ begin: 0, seconds, ...chosen, width }), [seconds, chosen, width]);
+  const apart = (3 * sight.seconds) / width;
+  const see = ({ begin, seconds: shown }: Sight): void =>
+    setChosen(shown < seconds ? { begin, seconds: shown } : null);
+  const zoom = (factor: number, around = time): void => see(zoomed(sight, factor, around, seconds));
+  // What is shown stays in sight as it moves on; it may be left by hand.
+  useEffect(() => {
+    setChosen((old) => {
+      if (!old || (time >= old.begin && time <= old.begin + old.seconds)) return old;
+      const begin = Math.min(time - LEAD * old.seconds, seconds - old.seconds);
+      return { ...old, begin: Math.max(0, begin) };
+    });
+  }, [time, seconds]);
   const rules = useMemo(() => incidents.filter(isRule), [incidents]);
   const others = useMemo(() => incidents.filter((one) => !isRule(one)), [incidents]);
   const firings = useMemo(() => firingsOf(rules), [rules]);
@@ -87,7 +102,7 @@ export function RunBar({
     const left = event.currentTarget.querySelector(".time-track")?.getBoundingClientRect().left ?? 0;
     const at = toTime(sight, event.clientX - left);
     if (event.clientX < left) return;
-    const one = nearestIncident(among, at, (REACH * seconds) / width);
+    const one = nearestIncident(among, at, (REACH * sight.seconds) / width);
     onSeek?.(one ? one.time : Math.min(reached, Math.max(0, at)));
     if (one) onShow(one);
   };
@@ -118,11 +133,20 @@ export function RunBar({
           {recent ? `${clock(recent.time)} ${sentence(recent, categories)}` : ""}
         </span>
         <Legend kinds={kinds} signals={bands.length > 0} />
+        {open && <ZoomButtons onZoom={zoom} onWhole={() => setChosen(null)} />}
         <Button size="compact-xs" variant="subtle" aria-expanded={open} onClick={() => setOpen(!open)}>
           {open ? "Hide the time bar" : "Show the time bar"}
         </Button>
       </div>
-      <div className="time" hidden={!open}>
+      <div
+        className="time"
+        hidden={!open}
+        onWheel={({ deltaX, deltaY, ctrlKey, shiftKey }) => {
+          if (ctrlKey) zoom(Math.exp(-deltaY * 0.002));
+          else if (deltaX || shiftKey)
+            see(panned(sight, ((deltaX || deltaY) / width) * sight.seconds, seconds));
+        }}
+      >
         <div className="time-inner">
           <Lines sight={sight} moment={time} />
           <div className="time-head">

@@ -1,12 +1,11 @@
 import "./time.css";
 
-import { ActionIcon, Button, Tooltip } from "@mantine/core";
+import { Button, Tooltip } from "@mantine/core";
 import { type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 
 import { rowsInSight } from "../editor/windowed";
 import type { EditorNow } from "../editor/useEditing";
 import { nth } from "../lists";
-import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 import { count } from "../ui/words";
 import { Axis, Lines } from "./Axis";
 import { panned, type Sight, zoomed } from "./sight";
@@ -15,6 +14,7 @@ import { BlockRow } from "./BlockRow";
 import type { Plan } from "./usePlanned";
 import { useRetiming } from "./useRetiming";
 import { useWidth } from "./useWidth";
+import { ZoomButtons } from "./ZoomButtons";
 
 const ROW = 26;
 /** Seconds that are in sight at least to begin with. */
@@ -87,19 +87,7 @@ export function TimeDock({
         <span role="status" className="time-status">
           {statusOf(plan, moment)}
         </span>
-        {open && (
-          <span className="time-buttons" role="group" aria-label="What is in sight">
-            <Tool label="Show less time" onClick={() => zoom(2)}>
-              <IconPlus size={15} />
-            </Tool>
-            <Tool label="Show more time" onClick={() => zoom(0.5)}>
-              <IconMinus size={15} />
-            </Tool>
-            <Tool label="Show the whole run" onClick={() => setChosen({ begin: 0, seconds: longest })}>
-              <IconFit size={15} />
-            </Tool>
-          </span>
-        )}
+        {open && <ZoomButtons onZoom={zoom} onWhole={() => setChosen({ begin: 0, seconds: longest })} />}
         {moment !== null && (
           <Button size="compact-xs" variant="default" onClick={() => onMoment(null)}>
             Back to the starts
@@ -181,16 +169,6 @@ export function TimeDock({
         </div>
       </div>
     </div>
-  );
-}
-
-function Tool({ label, onClick, children }: { label: string; onClick: () => void; children: ReactNode }) {
-  return (
-    <Tooltip label={label}>
-      <ActionIcon size="sm" variant="default" aria-label={label} onClick={onClick}>
-        {children}
-      </ActionIcon>
-    </Tooltip>
   );
 }
 

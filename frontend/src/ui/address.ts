@@ -1,5 +1,7 @@
 import { useSyncExternalStore } from "react";
 
+import { pathOf } from "./kept";
+
 /** Where in the page one is; kept in the address, so that reload and the back button work. */
 export type Address =
   | { view: "catalogue" }
@@ -11,7 +13,7 @@ export type Address =
   | { view: "sweep"; scenario: string; sweep: string };
 
 export function parseAddress(hash: string): Address {
-  const [view, scenario, run] = hash.replace(/^#\/?/, "").split("/").map(decode);
+  const [view, scenario, run] = pathOf(hash).replace(/^#\/?/, "").split("/").map(decode);
   if (view === "edit" && scenario) return { view: "editor", scenario };
   if (view === "imported" && scenario) return { view: "imported", scenario };
   if (view === "run" && scenario && run) return { view: "run", scenario, run };
@@ -43,7 +45,7 @@ export function useAddress(): Address {
       addEventListener("hashchange", changed);
       return () => removeEventListener("hashchange", changed);
     },
-    () => location.hash,
+    () => pathOf(location.hash),
   );
   return parseAddress(hash);
 }

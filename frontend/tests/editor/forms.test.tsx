@@ -204,6 +204,7 @@ test("start and goal can be set without the map", async () => {
       onGoal={onGoal}
       onPickGoal={onPickGoal}
       onVia={vi.fn()}
+      onPickVia={vi.fn()}
     />
   );
   const { user, again } = show(part(null));
@@ -224,7 +225,7 @@ test("start and goal can be set without the map", async () => {
 test("places that a route leads through are named in their order, and each can be taken out", async () => {
   const document = scenario([car], ["a", "b"]);
   const starts = new Starts(graph, new Picker(graph), insideRows(graph, document.roi), document);
-  const onVia = vi.fn();
+  const [onVia, onPickVia] = [vi.fn(), vi.fn()];
   const { user } = show(
     <StartAndGoal
       one={{ ...car, via: ["1.0.-1.1", "1.0.-1.0", "1.0.-1.1"] }}
@@ -235,17 +236,21 @@ test("places that a route leads through are named in their order, and each can b
       onGoal={vi.fn()}
       onPickGoal={vi.fn()}
       onVia={onVia}
+      onPickVia={onPickVia}
     />,
   );
-  const passed = within(screen.getByRole("group", { name: "Passes" }));
+  const passed = within(screen.getByRole("group", { name: "Waypoints" }));
   const buttons = passed.getAllByRole("button");
   expect(buttons.map((one) => one.getAttribute("aria-label"))).toEqual([
-    "Do not pass Road 1, right lane 1, 2 m",
-    "Do not pass Road 1, right lane 1, 0 m",
-    "Do not pass Road 1, right lane 1, 2 m",
+    null,
+    "Remove waypoint 1, Road 1, right lane 1, 2 m",
+    "Remove waypoint 2, Road 1, right lane 1, 0 m",
+    "Remove waypoint 3, Road 1, right lane 1, 2 m",
   ]);
-  await user.click(nth(buttons, 2));
+  await user.click(nth(buttons, 3));
   expect(onVia).toHaveBeenCalledWith(["1.0.-1.1", "1.0.-1.0"]);
+  await user.click(screen.getByRole("button", { name: "Add a waypoint" }));
+  expect(onPickVia).toHaveBeenCalledOnce();
 });
 
 test("how long parking places are taken is asked in minutes once cars park", async () => {
@@ -279,6 +284,7 @@ test("a start from which no goal can be reached says so", () => {
       onGoal={vi.fn()}
       onPickGoal={vi.fn()}
       onVia={vi.fn()}
+      onPickVia={vi.fn()}
     />,
   );
   expect(screen.getByText(/No goal can be reached from here/)).toBeTruthy();

@@ -9,9 +9,11 @@ import { goalTool } from "../../src/editor/handlers/goal";
 import type { Editing, Tool } from "../../src/editor/handlers/handler";
 import { moveTool } from "../../src/editor/handlers/move";
 import { placeTool } from "../../src/editor/handlers/place";
+import { waypointTool } from "../../src/editor/handlers/waypoint";
 import type { Picked, PickBy, PlacePick } from "../../src/editor/pick";
 import { everyone, Starts } from "../../src/editor/placing";
 import { insideRows, sceneActors, sceneFlows, type Step } from "../../src/editor/scene";
+import { inBounds, inCircle, inRing } from "../../src/map/areas";
 import type { Pointed } from "../../src/map/MapCanvas";
 import { Picker } from "../../src/map/picking";
 import { Heads } from "../../src/signals/heads";
@@ -53,6 +55,7 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
     selection: [],
     one: null,
     goals: null,
+    legs: [],
     lights: null,
     showLight: (junction) => log.lights.push(junction),
     changes: changesOf({
@@ -121,8 +124,8 @@ test("a segment that holds the region together says so before it is clicked", ()
 
 test("a rectangle in the step of the region adds what lies in it and hangs together", () => {
   const { log, handler } = using(null, scenario([], []), {}, "region");
-  handler.frame([-1, -1, 1, 1]);
-  handler.frame([50, 50, 60, 60]);
+  handler.frame(inBounds([-1, -1, 1, 1]));
+  handler.frame(inBounds([50, 50, 60, 60]));
   expect(log.edits).toEqual([{ kind: "extend_roi", segments: ["a"] }]);
   expect(log.labels).toEqual(["Add 1 segment"]);
   expect(log.said).toEqual([
@@ -133,7 +136,7 @@ test("a rectangle in the step of the region adds what lies in it and hangs toget
 test("with no region yet the map says how to begin it", () => {
   const { handler } = using(null, scenario([], []), {}, "region");
   expect(handler.hint(null)).toBe(
-    "Click a road or junction to begin the region, or drag a rectangle with Shift",
+    "Click a road or junction to begin the region, or drag a rectangle with Shift, a line around it with Ctrl",
   );
 });
 
@@ -280,10 +283,10 @@ test("a goal is chosen among those that are suggested, or anywhere in the region
   expect(handler.under({ ...at(2.9, 0), reach: 1.5 })).toEqual({
     is: "place",
     place: place(THIRD),
-    trial: { spawn: FIRST, goal: THIRD },
+    trial: [FIRST, THIRD],
   });
   const free = handler.under(at(2.1, 0));
-  expect(free).toMatchObject({ place: { id: SECOND }, trial: { spawn: FIRST, goal: SECOND } });
+  expect(free).toMatchObject({ place: { id: SECOND }, trial: [FIRST, SECOND] });
   expect(handler.hint(free)).toBe("a goes to Road 1, right lane 1, 2 m");
   handler.pick(at(2.1, 0));
   expect(log.edits).toEqual([{ kind: "set_goal", actor: "a", goal: SECOND }]);
@@ -316,7 +319,7 @@ test("the flag of the goal is taken along by a drag, with the route as it would 
   const { log, handler } = using(null, scenario([one], ["a", "b", "c"]), more);
   const carried = handler.grab(at(4, 0));
   expect(carried?.hint).toContain("the goal of a");
-  expect(carried?.under(at(2.2, 0))).toMatchObject({ trial: { spawn: FIRST, goal: SECOND } });
+  expect(carried?.under(at(2.2, 0))).toMatchObject({ trial: [FIRST, SECOND] });
   carried?.drop(at(2.2, 0));
   expect(log.edits).toEqual([{ kind: "set_goal", actor: "a", goal: SECOND }]);
 });
@@ -324,14 +327,85 @@ test("the flag of the goal is taken along by a drag, with the route as it would 
 test("a road user that is dragged shows the route from where it would start", () => {
   const one: Actor = { ...car("a", FIRST), goal: THIRD };
   const { handler } = using(null, scenario([one], ["a", "b", "c"]), { selection: ["a"], one });
-  expect(handler.grab(at(0, 0))?.under(at(2.2, 0))).toMatchObject({ trial: { spawn: SECOND, goal: THIRD } });
+  expect(handler.grab(at(0, 0))?.under(at(2.2, 0))).toMatchObject({ trial: [SECOND, THIRD] });
 });
 
 test("a rectangle selects all road users and flows in it", () => {
   const { log, handler } = using(null, scenario([car("a", FIRST)], ["a"], [flow("f", SECOND)]));
-  handler.frame([-1, -1, 3, 1]);
-  handler.frame([1, -1, 3, 1]);
+  handler.frame(inBounds([-1, -1, 3, 1]));
+  handler.frame(inBounds([1, -1, 3, 1]));
   expect(log.selected).toEqual([["a", "f"], ["f"]]);
+});
+
+test("a line around road users selects those inside, and a circle takes segments into the region", () => {
+  const { log, handler } = using(null, scenario([car("a", FIRST), car("b", THIRD)], ["a", "c"]));
+  const around = inRing([
+    [3, -1],
+    [5, -1],
+    [4.5, 2],
+  ]);
+  handler.frame(around);
+  expect(log.selected).toEqual([["b"]]);
+  // Crossing itself, a line leaves out what it goes round twice.
+  const twice = [
+    [0, 0],
+    [4, 0],
+    [4, 4],
+    [0, 4],
+  ] as const;
+  expect(inRing([...twice, ...twice])(2, 2)).toBe(false);
+  expect(inRing(twice)(2, 2)).toBe(true);
+  expect([inCircle({ x: 1, y: 1 }, 2)(3, 1), inCircle({ x: 1, y: 1 }, 2)(3.1, 1)]).toEqual([true, false]);
+});
+
+const LEGS = [
+  [
+    [0, 0],
+    [4, 0],
+  ],
+] as const;
+
+test("a route is led through another place by a drag, and a waypoint is moved", () => {
+  const one: Actor = { ...car("a", FIRST), goal: THIRD };
+  const document = scenario([one], ["a", "b", "c"]);
+  const { log, handler } = using(null, document, { selection: ["a"], one, legs: LEGS });
+  expect(handler.hint(handler.under(at(3, 0.2)))).toContain("Drag the route of a");
+  expect(handler.under(at(3, 0.4))).toBeNull();
+  const carried = handler.grab(at(3, 0.1));
+  expect(carried?.needsRoute).toBe(true);
+  expect(carried?.under(at(2.1, 0))).toMatchObject({ trial: [FIRST, SECOND, THIRD] });
+  carried?.drop(at(2.1, 0));
+  carried?.drop(at(900, 900));
+  const led: Actor = { ...one, via: [SECOND] };
+  const again = using(null, scenario([led], ["a", "b", "c"]), {
+    selection: ["a"],
+    one: led,
+    actors: [],
+    legs: [LEGS[0], LEGS[0]],
+  });
+  again.handler.grab(at(2, 0))?.drop(at(4, 0));
+  expect([...log.edits, ...again.log.edits]).toEqual([
+    { kind: "change_actor", actor: "a", via: [SECOND] },
+    { kind: "change_actor", actor: "a", via: [THIRD] },
+  ]);
+  expect(log.said).toEqual(["No route leads here: a waypoint lies on a lane or walkway inside the region."]);
+});
+
+test("a waypoint is chosen by a click, or in the middle of the route; flows have none", () => {
+  const one: Actor = { ...car("a", FIRST), goal: THIRD, via: [FIRST] };
+  const more = { selection: ["a"], one, legs: [[], LEGS[0]] };
+  const { log, handler } = using(waypointTool("a"), scenario([one], ["a", "b", "c"]), more);
+  handler.pick(at(2.1, 0));
+  expect(log.edits).toEqual([{ kind: "change_actor", actor: "a", via: [FIRST, SECOND] }]);
+  expect(log.done).toBe(1);
+  const source = flow("f", FIRST);
+  const of = using(null, scenario([], ["a"], [source]), { one: source, legs: LEGS });
+  expect(of.handler.grab(at(3, 0))).toBeNull();
+  const none = new Log();
+  waypointTool("a")
+    .handler(editing(scenario([one]), none, { one }))
+    .somewhere();
+  expect(none.said).toEqual(["There is no route yet: choose a goal first."]);
 });
 
 test("a drag takes a road user to a free start, and those that are selected with it", () => {

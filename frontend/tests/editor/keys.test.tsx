@@ -21,6 +21,7 @@ function listening() {
     move: vi.fn(),
     paste: vi.fn(),
     goal: vi.fn(),
+    waypoint: vi.fn(),
     along: vi.fn(),
     lane: vi.fn(),
     selectAll: vi.fn(),
@@ -32,7 +33,7 @@ function listening() {
 
 test("shortcuts do what the help says", async () => {
   const { actions, user, unmount } = listening();
-  await user.keyboard("{Control>}zyacvk{/Control}{Delete}{Escape}?mgl,.19");
+  await user.keyboard("{Control>}zyacvk{/Control}{Delete}{Escape}?mgwl,.19");
   const { tool, along, ...others } = actions;
   for (const [name, act] of Object.entries(others)) expect(act, name).toHaveBeenCalledOnce();
   expect(along.mock.calls).toEqual([[-1], [1]]);

@@ -221,7 +221,7 @@ test("problems of many are one line that opens, and places are named as everywhe
 });
 
 test("neighbours of the region are offered once they are known, and only if there are some", async () => {
-  const onAll = vi.fn();
+  const [onAll, onWithin] = [vi.fn(), vi.fn()];
   const part = (candidates: string[], current: boolean) => (
     <RegionStep
       segments={1}
@@ -230,6 +230,7 @@ test("neighbours of the region are offered once they are known, and only if ther
       onAll={onAll}
       onWhole={vi.fn()}
       onSeen={vi.fn()}
+      onWithin={onWithin}
       onBegin={vi.fn()}
       onShow={vi.fn()}
     />
@@ -244,7 +245,7 @@ test("neighbours of the region are offered once they are known, and only if ther
 });
 
 test("a region is begun by a click on the map, or with what is in its middle", async () => {
-  const onBegin = vi.fn();
+  const [onBegin, onWithin] = [vi.fn(), vi.fn()];
   const { user } = show(
     <RegionStep
       segments={0}
@@ -253,12 +254,15 @@ test("a region is begun by a click on the map, or with what is in its middle", a
       onAll={vi.fn()}
       onWhole={vi.fn()}
       onSeen={vi.fn()}
+      onWithin={onWithin}
       onBegin={onBegin}
       onShow={vi.fn()}
     />,
   );
   await user.click(screen.getByRole("button", { name: "Begin in the middle of what I see" }));
   expect(onBegin).toHaveBeenCalledOnce();
+  await user.click(screen.getByRole("button", { name: "Take all within" }));
+  expect(onWithin).toHaveBeenCalledWith(300);
 });
 
 function placing(

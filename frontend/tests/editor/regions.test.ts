@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
 
+import { inBounds } from "../../src/map/areas";
 import { extension, rowsWithin } from "../../src/editor/regions";
 import { Graph } from "../../src/map/graph";
 import { columns } from "../example";
@@ -20,10 +21,10 @@ const ALL = [0, 1, 2, 3];
 
 test("a rectangle takes the segments that lie in it by half or more", () => {
   const long = new Graph({ ...columns, segment: [0, 0, 1] });
-  expect(rowsWithin(long, [-1, -1, 1, 1])).toEqual([0]);
-  expect(rowsWithin(long, [1, -1, 5, 1])).toEqual([0, 1]);
+  expect(rowsWithin(long, inBounds([-1, -1, 1, 1]))).toEqual([0]);
+  expect(rowsWithin(long, inBounds([1, -1, 5, 1]))).toEqual([0, 1]);
   const three = new Graph({ ...columns, segment: [0, 0, 0] });
-  expect(rowsWithin(three, [3, -1, 5, 1])).toEqual([]);
+  expect(rowsWithin(three, inBounds([3, -1, 5, 1]))).toEqual([]);
 });
 
 test("a region is extended by what hangs together with it, nearest first, and the rest is counted", () => {

@@ -123,3 +123,36 @@ test("a live run has the same bar, in which nothing can be chosen", () => {
   expect(screen.queryByRole("button", { name: "Next event" })).toBeNull();
   expect(screen.getByText("1 green, 1 red")).toBeTruthy();
 });
+
+test("the bar of a run shows less time by its buttons, and what is shown stays in sight", async () => {
+  const { user, again, onSeek } = bar(50);
+  const part = (time: number) => (
+    <RunBar
+      end={100}
+      reached={100}
+      time={time}
+      incidents={FIRED}
+      categories={new Map()}
+      junction={null}
+      history={null}
+      ttc={{ ego: null, points: [], learn: () => undefined }}
+      spacing={0.5}
+      onSeek={onSeek}
+      onShow={vi.fn()}
+    />
+  );
+  const rules = (): Element => screen.getByText("Rules").closest(".time-row") as Element;
+  await user.click(screen.getByRole("button", { name: "Show less time" }));
+  // 25 to 75 s in 600 pixels.
+  fireEvent.click(rules(), { clientX: 300 });
+  expect(onSeek).toHaveBeenLastCalledWith(50);
+  fireEvent.click(rules(), { clientX: 12 });
+  expect(onSeek).toHaveBeenLastCalledWith(26);
+  again(part(80));
+  // 50 s are in sight, a tenth of them before 80 s if there were so much left.
+  fireEvent.click(rules(), { clientX: 12 });
+  expect(onSeek).toHaveBeenLastCalledWith(51);
+  await user.click(screen.getByRole("button", { name: "Show the whole run" }));
+  fireEvent.click(rules(), { clientX: 300 });
+  expect(onSeek).toHaveBeenLastCalledWith(50);
+});

@@ -1,3 +1,4 @@
+import { stationsOf } from "../placing";
 import { type Carrier, type Editing, onFoot, placeHover } from "./handler";
 
 /** Takes one along to a free start; the others that are selected come with it. */
@@ -5,7 +6,7 @@ export function carrier(editing: Editing, id: string): Carrier {
   const { ones, starts, selection, changes, say } = editing;
   const walk = onFoot(editing, id);
   const others = selection.includes(id) ? selection.filter((other) => other !== id) : [];
-  const goal = ones.find((one) => one.id === id)?.goal ?? null;
+  const one = ones.find((each) => each.id === id);
   return {
     hint:
       others.length === 0
@@ -13,7 +14,7 @@ export function carrier(editing: Editing, id: string): Carrier {
         : `Moving ${others.length + 1} road users: drop them where ${id} starts`,
     under: ({ x, y, reach }) => {
       const to = starts.near(x, y, reach, walk);
-      return placeHover(to, to && goal !== null ? { spawn: to.id, goal } : undefined);
+      return placeHover(to, to && one?.goal ? stationsOf({ ...one, spawn: to.id }) : undefined);
     },
     drop: ({ x, y, reach }) => {
       const to = starts.near(x, y, reach, walk);

@@ -2,7 +2,7 @@ import type { Actor, Flow } from "../../api/types";
 import type { Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
 import { placeWord } from "../placeWords";
-import { viasOf } from "../placing";
+import { stationsOf } from "../placing";
 import { nearestOne } from "../scene";
 import { type Carrier, type Editing, LOOKING, onFoot, placeHover, type Tool } from "./handler";
 import { selectFrame } from "./select";
@@ -30,7 +30,7 @@ export const goalTool = (id: string): Tool => ({
       pick: (at) => {
         if (one && take(editing, one, at)) editing.done();
       },
-      frame: (bounds) => selectFrame(editing, bounds),
+      frame: (area) => selectFrame(editing, area),
       somewhere: () => {
         const [first] = editing.goals ?? [];
         if (!one || !first) return editing.say("No goal can be reached from the start.");
@@ -56,7 +56,7 @@ export const goalCarrier = (editing: Editing, one: Actor | Flow): Carrier => ({
 
 function goalHover(editing: Editing, one: Actor | Flow, at: Pointed) {
   const place = goalNear(editing, one, at);
-  return placeHover(place, place ? { spawn: viasOf(one).at(-1) ?? one.spawn, goal: place.id } : undefined);
+  return placeHover(place, place ? stationsOf({ ...one, goal: place.id }) : undefined);
 }
 
 function take(editing: Editing, one: Actor | Flow, at: Pointed): boolean {

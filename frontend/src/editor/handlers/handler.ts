@@ -1,4 +1,5 @@
-import type { Actor, Bounds, Category, Flow } from "../../api/types";
+import type { Actor, Category, Flow } from "../../api/types";
+import type { Area } from "../../map/areas";
 import type { Graph, Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
 import type { Picker } from "../../map/picking";
@@ -10,16 +11,14 @@ import type { PlacePick } from "../pick";
 import type { Starts } from "../placing";
 import type { Step } from "../scene";
 
-/** A start and a goal, one of which is being chosen: the route between them is shown before the click. */
-export interface Trial {
-  spawn: string;
-  goal: string;
-}
+/** Stations of a route, at least two, one of which is being chosen: the route is shown before the click. */
+export type Trial = readonly string[];
 
 /** What lies under the pointer, as far as the handler in charge cares. */
 export type Hover =
   | { is: "place"; place: Place; trial?: Trial | undefined }
   | { is: "segment"; row: number }
+  | { is: "route"; id: string }
   | { is: "light"; junction: string };
 
 /** What the pointer does on the map now: one for each step of the editor and for each tool. */
@@ -36,8 +35,8 @@ export interface Handler {
   pick(at: Pointed): void;
   /** Takes what is here along until it is dropped; null if the drag moves the map. */
   grab(at: Pointed): Carrier | null;
-  /** A rectangle was drawn. */
-  frame(bounds: Bounds): void;
+  /** A rectangle was drawn, or a line around something. */
+  frame(area: Area): void;
 }
 
 /** Takes something along while the button is held down. */
@@ -46,6 +45,8 @@ export interface Carrier {
   /** What is taken along, and how it is put down. */
   readonly hint: string;
   drop(at: Pointed): void;
+  /** Whether it is only put down where a route leads. */
+  readonly needsRoute?: boolean;
 }
 
 /** A handler that takes points of the region, on the map or without it. */
@@ -84,6 +85,8 @@ export interface Editing {
   /** The only one that is selected, and where it can go; null until that is known. */
   one: Actor | Flow | null;
   goals: readonly Place[] | null;
+  /** Points of its route, from each station to the next. */
+  legs: readonly (readonly (readonly [number, number])[])[];
   /** Where the map has traffic lights, once that is known. */
   lights: Heads | null;
   /** Shows the program of the light of a junction. */

@@ -2,7 +2,7 @@ import { type Editing, type Handler, LOOKING } from "./handler";
 import { rowsWithin } from "../regions";
 import { segmentAt, segmentHover } from "./segments";
 
-/** Lets the region of interest grow and shrink, segment by segment or by a rectangle. */
+/** Lets the region of interest grow and shrink, segment by segment, by a rectangle or by a line around it. */
 export const regionHandler = ({ graph, picker, roi, region, changes }: Editing): Handler => ({
   ...LOOKING,
   aim: true,
@@ -13,10 +13,10 @@ export const regionHandler = ({ graph, picker, roi, region, changes }: Editing):
       return "This segment holds the region together and cannot be removed";
     }
     return roi.length === 0
-      ? "Click a road or junction to begin the region, or drag a rectangle with Shift"
+      ? "Click a road or junction to begin the region, or drag a rectangle with Shift, a line around it with Ctrl"
       : null;
   },
-  frame: (bounds) => changes.extendRegion(rowsWithin(graph, bounds)),
+  frame: (area) => changes.extendRegion(rowsWithin(graph, area)),
   pick: (at) => {
     const row = segmentAt(picker, at);
     if (row === null) return;

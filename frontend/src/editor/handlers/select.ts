@@ -1,15 +1,20 @@
-import type { Bounds } from "../../api/types";
+import type { Area } from "../../map/areas";
 import type { Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
 import { inFrame, nearestOne } from "../scene";
 import { carrier } from "./carry";
 import { chosenGoalAt, goalCarrier } from "./goal";
 import { type Editing, type Handler, LOOKING, onFoot } from "./handler";
+import { routeHover, waypointGrab } from "./waypoint";
 
-/** Without a tool: a click selects or sets the goal, a drag takes road users or a goal along, or draws a frame. */
+/** Without a tool: a click selects or sets the goal; a drag takes road users, a goal or a route along. */
 export const selectHandler = (editing: Editing): Handler => ({
   ...LOOKING,
   walks: editing.one ? onFoot(editing, editing.one.id) : null,
+  under: (at) =>
+    oneAt(editing, at) || chosenGoalAt(editing, at) || goalAt(editing, at) ? null : routeHover(editing, at),
+  hint: (hover) =>
+    hover?.is === "route" ? `Drag the route of ${hover.id} to lead it through another place` : null,
   pick: (at) => {
     editing.openActors();
     const goal = goalAt(editing, at);
@@ -19,15 +24,16 @@ export const selectHandler = (editing: Editing): Handler => ({
   grab: (at) => {
     const id = oneAt(editing, at);
     if (id !== null) return carrier(editing, id);
-    return editing.one && chosenGoalAt(editing, at) ? goalCarrier(editing, editing.one) : null;
+    if (editing.one && chosenGoalAt(editing, at)) return goalCarrier(editing, editing.one);
+    return goalAt(editing, at) ? null : waypointGrab(editing, at);
   },
-  frame: (bounds) => selectFrame(editing, bounds),
+  frame: (area) => selectFrame(editing, area),
 });
 
-/** Selects all in a rectangle, whatever is in the hand. */
-export function selectFrame({ actors, flows, select, openActors }: Editing, bounds: Bounds): void {
+/** Selects all in an area, whatever is in the hand. */
+export function selectFrame({ actors, flows, select, openActors }: Editing, area: Area): void {
   openActors();
-  select(inFrame([...actors, ...flows], bounds));
+  select(inFrame([...actors, ...flows], area));
 }
 
 /** Whose body or arrow is pointed at. */

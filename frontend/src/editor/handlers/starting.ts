@@ -38,7 +38,7 @@ export function startingHandler(
         else say(starts.reasonAt(at.x, at.y, at.reach, walks, who));
       }
     },
-    frame: (bounds) => selectFrame(editing, bounds),
+    frame: (area) => selectFrame(editing, area),
     somewhere: () => {
       const to = starts.first(
         walks,

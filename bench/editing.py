@@ -1,0 +1,165 @@
+"""The editor in headless Chromium, drawn in software, with 2,000 road users on a town.
+
+Aims: 50 frames a second while the map is panned, zoomed or a road user is dragged; a change shown
+100 ms after the key that asks for it, of which the part of the server is told apart.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+from playwright.sync_api import expect
+
+from bench.canvas import TOWN
+from bench.common import shared_maps
+from odscen.app.scenarios import SUFFIX, generate
+from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.sampling.generation_settings import GenerationSettings
+from odscen.workspace.store import Workspace
+from tests.browser.pages import OdscenPage
+from tools import page as tool
+
+ACTORS = 2000
+CHANGES = 9
+STEPS = 90
+
+_PROBE = """
+window.odscenFrames = [];
+const tick = now => { window.odscenFrames.push(now); requestAnimationFrame(tick); };
+requestAnimationFrame(tick);
+window.odscenChange = null;
+addEventListener('keydown', () => {
+  const begun = performance.now();
+  let asked = false;
+  const look = () => {
+    const saved = document.getElementById('head-slot').innerText.includes('All changes saved');
+    if (!saved) asked = true;
+    if (asked && saved) requestAnimationFrame(() => {
+      window.odscenChange = performance.now() - begun;
+    });
+    else requestAnimationFrame(look);
+  };
+  look();
+}, true);
+"""
+"""Notes each frame, and how long after a key the change that it asks for is saved and drawn."""
+
+
+def main() -> None:
+    shared = shared_maps()
+    if shared is None:
+        print(f"no folder of real maps with {TOWN} here")
+        return
+    with tempfile.TemporaryDirectory() as name:
+        workspace = Workspace.open(Path(name))
+        workspace.add_map(shared / TOWN)
+        scenario, number = _crowd(workspace)
+        with tool.served(Path(name)) as server, tool.launched() as browser:
+            context = browser.new_context(
+                base_url=server.url, viewport={"width": 1360, "height": 850}
+            )
+            context.set_default_timeout(120_000)
+            expect.set_options(timeout=120_000)
+            context.add_init_script(f"localStorage.setItem({tool.TOUR_SEEN!r}, 'seen')")
+            context.add_init_script(_PROBE)
+            user = OdscenPage(context.new_page())
+            user.open_editor(scenario)
+            expect(user.names.first).to_be_visible()
+            print(f"{Path(TOWN).stem}: {number} road users (wanted {ACTORS})")
+            _measure(user)
+
+
+def _crowd(workspace: Workspace) -> tuple[str, int]:
+    """Name of a scenario with many road users, and how many it has."""
+    settings = GenerationSettings(map_name=Path(TOWN).stem, seed=5, fill=0.9, roi_segments=400)
+    path = generate(workspace, settings=settings)[0]
+    made = loads(path.read_text(encoding="utf-8"))
+    assert isinstance(made, Scenario)
+    kept = made.model_copy(update={"actors": made.actors[:ACTORS]})
+    path.write_text(dumps(kept), encoding="utf-8")
+    return path.name.removesuffix(SUFFIX), len(kept.actors)
+
+
+def _measure(user: OdscenPage) -> None:
+    page, mouse = user.page, user.page.mouse
+    box = user.map.area.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def sway(held: Callable[[int], tuple[float, float]]) -> Callable[[], None]:
+        def move() -> None:
+            for k in range(STEPS):
+                mouse.move(*held(k))
+
+        return move
+
+    def wheel() -> None:
+        for k in range(STEPS):
+            mouse.wheel(0, -40 if k % 30 < 15 else 40)
+
+    def pan(k: int) -> tuple[float, float]:
+        return x - 150 + 3 * k, y + 60 - k
+
+    for what, before in (("whole map", "0"), ("3 px/m", "+++++")):
+        user.map.area.focus()
+        for key in before:
+            page.keyboard.press(key)
+        mouse.move(x - 150, y + 60)
+        mouse.down()
+        _frames(user, f"panning, {what}", sway(pan))
+        mouse.up()
+    mouse.move(x, y)
+    _frames(user, "zooming", wheel)
+    user.names.first.click()
+    page.wait_for_timeout(1500)
+    actor = user.document()["actors"][0]
+    at = user.map.at(*user.graph.place(actor["spawn"]))
+    mouse.move(*at)
+    mouse.down()
+    _frames(user, "dragging a car", sway(lambda k: (at[0] + k / 3, at[1] + k / 5)))
+    mouse.move(*at)
+    mouse.up()
+    user.names.first.click()
+    with user.changing():
+        page.keyboard.press("Delete")
+    _changes(user)
+
+
+def _frames(user: OdscenPage, what: str, move: Callable[[], None]) -> None:
+    """Frames per second while something moves, and the longest pause."""
+    page = user.page
+    begun = page.evaluate("odscenFrames.length")
+    move()
+    times: list[float] = page.evaluate(f"odscenFrames.slice({begun})")
+    pauses = [after - before for before, after in pairwise(times)]
+    print(
+        f"  {what:20} {1000 * len(pauses) / sum(pauses):5.1f} frames/s (aim 50),"
+        f" longest pause {max(pauses):.0f} ms"
+    )
+
+
+def _changes(user: OdscenPage) -> None:
+    """Milliseconds from the key that takes a removal back, or makes it again, to the picture."""
+    page = user.page
+    seen, served = [], []
+    for number in range(CHANGES):
+        page.evaluate("performance.clearResourceTimings()")
+        page.evaluate("window.odscenChange = null")
+        page.keyboard.press("Control+z" if number % 2 == 0 else "Control+y")
+        page.wait_for_function("window.odscenChange !== null")
+        seen.append(page.evaluate("window.odscenChange"))
+        served.append(
+            page.evaluate(
+                "performance.getEntriesByType('resource')"
+                ".filter(one => /(undo|redo)$/.test(one.name)).map(one => one.duration)[0] ?? NaN"
+            )
+        )
+    print(
+        f"  a change shown after {statistics.median(seen):.0f} ms, worst {max(seen):.0f} ms"
+        f" (aim 100), of which the server's answer {statistics.median(served):.0f} ms"
+    )

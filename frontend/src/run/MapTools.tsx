@@ -1,0 +1,47 @@
+import { Select } from "@mantine/core";
+import type { ReactNode } from "react";
+
+import { type ColourBy, coloursFor } from "./tint";
+
+/** What lies on the map of a run and is not the map: what colours say, and who is followed. */
+export function MapTools({
+  by,
+  live,
+  onBy,
+  share,
+  children,
+}: {
+  by: ColourBy;
+  /** Whether the run is watched while it runs. */
+  live: boolean;
+  onBy: (by: ColourBy) => void;
+  /** What the picture is taken away with. */
+  share?: ReactNode;
+  children?: ReactNode;
+}) {
+  return (
+    <div
+      className="map-tools"
+      onPointerDown={(event) => event.stopPropagation()}
+      onPointerMove={(event) => event.stopPropagation()}
+    >
+      <div className="map-tools-row">
+        <Select
+          size="xs"
+          w={176}
+          aria-label="Colour by"
+          leftSection={<span aria-hidden="true">Colour</span>}
+          leftSectionWidth={54}
+          allowDeselect={false}
+          data={coloursFor(live)}
+          value={by}
+          onChange={(next) => {
+            if (next) onBy(next as ColourBy);
+          }}
+        />
+        {share}
+      </div>
+      {children}
+    </div>
+  );
+}

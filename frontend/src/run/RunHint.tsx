@@ -1,0 +1,38 @@
+import { Loader } from "@mantine/core";
+
+import type { RunInfo } from "../api/runs";
+
+/** What is said on the map of a run: how its preparation goes, or who is followed. */
+export function RunHint({
+  info,
+  planned,
+  followed,
+  there,
+}: {
+  info: Pick<RunInfo, "state" | "preparing">;
+  /** Whether all road users are known, for their routes are planned. */
+  planned: boolean;
+  followed: string | null;
+  /** Whether that one is on the road. */
+  there: boolean;
+}) {
+  if (info.state === "preparing")
+    return (
+      <div className="map-hint" role="status">
+        <span className="waiting">
+          <Loader size={16} aria-hidden="true" />
+          {planned
+            ? "Preparing, step 2 of 2: starting the simulation …"
+            : `Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
+        </span>
+      </div>
+    );
+  if (followed === null) return null;
+  return (
+    <div className="map-hint" role="status">
+      {there
+        ? `Following ${followed}. Click on the empty map to stop.`
+        : `${followed} is not on the road now.`}
+    </div>
+  );
+}

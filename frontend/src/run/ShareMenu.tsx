@@ -1,0 +1,76 @@
+import { Button, Menu } from "@mantine/core";
+import { type RefObject, useEffect, useRef, useState } from "react";
+
+import type { MapHandle } from "../map/MapCanvas";
+import { tell, tellError } from "../ui/notices";
+import { copyLink, record, type Recording, saveFile, savePicture } from "../ui/share";
+import { IconDown } from "../ui/icons";
+
+/** Takes away what is seen of a run: a link, a picture, a video, paper. */
+export function ShareMenu({
+  run,
+  handle,
+  playing,
+  onPlay,
+}: {
+  run: string;
+  handle: RefObject<MapHandle | null>;
+  /** Whether the picture moves; null of a live run. */
+  playing: boolean | null;
+  /** Plays the recording of the run. */
+  onPlay: () => void;
+}) {
+  const [recording, setRecording] = useState<Recording | null>(null);
+  const moved = useRef(false);
+  const begin = (): void => {
+    const made = record((canvas) => handle.current?.picture(canvas));
+    if (!made) return tell("This browser cannot record videos.");
+    moved.current = false;
+    setRecording(made);
+    if (playing === false) onPlay();
+  };
+  // A recording that has been played to its end ends the video.
+  useEffect(() => {
+    if (!recording) return;
+    if (playing) moved.current = true;
+    else if (playing === false && moved.current) {
+      setRecording(null);
+      recording.stop().then((blob) => saveFile(blob, `${run}.webm`), tellError);
+    }
+  }, [recording, playing, run]);
+  if (recording)
+    return (
+      <Button
+        size="xs"
+        color="red"
+        onClick={() => {
+          setRecording(null);
+          recording.stop().then((blob) => saveFile(blob, `${run}.webm`), tellError);
+        }}
+      >
+        Stop and save the video
+      </Button>
+    );
+  return (
+    <Menu position="bottom-end" withinPortal={false} withInitialFocusPlaceholder={false}>
+      <Menu.Target>
+        <Button size="xs" variant="default" leftSection={<IconDown size={13} />}>
+          Share
+        </Button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Item onClick={copyLink}>Copy the link to this view</Menu.Item>
+        <Menu.Item
+          onClick={() => {
+            const canvas = handle.current?.picture();
+            if (canvas) savePicture(canvas, run);
+          }}
+        >
+          Picture of the map (PNG)
+        </Menu.Item>
+        <Menu.Item onClick={begin}>Video of the map (WebM)</Menu.Item>
+        <Menu.Item onClick={() => print()}>Print</Menu.Item>
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
