@@ -661,7 +661,7 @@ export interface paths {
         };
         /**
          * Report
-         * @description Report of a completed run.
+         * @description Report of a completed run, which is written if it is not there.
          */
         get: operations["report_api_runs__run__report_html_get"];
         put?: never;
