@@ -12,10 +12,10 @@ from odscen.scenario.document.document_parts import Identifier
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.web.jobs import JobResult
 from odscen.web.large.large_documents import LargeDocumentRoute
+from odscen.web.large.whole_days import make_day
 from odscen.web.messages import EntryPlace, JobStarted, ScenarioState, Version, WholeDay
 from odscen.web.scenario_routes import state_of
 from odscen.web.services import Shared
-from odscen.web.whole_days import make_day
 
 if TYPE_CHECKING:
     from odscen.workspace.store import ProgressCallback

@@ -12,8 +12,8 @@ from starlette.requests import Request
 
 from odscen.web.application import create_app
 from odscen.web.large.large_documents import ANSWER, BODY, HEAD, REQUEST
+from odscen.web.large.whole_days import day_made
 from odscen.web.messages import WholeDay
-from odscen.web.whole_days import day_made
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
