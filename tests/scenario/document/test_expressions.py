@@ -29,6 +29,9 @@ numbers = st.floats(-1e6, 1e6, allow_nan=False)
         ("pow($gap, 2) + sqrt(16)", 13.0),
         ("max(min($gap, 2), sign($speed)) + abs($speed)", 22.0),
         (" 1e-3 * $gap ", 0.003),
+        ("acos(cos($gap)) + atan(tan(1)) + asin(sin(0.5))", 4.5),
+        ("not ($gap - 3) and $_x1", 1.0),
+        ("($gap - 3) or 0", 0.0),
     ],
 )
 def test_an_expression_is_computed_as_openscenario_does(text: str, value: float) -> None:
