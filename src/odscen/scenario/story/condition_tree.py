@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from odscen.scenario.story.condition_kinds import Reading
     from odscen.scenario.story.road_view import RoadView
 
-_ALWAYS, _NEVER = Flips(was=True), Flips(was=False)
+_ALWAYS, NEVER_IN_STEP = Flips(was=True), Flips(was=False)
 _CLOSE = 1e-6
 """Of a margin: as good as on the bound, so that what was said before stays."""
 
@@ -120,6 +120,12 @@ class ConditionTrees:
                 found[name] = value + (rate * seconds if seconds else 0.0)
         return found
 
+    def forget(self, where: str) -> None:
+        """Forget the last readings of a rule that is not looked at for a while."""
+        for leaves in (self._leaves, self._new_leaves):
+            for key in [key for key in leaves if key.startswith(where)]:
+                leaves[key] = LeafMemory(None, leaves[key].holds)
+
     def next_step(self) -> None:
         """Keep what was seen in this step."""
         self._leaves.update(self._new_leaves)
@@ -179,7 +185,7 @@ class ConditionTrees:
             if turn < time + self.step:
                 at = (*at, turn)
         if not at:  # nearly always
-            return _ALWAYS if was else _NEVER
+            return _ALWAYS if was else NEVER_IN_STEP
         return Flips(was, at)
 
     def _later(self, condition: Condition, where: str, flips: Flips, time: float) -> Flips:

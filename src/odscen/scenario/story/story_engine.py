@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
 from odscen.scenario.story.channels import Channel, WantedMove
-from odscen.scenario.story.condition_tree import ConditionTrees
+from odscen.scenario.story.condition_tree import NEVER_IN_STEP, ConditionTrees
 from odscen.scenario.story.own_kinds import action_kind
+from odscen.scenario.story.quiet_spells import QuietSpells
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -84,12 +85,19 @@ class StoryEngine:
     ----------
     step
         Seconds between two looks.
+
+    Attributes
+    ----------
+    patient
+        Whether rules that cannot fire yet are left alone, as SUMO alone drives whom no rule moves.
     """
 
     def __init__(self, rules: Sequence[StoryRule], *, step: float) -> None:
+        self.patient = True
         self._rules = {rule.id: rule for rule in rules}
         self._step = step
         self._trees = ConditionTrees(step)
+        self._quiet = QuietSpells(step)
         self._states = {rule.id: _RuleState() for rule in rules}
         self._channels: dict[str, Channel] = {}
         self._events: list[StoryEvent] = []
@@ -111,6 +119,10 @@ class StoryEngine:
         """Add a rule to those that there are."""
         self._rules[rule.id] = rule
         self._states[rule.id] = _RuleState()
+
+    def look_at_all(self) -> None:
+        """Look at all rules in the next step: somebody is elsewhere than he drove."""
+        self._quiet.end()
 
     def may_fire(self, rule: str) -> bool:
         """Whether a rule can fire yet, or is about something."""
@@ -141,6 +153,7 @@ class StoryEngine:
         """What has to be remembered from one slice of a run to the next, for JSON."""
         return {
             "trees": self._trees.state(),
+            "quiet": self._quiet.state(),
             "rules": {
                 name: {**asdict(state), "running": [one.state() for one in state.running]}
                 for name, state in self._states.items()
@@ -151,6 +164,7 @@ class StoryEngine:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
         self._trees.restore(state["trees"])
+        self._quiet.restore(state.get("quiet", {}), self._rules)
         for name, kept in state["rules"].items():
             running = [_Running.from_state(one) for one in kept["running"]]
             self._states[name] = _RuleState(**{**kept, "running": running})
@@ -189,6 +203,8 @@ class StoryEngine:
                 if due < end:
                     found.append((max(due, now), index, name))
             elif state.fired < rule.times:
+                if self._quiet.lasts(rule, view.time, self._channels):
+                    continue
                 holds = self._trees.look(rule.when, f"{name}.when", rule.actor, view)
                 if state.fired:
                     instant = holds.first_rise(now, end, after=state.ready)
@@ -196,6 +212,12 @@ class StoryEngine:
                     instant = holds.first(now, end)
                 if instant is not None:
                     found.append((instant, index, name))
+                elif (
+                    self.patient
+                    and holds == NEVER_IN_STEP
+                    and self._quiet.begins(rule, view, self._channels)
+                ):
+                    self._trees.forget(f"{name}.when")
         if not found:
             return None
         instant, _, name = min(found)

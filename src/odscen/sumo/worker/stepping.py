@@ -66,6 +66,8 @@ class Stepper:
         self._send = send
         self._watch = watch
         self._led = watch if isinstance(watch, LockstepWatch) and watch.rules else None
+        if story is not None and (behaviour is not None or isinstance(watch, LockstepWatch)):
+            story.look_always()
         self._due: float | None = None
         self._sent = 0.0
         self._start: tuple[float, int] | None = None
@@ -140,6 +142,7 @@ class Stepper:
             from odscen.sumo.worker.story.story_run import StoryRun
 
             self.story = StoryRun.without_rules(self._plan)
+            self.story.look_always()
             self.story.begin(session)
         while heard and self.story is not None:
             self.story.add(heard.pop(0))

@@ -34,6 +34,8 @@ _ANY_SPEED = 200.0
 """m/s."""
 _MORE = frozenset({"acceleration", "travelled", "off_road", "arrive", "own"})
 """Conditions and actions that ask more of actors than where they are and how fast."""
+_MOVED = frozenset({EventKind.TELEPORT_START, EventKind.TELEPORT_END, EventKind.COLLISION})
+"""After these a vehicle is elsewhere, or has another speed, than it drove."""
 _LASTING = frozenset({"stopped", "own"})
 """Those that ask how long actors have been standing."""
 
@@ -67,6 +69,7 @@ class StoryRun:
         self._goal_edges: dict[str, str] = {}
         self._sent: dict[str, float] = {}
         self._lost: list[Event] = []
+        self._heard = 0
 
     @classmethod
     def in_folder(cls, run: Path, plan: Plan) -> StoryRun:
@@ -91,6 +94,10 @@ class StoryRun:
         for name in _names(more):
             if name in self._planned:
                 self._actors[name] = self._planned[name]
+
+    def look_always(self) -> None:
+        """Look at all rules in each step: not SUMO alone drives."""
+        self._engine.patient = False
 
     def _read(self, story: StoryPlan) -> None:
         """Let the view read what rules ask of actors."""
@@ -119,6 +126,9 @@ class StoryRun:
     def after_step(self, time: float, recorder: Recorder) -> None:
         """Look at the road as it is at ``time``, say what rules do, and act for the next step."""
         road = self._road
+        if any(event.kind in _MOVED for event in recorder.since(self._heard)):
+            self._engine.look_at_all()
+        self._heard = recorder.count
         driven = {
             name: move.speed or 0.0
             for name, move in self._moves.items()
@@ -148,6 +158,7 @@ class StoryRun:
         """What has to be remembered from one slice of a run to the next, for JSON."""
         return {
             "engine": self._engine.state(),
+            "heard": self._heard,
             "view": self._view.state(),
             "contacts": self._contacts.state(),
             "hands": self._hands.state(),
@@ -162,6 +173,7 @@ class StoryRun:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
         self._engine.restore(state["engine"])
+        self._heard = state.get("heard", 0)
         self._view.restore(state["view"])
         self._contacts.restore(state["contacts"])
         self._hands.restore(state["hands"])

@@ -1,0 +1,142 @@
+"""Rules that cannot fire yet are left alone, and fire as if they had been looked at all along."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from odscen.scenario.story.story_engine import StoryEngine, StoryEvent
+from tests.scenario.story.straight_road import CAR, Road, rule, started
+
+bounds = st.floats(0.5, 60.0)
+CONDITIONS: tuple[Any, ...] = (
+    bounds.map(lambda b: {"distance": {"to": "other", "below": b}}),
+    bounds.map(lambda b: {"distance": {"to": "other", "below": b, "free": False}}),
+    bounds.map(lambda b: {"distance": {"place": [150.0, 3.0], "below": b}}),
+    bounds.map(lambda b: {"reaches": {"place": [120.0, -4.0], "within": b}}),
+    bounds.map(lambda b: {"travelled": {"above": 4.0 * b}}),
+    bounds.map(lambda b: {"speed": {"above": b}}),
+    bounds.map(lambda b: {"speed": {"of": "other", "below": b / 4.0}}),
+    bounds.map(lambda b: {"time": {"after": b / 3.0}}),
+    bounds.map(lambda b: {"ttc": {"to": "other", "below": b / 10.0}}),
+)
+one = st.one_of(CONDITIONS)
+conditions = st.one_of(
+    one,
+    st.lists(one, min_size=2, max_size=3).map(lambda parts: {"all": parts}),
+    st.lists(one, min_size=2, max_size=3).map(lambda parts: {"any": parts}),
+    one.map(lambda part: {"not": part}),
+    st.tuples(one, st.floats(0.0, 1.0)).map(lambda both: {**both[0], "delay": both[1]}),
+    one.map(lambda part: {**part, "edge": "rising"}),
+)
+actors = st.builds(
+    lambda x, y, hdg, speed, gain: replace(
+        CAR, x=x, y=y, hdg=hdg, speed=speed, acceleration=gain
+    ),
+    st.floats(-200.0, 200.0), st.floats(-30.0, 30.0), st.floats(-3.1, 3.1),
+    st.floats(0.0, 40.0), st.floats(-4.0, 9.0),
+)  # fmt: skip
+
+
+class _CountedRoad(Road):
+    looks = 0
+
+    def actor(self, name: str) -> Any:
+        self.looks += 1
+        return super().actor(name)
+
+
+def _story(
+    when: list[dict[str, Any]], *, patient: bool, step: float, bodies: Any, until: float = 15.0
+) -> tuple[list[StoryEvent], int]:
+    rules = [rule(one, name=f"r{n}", times=2) for n, one in enumerate(when)]
+    engine = StoryEngine(rules, step=step)
+    engine.patient = patient
+    road = _CountedRoad(bodies, engine.rule_changes)
+    events: list[StoryEvent] = []
+    for number in range(round(until / step)):
+        road.time = number * step
+        events += engine.step(road)[1]
+    return events, road.looks
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    when=st.lists(conditions, min_size=1, max_size=3),
+    car=actors,
+    other=actors,
+    step=st.sampled_from((0.05, 0.1, 0.2, 0.5)),
+)
+def test_the_same_happens_at_the_same_instants(
+    when: list[dict[str, Any]], car: Any, other: Any, step: float
+) -> None:
+    bodies = (car, replace(other, id="other"))
+    patient, _ = _story(when, patient=True, step=step, bodies=bodies)
+    always, _ = _story(when, patient=False, step=step, bodies=bodies)
+    assert patient == always
+
+
+@pytest.mark.parametrize(
+    "when",
+    [
+        {"distance": {"to": "other", "below": 3.0}},
+        {"reaches": {"place": [3000.0, 0.0], "within": 2.0}},
+        {"travelled": {"above": 3000.0}},
+        {"time": {"after": 300.0}},
+        {"all": [{"ttc": {"to": "other", "below": 60.0}}, {"time": {"after": 300.0}}]},
+    ],
+)
+def test_what_is_far_off_is_read_in_few_steps(when: dict[str, Any]) -> None:
+    bodies = (CAR, replace(CAR, id="other", x=2000.0))
+    _, patient = _story([when], patient=True, step=0.1, bodies=bodies)
+    _, always = _story([when], patient=False, step=0.1, bodies=bodies)
+    assert patient < 0.25 * max(always, 150)
+
+
+@pytest.mark.parametrize(
+    "when",
+    [
+        {"ttc": {"to": "other", "below": 0.1}},
+        {"distance": {"to": "other", "below": 3.0, "along": "lateral"}},
+        {"speed": {"below": 1.0}},
+        {"not": {"time": {"after": 0.0}}},
+        {"any": [{"time": {"after": 300.0}}, {"ttc": {"to": "other", "below": 0.1}}]},
+        {"time": {"after": 300.0}, "delay": 1.0},
+    ],
+)
+def test_what_may_be_met_at_once_is_read_in_each(when: dict[str, Any]) -> None:
+    bodies = (CAR, replace(CAR, id="other", x=2000.0))
+    _, patient = _story([when], patient=True, step=0.1, bodies=bodies)
+    _, always = _story([when], patient=False, step=0.1, bodies=bodies)
+    assert patient == always
+
+
+def test_whoever_is_put_elsewhere_is_seen_there_in_the_next_step() -> None:
+    engine = StoryEngine([rule({"distance": {"to": "other", "below": 3.0}})], step=0.1)
+    road = Road((CAR, replace(CAR, id="other", x=2000.0, speed=0.0)), engine.rule_changes)
+    engine.step(road)
+    road.actors = (CAR, replace(CAR, id="other", x=6.0, speed=0.0))
+    engine.look_at_all()
+    road.time = 0.1
+    assert started(engine.step(road)[1]) == pytest.approx([0.1], abs=0.1)
+
+
+def test_spells_go_on_after_a_saved_state() -> None:
+    rules = [rule({"travelled": {"above": 100.0}})]
+    whole, _ = _story([{"travelled": {"above": 100.0}}], patient=True, step=0.1, bodies=(CAR,))
+    engine = StoryEngine(rules, step=0.1)
+    road = _CountedRoad((CAR,), engine.rule_changes)
+    events: list[StoryEvent] = []
+    for number in range(150):
+        if number == 7:
+            saved, engine = engine.state(), StoryEngine(rules, step=0.1)
+            engine.restore(saved)
+            road.looks = 0
+        road.time = number * 0.1
+        events += engine.step(road)[1]
+        assert number != 8 or road.looks == 0
+    assert [one.time for one in events] == [one.time for one in whole]
