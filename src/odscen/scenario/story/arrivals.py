@@ -102,7 +102,7 @@ def _rest(
 
 def _on_line(actor: ActorView, place: RulePlace, view: RoadView, channel: Channel) -> float | None:
     """Metres from the centre to a place that the actor's line leads by; ``None`` without one."""
-    if channel.line is None:
+    if channel.line is None or channel.held:  # what is held stands, whatever line that is on
         return None
     there = beside(channel.line, view.place(place))
     centre = channel.along - (0.0 if actor.person else actor.length / 2.0)
