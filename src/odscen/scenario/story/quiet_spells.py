@@ -9,7 +9,7 @@ before, as the instant at which it comes true follows from its last two readings
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.document.rules_document import actors_of, rule_parts
 
@@ -47,7 +47,7 @@ class QuietSpells:
         self._step = step
         self._until: dict[str, float] = {}
         self._actors: dict[str, frozenset[str]] = {}
-        self._never: set[str] = set()
+        self._nodes: dict[str, _Node | None] = {}
 
     def lasts(self, rule: StoryRule, time: float, moved: Collection[str]) -> bool:
         """Whether a rule is not to be looked at; it is when one of its actors is being moved."""
@@ -62,14 +62,13 @@ class QuietSpells:
     def begins(self, rule: StoryRule, view: RoadView, moved: Collection[str]) -> bool:
         """Whether a rule whose condition is not met, and will not be in this step, is left now."""
         name = rule.id
-        if name in self._never:
-            return False
-        if name not in self._actors:
-            if not _can_be_told(rule):
-                self._never.add(name)
-                return False
+        if name not in self._nodes:
+            self._nodes[name] = _node(rule.when) if _can_be_told(rule) else None
             self._actors[name] = _about(rule)
-        seconds = min(quiet_seconds(rule.when, rule.actor, view), LONGEST)
+        node = self._nodes[name]
+        if node is None:
+            return False
+        seconds = min(quiet_seconds(node, rule.actor, view), LONGEST)
         until = view.time + seconds - BEFORE * self._step
         if until <= view.time + self._step or not self._actors[name].isdisjoint(moved):
             return False
@@ -91,14 +90,33 @@ class QuietSpells:
             self._until[name] = until
 
 
-def quiet_seconds(condition: Condition, actor: str, view: RoadView) -> float:
+def quiet_seconds(node: _Node, actor: str, view: RoadView) -> float:
     """Seconds for which a condition that is not met surely stays so; 0 if that cannot be told."""
+    tell, part, below, every = node
+    if tell is not None:
+        seconds = tell(part, actor, view)
+        return max(0.0, seconds)
+    if not below:
+        return 0.0
+    parts = [quiet_seconds(one, actor, view) for one in below]
+    return max(parts) if every else min(parts)
+
+
+class _Node(NamedTuple):
+    """A condition, taken apart once: a leaf that can be told, or what it is combined of."""
+
+    tell: Callable[[Any, str, RoadView], float] | None
+    part: Any
+    below: tuple[_Node, ...] = ()
+    every: bool = False
+
+
+def _node(condition: Condition) -> _Node:
     kind = condition.kind
+    part = getattr(condition, kind)
     if kind in ("all", "any"):
-        parts = [quiet_seconds(one, actor, view) for one in getattr(condition, kind)]
-        return max(parts) if kind == "all" else min(parts)
-    tell = _TELL.get(kind)
-    return 0.0 if tell is None else max(tell(getattr(condition, kind), actor, view), 0.0)
+        return _Node(None, None, tuple(map(_node, part)), kind == "all")
+    return _Node(_TELL.get(kind), part)
 
 
 def _can_be_told(rule: StoryRule) -> bool:

@@ -179,9 +179,9 @@ class StoryEngine:
             else:
                 self._channels[name].begin_step(actor, view.time)
         for name, rule in self._rules.items():
-            state = self._states[name]
-            for one in list(state.running):
-                self._update(view, rule, one, view.time)
+            if running := self._states[name].running:
+                for one in list(running):
+                    self._update(view, rule, one, view.time)
 
     def _gone(self, view: RoadView, actor: str) -> None:
         """End what an actor does that has left the road."""
