@@ -47,7 +47,7 @@ class QuietSpells:
         self._step = step
         self._until: dict[str, float] = {}
         self._actors: dict[str, frozenset[str]] = {}
-        self._nodes: dict[str, _Node | None] = {}
+        self._tellers: dict[str, _Teller | None] = {}
 
     def lasts(self, rule: StoryRule, time: float, moved: Collection[str]) -> bool:
         """Whether a rule is not to be looked at; it is when one of its actors is being moved."""
@@ -62,13 +62,13 @@ class QuietSpells:
     def begins(self, rule: StoryRule, view: RoadView, moved: Collection[str]) -> bool:
         """Whether a rule whose condition is not met, and will not be in this step, is left now."""
         name = rule.id
-        if name not in self._nodes:
-            self._nodes[name] = _node(rule.when) if _can_be_told(rule) else None
+        if name not in self._tellers:
+            self._tellers[name] = _teller(rule.when) if _can_be_told(rule) else None
             self._actors[name] = _about(rule)
-        node = self._nodes[name]
-        if node is None:
+        teller = self._tellers[name]
+        if teller is None:
             return False
-        seconds = min(quiet_seconds(node, rule.actor, view), LONGEST)
+        seconds = min(quiet_seconds(teller, rule.actor, view), LONGEST)
         until = view.time + seconds - BEFORE * self._step
         if until <= view.time + self._step or not self._actors[name].isdisjoint(moved):
             return False
@@ -90,9 +90,9 @@ class QuietSpells:
             self._until[name] = until
 
 
-def quiet_seconds(node: _Node, actor: str, view: RoadView) -> float:
+def quiet_seconds(teller: _Teller, actor: str, view: RoadView) -> float:
     """Seconds for which a condition that is not met surely stays so; 0 if that cannot be told."""
-    tell, part, below, every = node
+    tell, part, below, every = teller
     if tell is not None:
         seconds = tell(part, actor, view)
         return max(0.0, seconds)
@@ -102,21 +102,21 @@ def quiet_seconds(node: _Node, actor: str, view: RoadView) -> float:
     return max(parts) if every else min(parts)
 
 
-class _Node(NamedTuple):
+class _Teller(NamedTuple):
     """A condition, taken apart once: a leaf that can be told, or what it is combined of."""
 
     tell: Callable[[Any, str, RoadView], float] | None
     part: Any
-    below: tuple[_Node, ...] = ()
+    below: tuple[_Teller, ...] = ()
     every: bool = False
 
 
-def _node(condition: Condition) -> _Node:
+def _teller(condition: Condition) -> _Teller:
     kind = condition.kind
     part = getattr(condition, kind)
     if kind in ("all", "any"):
-        return _Node(None, None, tuple(map(_node, part)), kind == "all")
-    return _Node(_TELL.get(kind), part)
+        return _Teller(None, None, tuple(map(_teller, part)), kind == "all")
+    return _Teller(_TELL.get(kind), part)
 
 
 def _can_be_told(rule: StoryRule) -> bool:
