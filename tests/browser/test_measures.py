@@ -139,8 +139,9 @@ def test_a_light_is_put_out_of_order_with_the_keyboard_alone(
     press(user, user.step("Measures"))
     user.tab_to(user.page.get_by_role("textbox", name="Kind of measure"))
     keyboard.press("Enter")
-    keyboard.type("Signal")
-    for _ in range(5):
+    wanted = user.page.get_by_role("option", name="Signal")
+    expect(wanted).to_be_visible()
+    while wanted.get_attribute("data-combobox-selected") is None:
         keyboard.press("ArrowDown")
     keyboard.press("Enter")
     user.tab_to(user.page.get_by_role("textbox", name="or its junction"))

@@ -25,9 +25,11 @@ if TYPE_CHECKING:
     from odscen.sumo.folder.finished_run import Run
 
 MOTORWAY = "motorway_weave"
+ROOT = str(Path(__file__).parents[4])
 RECORDS = ("trajectories.parquet", "events.json", "actors.json")
 SERVE = """
 import sys
+sys.path.insert(0, {!r})
 from odscen.learning.behaviour.behaviour_messages import serve
 from tests.sumo.worker.behaviour import models
 serve(models.{})
@@ -125,7 +127,7 @@ def test_what_cannot_be_ends_the_run_with_instant_and_value(
 
 def test_a_program_over_a_pipe_drives_as_the_class_does(tmp_path: Path) -> None:
     script = tmp_path / "drive.py"
-    script.write_text(SERVE.format("Only('ahead', 1, 3.0)"))
+    script.write_text(SERVE.format(ROOT, "Only('ahead', 1, 3.0)"))
     run = driven(tmp_path / "piped", command=f"{sys.executable} {script}")
     own = driven(tmp_path / "own", **only(DrivingKind.SPEED_UNCHECKED, 3.0))
     for name in RECORDS:
