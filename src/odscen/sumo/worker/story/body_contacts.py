@@ -61,9 +61,7 @@ class BodyContacts:
                 continue
             for other in self._others(one, road, named):
                 pair = min(one.id, other.id), max(one.id, other.id)
-                if pair in touching or not _near(one, other):
-                    continue
-                if overlap(one.corners, other.corners):
+                if pair not in touching and overlap(one.corners, other.corners):
                     touching.add(pair)
                     if pair not in self._touching:
                         events.append(_contact(one, other, time, step))
@@ -76,7 +74,12 @@ class BodyContacts:
     def _others(
         self, one: ActorView, road: MovedActors, named: Mapping[str, ActorView]
     ) -> Iterator[ActorView]:
-        yield from (other for name, other in named.items() if name != one.id)
+        """Those whose bodies may overlap with another's."""
+        x, y, own = one.x, one.y, one.length + one.width
+        for other in named.values():
+            reach = (own + other.length + other.width) / 2.0
+            if abs(x - other.x) < reach and abs(y - other.y) < reach and other is not one:
+                yield other
         lane = road.lane_of(one.id, person=one.person)
         if not lane:
             return
@@ -84,7 +87,7 @@ class BodyContacts:
             planned = self._planned.get(name)
             if name not in named and planned is not None:
                 other = stranger(road, planned, self._offset)
-                if other is not None:
+                if other is not None and _near(one, other):
                     yield other
 
 
