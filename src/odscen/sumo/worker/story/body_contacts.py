@@ -86,9 +86,9 @@ class BodyContacts:
         for name, _ in road.bodies_near(lane):
             planned = self._planned.get(name)
             if name not in named and planned is not None:
-                other = stranger(road, planned, self._offset)
-                if other is not None and _near(one, other):
-                    yield other
+                found = stranger(road, planned, self._offset)
+                if found is not None and _near(one, found):
+                    yield found
 
 
 def _near(one: ActorView, other: ActorView) -> bool:
