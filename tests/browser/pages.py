@@ -18,10 +18,12 @@ FAILED = "The run failed"
 
 ACTIONS = """
 window.odscenActions = {pointer: 0, key: 0};
-addEventListener('pointerdown', () => { window.odscenActions.pointer += 1; }, true);
-addEventListener('keydown', () => { window.odscenActions.key += 1; }, true);
+document.addEventListener('pointerdown', () => { window.odscenActions.pointer += 1; }, true);
+document.addEventListener('keydown', () => { window.odscenActions.key += 1; }, true);
 """
-"""Counts what the user does, in the page itself, so that no helper can forget to count."""
+"""Counts what the user does, in the page itself, so that no helper can forget to count. At the
+document: at the window, Playwright holds back a press whose target has just moved, and repeats it.
+"""
 
 _SETTLED = """element => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => requestAnimationFrame(() => done(element.dataset.view)))))"""
