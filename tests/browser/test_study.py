@@ -67,7 +67,9 @@ def test_times_and_a_cordon_are_set_with_the_keyboard_alone(
         keyboard.press("Enter")
     user.tab_to(user.page.get_by_role("textbox", name="Analysis interval"))
     keyboard.press("Enter")
-    for _ in range(2):
+    wanted = user.page.get_by_role("option", name="15 min")
+    expect(wanted).to_be_visible()
+    while wanted.get_attribute("data-combobox-selected") is None:
         keyboard.press("ArrowDown")
     with user.changing():
         keyboard.press("Enter")
@@ -75,7 +77,9 @@ def test_times_and_a_cordon_are_set_with_the_keyboard_alone(
     assert (study["warm_up"], study["interval"]) == (600, 900)
     user.tab_to(user.page.get_by_role("textbox", name="Kind of station"))
     keyboard.press("Enter")
-    for _ in range(2):
+    wanted = user.page.get_by_role("option", name="Cordon")
+    expect(wanted).to_be_visible()
+    while wanted.get_attribute("data-combobox-selected") is None:
         keyboard.press("ArrowDown")
     keyboard.press("Enter")
     lanes = [f"{outer_lane(user, road)}.1" for road in ("r2", "r3")]
