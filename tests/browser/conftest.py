@@ -25,7 +25,7 @@ from tools import page as tool
 ARTEFACTS = tool.ROOT / "build/browser"
 SHIPPED = tool.ROOT / "maps"
 CROSSING = "signal_crossing"
-PATIENCE = 20_000
+PATIENCE = 40_000
 """Milliseconds that a state may take to come about on a busy machine."""
 
 expect.set_options(timeout=PATIENCE)

@@ -60,7 +60,7 @@ class Driver:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        told, _ = self._process.communicate(timeout=30)
+        told, _ = self._process.communicate(timeout=120)
         self.ticks_of_others = int(told)
 
 

@@ -63,7 +63,7 @@ class Observer:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._process.communicate(timeout=60)
+        self._process.communicate(timeout=180)
         seen = json.loads(self._file.read_text())
         self.frames = [Frame(**frame) for frame in seen["frames"]]
         self.boxes = seen["boxes"]

@@ -29,7 +29,7 @@ def odscen(*arguments: object, cwd: Path | None = None) -> Finished:
         text=True,
         check=False,
         cwd=cwd,
-        timeout=120,
+        timeout=300,
     )
     return Finished(done.returncode, done.stdout, done.stderr)
 

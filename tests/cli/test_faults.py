@@ -58,7 +58,7 @@ def run_folder(out, scenario):
 
 
 def end_of(process) -> Finished:
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=300)
     assert "Traceback" not in err
     return Finished(process.returncode, out, err)
 
@@ -197,7 +197,7 @@ def test_too_few_handles_are_named_with_what_to_do(workspace, scenario, tmp_path
 
     process = start("run", scenario, "--until", "5", "--out", tmp_path / "r", "--json",
                     "--workspace", workspace, preexec_fn=limit)  # fmt: skip
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=300)
     assert process.returncode in (0, 3), err
     if process.returncode == 3:
         assert "too many files are open" in err

@@ -53,7 +53,7 @@ def test_an_interrupted_run_leaves_nothing(workspace, tmp_path):
         while process.poll() is None and not list(runs.glob(".building-*/trajectories.parquet")):
             time.sleep(0.01)
         os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=180)
     assert process.returncode == 130
     assert out == ""
     assert "Traceback" not in err
@@ -77,7 +77,7 @@ def test_a_long_run_that_is_interrupted_says_how_to_go_on_and_does(workspace, tm
         while process.poll() is None and not (folder / "slices" / "0001").is_dir():
             time.sleep(0.01)
         os.killpg(process.pid, signal.SIGINT)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=180)
     assert process.returncode == 130
     assert f"odscen resume {folder}" in err
     again = odscen(*command, "--out", folder.parent, *w)

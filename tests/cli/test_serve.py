@@ -28,7 +28,7 @@ def served(*arguments):
 
 
 def get(url):
-    with urllib.request.urlopen(url, timeout=20) as answer:
+    with urllib.request.urlopen(url, timeout=90) as answer:
         return answer.status, answer.read().decode()
 
 
@@ -39,7 +39,7 @@ def test_serve_answers_on_this_machine_until_it_is_interrupted(tmp_path):
         page, token = address.split("?token=")
         assert get(bearing(page + "api/health", token))[0] == 200
         process.send_signal(signal.SIGINT)
-        process.wait(timeout=20)
+        process.wait(timeout=90)
         assert "Traceback" not in process.stderr.read()
 
 
@@ -99,12 +99,12 @@ pathlib.Path({str(seen)!r}).write_text("\\n".join([sys.argv[1], mode, file.read_
         env=environment,
     ) as process:  # fmt: skip
         address = re.search(r"http://\S+", process.stderr.readline())[0]
-        end = time.monotonic() + 60
+        end = time.monotonic() + 120
         while not seen.exists() or len(seen.read_text()) < 50:
             assert time.monotonic() < end
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
-        process.wait(timeout=20)
+        process.wait(timeout=90)
     called, mode, text = seen.read_text().split("\n", 2)
     assert called.startswith("file:///")
     assert "token" not in called

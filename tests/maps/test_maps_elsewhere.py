@@ -109,7 +109,7 @@ def test_netconvert_makes_one_network_of_it(path, tmp_path):
         ],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -135,7 +135,7 @@ def test_asam_checks_find_nothing(path):
     if python is None:
         pytest.skip("asam-qc-opendrive is not here; `make check-maps` installs it")
     command = [str(python), str(ROOT / "tools" / "check_maps.py"), str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout
     completed = re.search(r"(\d+) checks completed, 0 issues", done.stdout)
     assert completed is not None

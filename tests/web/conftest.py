@@ -74,11 +74,11 @@ def serving(workspace: Workspace, **options: Any) -> Iterator[str]:
         yield f"127.0.0.1:{bound.getsockname()[1]}"
     finally:
         server.should_exit = True
-        thread.join(timeout=20)
+        thread.join(timeout=60)
     assert not thread.is_alive()
 
 
-def wait_for(condition: Callable[[], Any], *, seconds: float = 30.0) -> Any:
+def wait_for(condition: Callable[[], Any], *, seconds: float = 120.0) -> Any:
     """First true value of ``condition``."""
     end = time.monotonic() + seconds
     while not (value := condition()):

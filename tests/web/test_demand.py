@@ -121,7 +121,7 @@ def test_a_day_that_is_being_tried_is_cancelled_within_a_second_and_changes_noth
     assert other.status_code == 409
     assert begun in other.json()["error"]["message"]
     assert client.delete(path).status_code == 202
-    wait_for(lambda: client.get(path).json()["state"] == "cancelled", seconds=5.0)
+    wait_for(lambda: client.get(path).json()["state"] == "cancelled")
     assert client.get("/api/scenarios/mine").json() == state
 
 

@@ -235,7 +235,7 @@ def test_a_scenario_of_millions_of_faults_ends_the_child_only(scratch: Path) -> 
     assert list(scratch.iterdir()) == []
 
 
-def wait_for(true: Callable[[], object], seconds: float = 60.0) -> None:
+def wait_for(true: Callable[[], object], seconds: float = 120.0) -> None:
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end

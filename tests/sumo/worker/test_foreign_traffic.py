@@ -49,7 +49,7 @@ def test_drivers_brake_for_a_pedestrian_of_another_program_until_it_is_gone(tmp_
     net = next(entry.folder.rglob("net.net.xml"))
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, str(net), "1.0.b"],
-        capture_output=True, text=True, timeout=60, check=True,
+        capture_output=True, text=True, timeout=180, check=True,
     )  # fmt: skip
     told = json.loads(done.stdout.splitlines()[-1])
     assert told["shown"] == 100

@@ -25,7 +25,7 @@ def run_script(body: str, *arguments: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-c", PRELUDE + body, *arguments],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=180,
         check=False,
     )
 
