@@ -10,6 +10,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -59,7 +60,13 @@ def motorway(tmp_path: Path) -> Path:
 
 
 def children() -> list[psutil.Process]:
-    return [one for one in psutil.Process().children() if "child_worker" in " ".join(one.cmdline())]
+    return [one for one in psutil.Process().children() if "child_worker" in _command(one)]
+
+
+def _command(process: psutil.Process) -> str:
+    with suppress(psutil.ZombieProcess):  # one of another test that nothing has waited for
+        return " ".join(process.cmdline())
+    return ""
 
 
 def left(store: Workspace, scratch: Path) -> list[str]:
