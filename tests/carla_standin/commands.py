@@ -35,7 +35,7 @@ class BatchCalls:
             12: actors.take_note,
             13: actors.take_note,
             14: actors.simulate_physics,
-            15: actors.take_note,
+            15: actors.set_gravity,
             16: actors.autopilot,
             17: actors.note_vehicle,
             18: actors.set_light_flags,
