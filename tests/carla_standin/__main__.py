@@ -77,6 +77,7 @@ class StandIn:
                 "physics": actor.physics,
                 "autopilot": actor.autopilot,
                 "lights": actor.lights,
+                "wheels": actor.wheels,
             }
             for actor in self.world.actors.values()
         ]

@@ -163,6 +163,20 @@ class ActorCalls:
         self._world.of_kind(actor, Kind.VEHICLE)
         self._physics_controls[actor] = control
 
+    @rpc("set_wheel_steer_direction", Returns.VOID)
+    def steer_wheel(self, actor: int, wheel: int, angle: float) -> None:
+        self._turn_wheel(actor, wheel, 0, angle)
+
+    @rpc("set_wheel_pitch_angle", Returns.VOID)
+    def roll_wheel(self, actor: int, wheel: int, angle: float) -> None:
+        self._turn_wheel(actor, wheel, 1, angle)
+
+    def _turn_wheel(self, actor: int, wheel: int, kind: int, angle: float) -> None:
+        """Turn a wheel by hand, which acts only without physics (CarlaWheeledVehicle.cpp)."""
+        vehicle = self._world.of_kind(actor, Kind.VEHICLE)
+        if not vehicle.physics:
+            vehicle.wheels.setdefault(wheel, [0.0, 0.0])[kind] = angle
+
     # ------------------------------------------------------------------------------- walkers
     @rpc("apply_control_to_walker", Returns.VOID)
     def walk(self, actor: int, control: list[Any]) -> None:

@@ -41,6 +41,8 @@ class Kind(Enum):
 class Actor:
     """One actor. Angular velocities are deg/s; ``box`` is local, as a BoundingBox on the wire.
 
+    ``wheels`` are those turned by hand: steering and pitch, degrees, by number.
+
     Without ``physics`` an actor stays where it was put and reports velocity 0, whatever it was
     given, as on a real server (issues 7143, 3683 and 4774 of carla-simulator/carla). With it a
     vehicle falls to the ground and goes on its wheels, as its ``control`` says
@@ -68,6 +70,7 @@ class Actor:
     autopilot: bool = False
     dormant: bool = False
     lights: int = 0
+    wheels: dict[int, list[float]] = field(default_factory=dict)
     control: list[Any] = field(default_factory=lambda: list(_NO_CONTROL))
     walk: list[Any] = field(default_factory=lambda: list(_NO_WALK))
     kind: Kind = field(init=False)

@@ -163,6 +163,21 @@ def test_controls_and_lights_are_shown_as_they_were_set(connected: Connected) ->
     assert connected.world.get_vehicles_light_states()[car.id] == other
 
 
+def test_wheels_are_turned_by_hand_only_without_physics(connected: Connected) -> None:
+    car = connected.spawn(CAR, transform(0.0, 0.0))
+    left = carla.VehicleWheelLocation.FL_Wheel
+
+    def turned(angle: float) -> dict[str, list[float]]:
+        car.set_wheel_steer_direction(left, angle)
+        car.set_wheel_pitch_angle(left, -10.0 * angle)
+        connected.world.tick()
+        return next(a["wheels"] for a in connected.server.actors() if a["id"] == car.id)
+
+    assert turned(5.0) == {}
+    car.set_simulate_physics(False)
+    assert turned(6.0) == {"0": [6.0, -60.0]}
+
+
 def test_something_attached_goes_where_its_parent_goes(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0, yaw=90.0))
     camera = connected.spawn("sensor.camera.rgb", transform(2.0, 1.0, 1.5), attach_to=car)
