@@ -86,6 +86,15 @@ class RoadMap:
         walk = bool(self.walks[best])
         return self._height(best, x, y) + (kerb if walk else 0.0), walk
 
+    @cached_property
+    def _walk_tree(self) -> cKDTree:
+        return cKDTree(self.ground[self.walks, :2])
+
+    def walk_height(self, x: float, y: float) -> float:
+        """Height of the sidewalk that is nearest to a place; there has to be one on the map."""
+        nearest = self._walk_tree.query((x, y))[1]
+        return self._height(int(np.flatnonzero(self.walks)[nearest]), x, y)
+
     def _height(self, best: int, x: float, y: float) -> float:
         """Between a point and the next one of its lane, that way or the other."""
         here = self.ground[best]
