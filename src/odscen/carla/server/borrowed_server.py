@@ -216,6 +216,12 @@ class BorrowedServer:
         stamp = self._world.get_snapshot().timestamp
         return float(stamp.elapsed_seconds), float(stamp.delta_seconds)
 
+    def first_clock(self) -> tuple[float, float]:
+        """As :meth:`clock`, behind a call that is answered: a recording then has when this was."""
+        with self._answering():
+            self._world.get_settings()
+        return self.clock()
+
     def synchronize(self, delta: float, *, sensed_speed: bool = False) -> None:
         """Let the server wait for our ticks, each of ``delta`` simulated seconds.
 
