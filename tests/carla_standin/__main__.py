@@ -41,8 +41,10 @@ class StandIn:
         self.world.box_offset = options["box_offset"]
         self._world_calls = WorldCalls(self.world, self.streams, self.switches, maps=maps)
         actors, lights = ActorCalls(self.world, self.switches), LightCalls(self.world)
-        batch = BatchCalls(actors, lights, self._world_calls)
-        self.methods = MethodTable(self._world_calls, actors, lights, batch, switches=self.switches)
+        self._batch = BatchCalls(actors, lights, self._world_calls)
+        self.methods = MethodTable(
+            self._world_calls, actors, lights, self._batch, switches=self.switches
+        )
 
     def set(self, **switches: Any) -> None:
         """Change switches."""
@@ -61,6 +63,10 @@ class StandIn:
         """Parameters by which a world was made of an OpenDRIVE text, as they were sent."""
         return self._world_calls.generation
 
+    def commands(self) -> dict[int, list[Any]]:
+        """For each actor the last command that drove it or put it somewhere."""
+        return self._batch.last
+
     def load(self, name: str) -> None:
         """Load another map, as another client might."""
         self._world_calls.load(name)
@@ -77,6 +83,7 @@ class StandIn:
                 "physics": actor.physics,
                 "autopilot": actor.autopilot,
                 "lights": actor.lights,
+                "wheels": actor.wheels,
             }
             for actor in self.world.actors.values()
         ]

@@ -6,16 +6,18 @@ import os
 from typing import Any
 
 from tests.carla_standin import wire
-from tests.carla_standin.actors import MASS, Actor, Kind, turned
+from tests.carla_standin.actors import MASS, Actor, Kind
+from tests.carla_standin.driving import STEERING_CURVE, WHEEL_ANGLE
+from tests.carla_standin.poses import turned
 from tests.carla_standin.rpc import Returns, rpc
 from tests.carla_standin.switches import Switches
 from tests.carla_standin.world import World
 
 _NOTHING = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 0]
-_WHEEL = [3.5, 0.25, 70.0, 35.0, 1500.0, 3000.0, 2.0, 17.0, 1000.0, [0.0, 0.0, 0.0]]
+_WHEEL = [3.5, 0.25, WHEEL_ANGLE, 35.0, 1500.0, 3000.0, 2.0, 17.0, 1000.0, [0.0, 0.0, 0.0]]
 _PHYSICS = [
     [[0.0, 400.0], [5000.0, 400.0]], 5000.0, 1.0, 0.15, 2.0, 0.35, True, 0.0, 10.0, 4.0,
-    [[4.0, 0.5, 0.65]], MASS, 0.3, [0.0, 0.0, 0.0], [[0.0, 1.0], [100.0, 0.5]],
+    [[4.0, 0.5, 0.65]], MASS, 0.3, [0.0, 0.0, 0.0], [list(point) for point in STEERING_CURVE],
     [_WHEEL] * 4, False,
 ]  # fmt: skip
 
@@ -104,11 +106,14 @@ class ActorCalls:
 
     @rpc("add_actor_angular_impulse", Returns.VOID)
     @rpc("add_actor_torque", Returns.VOID)
-    @rpc("set_actor_enable_gravity", Returns.VOID)
     @rpc("set_actor_collisions", Returns.VOID)
     def take_note(self, actor: int, *_what: Any) -> None:
-        """Accept what has no effect here: actors have no inertia, weight or collisions."""
+        """Accept what has no effect here: actors have no moments of inertia and no collisions."""
         _ = self._world[actor]  # refuses an unknown one
+
+    @rpc("set_actor_enable_gravity", Returns.VOID)
+    def set_gravity(self, actor: int, on: bool) -> None:
+        self._world[actor].gravity = on
 
     @rpc("set_actor_simulate_physics", Returns.VOID)
     def simulate_physics(self, actor: int, on: bool) -> None:
@@ -157,6 +162,20 @@ class ActorCalls:
     def set_physics_control(self, actor: int, control: list[Any]) -> None:
         self._world.of_kind(actor, Kind.VEHICLE)
         self._physics_controls[actor] = control
+
+    @rpc("set_wheel_steer_direction", Returns.VOID)
+    def steer_wheel(self, actor: int, wheel: int, angle: float) -> None:
+        self._turn_wheel(actor, wheel, 0, angle)
+
+    @rpc("set_wheel_pitch_angle", Returns.VOID)
+    def roll_wheel(self, actor: int, wheel: int, angle: float) -> None:
+        self._turn_wheel(actor, wheel, 1, angle)
+
+    def _turn_wheel(self, actor: int, wheel: int, kind: int, angle: float) -> None:
+        """Turn a wheel by hand, which acts only without physics (CarlaWheeledVehicle.cpp)."""
+        vehicle = self._world.of_kind(actor, Kind.VEHICLE)
+        if not vehicle.physics:
+            vehicle.wheels.setdefault(wheel, [0.0, 0.0])[kind] = angle
 
     # ------------------------------------------------------------------------------- walkers
     @rpc("apply_control_to_walker", Returns.VOID)

@@ -8,8 +8,10 @@ from math import cos, hypot, radians, sin
 from typing import Any
 
 from odscen.scenario.placing.bodies import Box
-from tests.carla_standin import wire
+from tests.carla_standin import driving, wire
 from tests.carla_standin.blueprints import CAMERA
+from tests.carla_standin.driving import Ground
+from tests.carla_standin.poses import attached, turned
 from tests.carla_standin.wire import ZERO, Pose, Vector
 
 _NO_CONTROL = [0.0, 0.0, 0.0, False, False, False, 0]
@@ -39,9 +41,13 @@ class Kind(Enum):
 class Actor:
     """One actor. Angular velocities are deg/s; ``box`` is local, as a BoundingBox on the wire.
 
-    With ``physics`` an actor moves by its velocity from tick to tick; without, it stays where it
-    was put and reports velocity 0, whatever it was given, as on a real server (issues 7143, 3683
-    and 4774 of carla-simulator/carla). There is no gravity and no collision.
+    ``wheels`` are those turned by hand: steering and pitch, degrees, by number.
+
+    Without ``physics`` an actor stays where it was put and reports velocity 0, whatever it was
+    given, as on a real server (issues 7143, 3683 and 4774 of carla-simulator/carla). With it a
+    vehicle falls to the ground and goes on its wheels, as its ``control`` says
+    (:mod:`tests.carla_standin.driving`); without ``gravity``, and at a velocity that is kept for
+    it, it moves by its velocity, and so does a walker. Nothing collides.
     """
 
     id: int
@@ -60,9 +66,11 @@ class Actor:
     constant_velocity: Vector | None = None
     force: Vector = ZERO
     physics: bool = True
+    gravity: bool = True
     autopilot: bool = False
     dormant: bool = False
     lights: int = 0
+    wheels: dict[int, list[float]] = field(default_factory=dict)
     control: list[Any] = field(default_factory=lambda: list(_NO_CONTROL))
     walk: list[Any] = field(default_factory=lambda: list(_NO_WALK))
     kind: Kind = field(init=False)
@@ -126,7 +134,7 @@ class Actor:
         return Box(x + offset * ux, y + offset * uy, z, ux, uy, length, width)
 
     def drive(self, control: list[Any]) -> None:
-        """Take a VehicleControl; it is shown to clients and does not move the vehicle."""
+        """Take a VehicleControl: it acts from the next tick on, and is shown to clients."""
         self.control = control
         # No traffic light ever acts on a vehicle here: the client sees green.
         self.tail = wire.VEHICLE_TAIL.pack(*control, _SPEED_LIMIT, _GREEN, False, 0, 0)
@@ -152,8 +160,8 @@ class Actor:
         x, y, z = self.velocity
         self.velocity = (x + impulse[0] / MASS, y + impulse[1] / MASS, z + impulse[2] / MASS)
 
-    def advance(self, dt: float) -> None:
-        """Move by one tick of ``dt`` seconds."""
+    def advance(self, dt: float, ground: Ground) -> None:
+        """Move by one tick of ``dt`` seconds over ``ground``."""
         if self.parent is not None and self.relative is not None:
             self.at = attached(self.parent.at, self.relative)
             self.velocity = self.parent.velocity
@@ -164,9 +172,12 @@ class Actor:
             fx, fy, fz = self.force
             self.push((fx * dt, fy * dt, fz * dt))
             self.force = ZERO
+        if self.physics:
+            if self._on_wheels:
+                self._drive_on(dt, ground)
+            elif self.velocity != ZERO or self.angular != ZERO:
+                self._move(dt)
         velocity = self.velocity
-        if self.physics and (velocity != ZERO or self.angular != ZERO):
-            self._move(dt)
         if velocity != self.previous_velocity or self.acceleration != ZERO:
             (a, b, c), (d, e, f) = velocity, self.previous_velocity
             self.acceleration = ((a - d) / dt, (b - e) / dt, (c - f) / dt)
@@ -177,30 +188,23 @@ class Actor:
         if not self.physics:
             self._move(dt)
 
+    @property
+    def _on_wheels(self) -> bool:
+        return self.kind is Kind.VEHICLE and self.gravity and self.constant_velocity is None
+
+    def _drive_on(self, dt: float, ground: Ground) -> None:
+        length = 2.0 * self.box[1][0]
+        self.at, self.velocity, rate = driving.driven(
+            self.at,
+            self.velocity,
+            self.control,
+            wheelbase=driving.WHEELBASE_SHARE * length,
+            dt=dt,
+            ground=ground,
+        )
+        self.angular = (0.0, 0.0, rate)
+
     def _move(self, dt: float) -> None:
         x, y, z, pitch, yaw, roll = self.at
         vx, vy, vz = self.velocity
         self.at = (x + vx * dt, y + vy * dt, z + vz * dt, pitch, yaw + self.angular[2] * dt, roll)
-
-
-def turned(frame: Pose, local: Vector) -> Vector:
-    """Vector of a pose's frame in the world; Unreal's order of rotations, left-handed."""
-    _, _, _, pitch, yaw, roll = frame
-    sp, cp = sin(radians(pitch)), cos(radians(pitch))
-    sy, cy = sin(radians(yaw)), cos(radians(yaw))
-    sr, cr = sin(radians(roll)), cos(radians(roll))
-    x, y, z = local
-    return (
-        cp * cy * x + (cy * sp * sr - sy * cr) * y - (cy * sp * cr + sy * sr) * z,
-        cp * sy * x + (sy * sp * sr + cy * cr) * y - (sy * sp * cr - cy * sr) * z,
-        sp * x - cp * sr * y + cp * cr * z,
-    )
-
-
-def attached(parent: Pose, relative: Pose) -> Pose:
-    """Pose of something attached; rotations are added, which is exact for a level parent."""
-    dx, dy, dz = turned(parent, wire.vector(relative[:3]))
-    x, y, z, pitch, yaw, roll = parent
-    return (
-        x + dx, y + dy, z + dz, pitch + relative[3], yaw + relative[4], roll + relative[5]
-    )  # fmt: skip

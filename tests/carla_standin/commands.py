@@ -12,14 +12,23 @@ from tests.carla_standin.rpc import Returns, rpc
 from tests.carla_standin.world_calls import WorldCalls
 
 _SPAWN, _CONSOLE = 0, 20
+_PLACING = {2, 6, 7}
+"""Commands that drive an actor or put it somewhere."""
 
 
 class BatchCalls:
-    """``apply_batch``: a batch goes on after a command that is refused."""
+    """``apply_batch``: a batch goes on after a command that is refused.
+
+    Attributes
+    ----------
+    last
+        For each actor the last command that drove it or put it somewhere: index and arguments.
+    """
 
     def __init__(self, actors: ActorCalls, lights: LightCalls, world: WorldCalls) -> None:
         self._actors = actors
         self._world = world
+        self.last: dict[int, list[Any]] = {}
         self._commands: dict[int, Callable[..., Any]] = {
             1: actors.destroy,
             2: actors.drive,
@@ -35,7 +44,7 @@ class BatchCalls:
             12: actors.take_note,
             13: actors.take_note,
             14: actors.simulate_physics,
-            15: actors.take_note,
+            15: actors.set_gravity,
             16: actors.autopilot,
             17: actors.note_vehicle,
             18: actors.set_light_flags,
@@ -59,6 +68,8 @@ class BatchCalls:
             if index == _CONSOLE:
                 return wire.value_error("the console is not served")
             self._commands[index](*arguments)
+            if index in _PLACING:
+                self.last[arguments[0]] = command
         except wire.RefusedError as error:
             return wire.value_error(str(error))
         return wire.value(arguments[0])

@@ -101,6 +101,10 @@ class StandIn:
         """Parameters by which a world was made of an OpenDRIVE text, as they were sent."""
         return list(self._ask("generation"))
 
+    def commands(self) -> dict[int, list[Any]]:
+        """For each actor the last command of a batch that drove it or put it somewhere."""
+        return {int(actor): command for actor, command in self._ask("commands").items()}
+
     def set(self, **switches: Any) -> None:
         """Change switches of :class:`tests.carla_standin.switches.Switches`."""
         self._ask("set", **switches)

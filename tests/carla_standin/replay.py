@@ -3,7 +3,8 @@
 Started by :class:`tests.carla_standin.process.Replay`. Calls are answered from a transcript, in its
 order, and held against the calls that were recorded. States of the world are shown where they came
 between calls and answers; in a world that ran by itself the last one before a call waits a little,
-for a client may wait for it.
+for a client may wait for it. Where the client made no ticks, it goes by the states that it sees, of
+which only the newest counts: those between two of its calls are shown at once, with the last.
 """
 
 from __future__ import annotations
@@ -27,6 +28,11 @@ from tests.carla_standin.rpc import no_delay
 from tests.carla_standin.streams import StreamServer
 
 _HELD_SECONDS = 0.25
+_FOLLOWED_SECONDS = 0.15
+"""At least between an answer and the next states for a client that makes no ticks: all that it does
+meanwhile it did before they came."""
+_SEEN_SECONDS = 0.01
+"""For states to be seen before the answer that came behind them, on another connection."""
 _AHEAD = 40
 """Recorded calls that are looked through for one that comes at another time."""
 _MOST = 1000
@@ -66,6 +72,7 @@ class ReplayServer:
         self._pacing: asyncio.Task[None] | None = None
         self._calls: dict[int, list[int]] = defaultdict(list)
         self._answers: dict[tuple[int, int], int] = {}
+        self._follows = all(frame.name != "tick_cue" for frame in frames)
         for k, frame in enumerate(frames):
             if frame.kind is FrameKind.CALL:
                 self._calls[frame.connection].append(k)
@@ -173,15 +180,19 @@ class ReplayServer:
         return b"\x94\x01" + bytes(msgpack.packb(number)) + rest
 
     async def _show_until(self, position: int) -> None:
-        for k in range(self._shown, position):
-            await self._show(k)
+        shown = [await self._show(k) for k in range(self._shown, position)]
         self._shown = max(self._shown, position)
+        if self._follows and any(shown):
+            await asyncio.sleep(_SEEN_SECONDS)
 
-    async def _show(self, position: int) -> None:
+    async def _show(self, position: int) -> bool:
+        """Show a frame of the recording if it is a state, and say whether it is."""
         frame = self._frames[position]
-        if frame.kind is FrameKind.STATE:
-            await self.streams.settled()
-            self.streams.send(wire.WORLD_OBSERVER, frame.data)
+        if frame.kind is not FrameKind.STATE:
+            return False
+        await self.streams.settled()
+        self.streams.send(wire.WORLD_OBSERVER, frame.data)
+        return True
 
     async def _show_on(self, answer: int, name: str) -> None:
         """Show what came between an answer and the next call, when it came."""
@@ -194,6 +205,11 @@ class ReplayServer:
         loop = asyncio.get_running_loop()
         start = loop.time()
         states = [k for k in gap if self._frames[k].kind is FrameKind.STATE]
+        if self._follows and states:
+            after = self._frames[states[-1]].at - begun.at
+            await asyncio.sleep(max(after, _FOLLOWED_SECONDS))
+            await self._show_until(states[-1] + 1)
+            return
         for k in states:
             after = self._frames[k].at - begun.at
             if name != "tick_cue" and k == states[-1]:

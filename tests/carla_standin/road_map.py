@@ -6,10 +6,12 @@ Places are in CARLA's frame: y and yaw have the opposite sign of OpenDRIVE's.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from odscen.base.frames import CarlaPose, XodrPose, xodr_to_carla
 from odscen.opendrive.lanes import RoadTable
@@ -38,7 +40,7 @@ class RoadSign:
     at: Pose
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class RoadMap:
     """What the server knows of a map.
 
@@ -56,23 +58,42 @@ class RoadMap:
     walks: np.ndarray
     """Which of them are on sidewalks, shape ``(N,)``."""
 
+    @cached_property
+    def _tree(self) -> cKDTree | None:
+        return cKDTree(self.ground[:, :2]) if len(self.ground) else None
+
+    def _near(self, x: float, y: float) -> list[int]:
+        """Points that are near a place, in the order of the lanes."""
+        if self._tree is None:
+            return []
+        found: list[int] = self._tree.query_ball_point((x, y), _GROUND_NEAR, return_sorted=True)
+        return found
+
     def ground_at(self, x: float, y: float) -> np.ndarray:
         """Heights of the ground below and above a place; several where roads cross, or none."""
-        near = np.hypot(self.ground[:, 0] - x, self.ground[:, 1] - y) < _GROUND_NEAR
-        return self.ground[near, 2]
+        return self.ground[self._near(x, y), 2]
 
     def surface(self, x: float, y: float, z: float, kerb: float) -> tuple[float, bool] | None:
         """Height of what is below a place, and whether that is a sidewalk, ``kerb`` metres high.
 
         Sidewalks stand above the file's surface: pull request 2491 of carla-simulator/carla.
         """
-        away = np.hypot(self.ground[:, 0] - x, self.ground[:, 1] - y)
-        away[self.ground[:, 2] > z] = np.inf
-        if not len(away) or away.min() >= _GROUND_NEAR:
+        near = np.array(self._near(x, y), dtype=int)
+        near = near[self.ground[near, 2] <= z]
+        if not len(near):
             return None
-        best = int(np.argmin(away))
+        best = int(near[np.argmin(np.hypot(*(self.ground[near, :2] - (x, y)).T))])
         walk = bool(self.walks[best])
         return self._height(best, x, y) + (kerb if walk else 0.0), walk
+
+    @cached_property
+    def _walk_tree(self) -> cKDTree:
+        return cKDTree(self.ground[self.walks, :2])
+
+    def walk_height(self, x: float, y: float) -> float:
+        """Height of the sidewalk that is nearest to a place; there has to be one on the map."""
+        nearest = self._walk_tree.query((x, y))[1]
+        return self._height(int(np.flatnonzero(self.walks)[nearest]), x, y)
 
     def _height(self, best: int, x: float, y: float) -> float:
         """Between a point and the next one of its lane, that way or the other."""

@@ -62,6 +62,8 @@ class Switches:
         Seconds that a tick, and an answer on what is below a place, take more.
     keeps_actors
         Whether actors cannot be destroyed.
+    navigation
+        Whether a navigation mesh is served; clients keep its file in ``~/carlaCache``.
     large_map
         Whether actors that are further than ``actor_active_distance`` from all of a role with
         ``hero`` or ``ego_vehicle`` in it, or else from the spectator, become dormant with the next
@@ -94,6 +96,7 @@ class Switches:
     tick_seconds: float = 0.0
     ground_seconds: float = 0.0
     keeps_actors: bool = False
+    navigation: bool = False
     large_map: bool = False
     _ticks: int = 0
     _spawns: int = 0

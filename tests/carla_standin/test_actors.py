@@ -27,6 +27,7 @@ def flat(at: carla.Transform) -> list[float]:
 def test_a_spawned_vehicle_is_in_the_next_snapshot_where_it_was_put(connected: Connected) -> None:
     at = transform(12.25, -7.5, 0.3, pitch=2.0, yaw=-135.0, roll=1.0)
     car = connected.spawn(CAR, at)
+    car.set_enable_gravity(False)
     connected.world.tick()
     assert connected.world.get_snapshot().has_actor(car.id)
     assert flat(car.get_transform()) == pytest.approx(flat(at))
@@ -81,10 +82,11 @@ def test_a_destroyed_actor_is_gone_with_the_next_tick(connected: Connected) -> N
 
 def test_a_batch_spawns_moves_and_shows_all_in_one_tick(connected: Connected) -> None:
     places = [transform(10.0 * number, 3.0) for number in range(20)]
+    command, new = carla.command, carla.command.FutureActor
     spawn = [
-        carla.command.SpawnActor(connected.blueprint(CAR), at).then(
-            carla.command.ApplyTargetVelocity(carla.command.FutureActor, carla.Vector3D(3.0, 0, 0))
-        )
+        command.SpawnActor(connected.blueprint(CAR), at)
+        .then(command.SetEnableGravity(new, False))
+        .then(command.ApplyTargetVelocity(new, carla.Vector3D(3.0, 0, 0)))
         for at in places
     ]
     answers = connected.client.apply_batch_sync(spawn, True)
@@ -159,6 +161,21 @@ def test_controls_and_lights_are_shown_as_they_were_set(connected: Connected) ->
     batch = [carla.command.SetVehicleLightState(car.id, other)]
     connected.client.apply_batch_sync(batch, True)
     assert connected.world.get_vehicles_light_states()[car.id] == other
+
+
+def test_wheels_are_turned_by_hand_only_without_physics(connected: Connected) -> None:
+    car = connected.spawn(CAR, transform(0.0, 0.0))
+    left = carla.VehicleWheelLocation.FL_Wheel
+
+    def turned(angle: float) -> dict[str, list[float]]:
+        car.set_wheel_steer_direction(left, angle)
+        car.set_wheel_pitch_angle(left, -10.0 * angle)
+        connected.world.tick()
+        return next(a["wheels"] for a in connected.server.actors() if a["id"] == car.id)
+
+    assert turned(5.0) == {}
+    car.set_simulate_physics(False)
+    assert turned(6.0) == {"0": [6.0, -60.0]}
 
 
 def test_something_attached_goes_where_its_parent_goes(connected: Connected) -> None:
@@ -251,6 +268,7 @@ def test_every_command_of_the_client_is_understood(connected: Connected) -> None
 
 def test_a_push_and_a_pull_change_the_velocity(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0))
+    car.set_enable_gravity(False)  # off its wheels, it is not held to their direction
     mass = car.get_physics_control().mass
     car.add_impulse(carla.Vector3D(2.0 * mass, 0.0, 0.0))
     car.add_force(carla.Vector3D(0.0, mass, 0.0))

@@ -12,7 +12,7 @@ import numpy as np
 from odscen.scenario.placing.bodies import overlap
 from odscen.workspace.asset_catalogue import shipped_assets
 from tests.carla_standin import camera, wire
-from tests.carla_standin.actors import Actor, Kind, attached
+from tests.carla_standin.actors import Actor, Kind
 from tests.carla_standin.blueprints import (
     SIGN_TAG,
     TRAFFIC_LIGHT_TAG,
@@ -20,6 +20,7 @@ from tests.carla_standin.blueprints import (
     Definition,
     definitions,
 )
+from tests.carla_standin.poses import attached
 from tests.carla_standin.road_map import RoadMap, RoadSign
 from tests.carla_standin.streams import StreamServer
 from tests.carla_standin.switches import Switches
@@ -32,6 +33,8 @@ ASYNC_DELTA = 0.05
 _SETTINGS = [False, False, [False], True, 0.01, 10, 0.0, True, 3000.0, 2000.0, True]
 _SYNCHRONOUS, _FIXED_DELTA, _ACTIVE_DISTANCE = 0, 2, 9
 _HEROES = ("hero", "ego_vehicle")
+_SUNK = 1.0
+"""Metres by which a body may be below the ground that carries it."""
 _TRIGGER = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0], [0.0, 0.0, 0.0]]
 _POINT = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 
@@ -196,6 +199,11 @@ class World:
         """Height of what is below a place, and whether that is a sidewalk."""
         return self.map.surface(x, y, z, self._switches.kerb)
 
+    def _ground(self, x: float, y: float, z: float) -> float | None:
+        """Height of the ground below a body that stands on it, or has sunk in a little."""
+        found = self.surface(x, y, z + _SUNK)
+        return None if found is None else found[0]
+
     # ------------------------------------------------------------------------------- ticks
     def tick(self) -> int:
         """Let one tick pass and show it; the number of the new frame."""
@@ -204,7 +212,7 @@ class World:
         self.elapsed += dt * self._switches.time_factor
         # A parent is older than what is attached to it, and a dictionary keeps its order.
         for actor in self.actors.values():
-            actor.advance(dt)
+            actor.advance(dt, self._ground)
             if self._switches.walkers_drift and actor.kind is Kind.WALKER:
                 actor.drift(dt)
         if self._switches.large_map:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from tests.carla_standin import wire
+from tests.carla_standin.navigation import navigation_mesh
 from tests.carla_standin.road_map import RoadMap
 from tests.carla_standin.rpc import Returns, rpc
 from tests.carla_standin.streams import StreamServer
@@ -41,6 +43,7 @@ class WorldCalls:
         self._maps = maps
         self._copied = ""
         self.generation: list[Any] = []
+        self._meshes: dict[str, bytes] = {}
 
     @rpc("version")
     def version(self) -> str:
@@ -102,8 +105,25 @@ class WorldCalls:
         return [True, [[x, y, found[0]], 2 if found[1] else 1]]
 
     @rpc("get_required_files")
-    def required_files(self, _folder: str) -> list[str]:
-        return []
+    def required_files(self, folder: str) -> list[str]:
+        """Files that a client is to have. It keeps them by name, so the name is the content's."""
+        if folder != "Nav" or not self._navigation():
+            return []
+        digest = hashlib.sha256(self._navigation()).hexdigest()[:16]
+        return [f"{_FOLDER}/Nav/{PurePosixPath(self._world.map.name).name}-{digest}.bin"]
+
+    @rpc("request_file")
+    def file(self, _name: str) -> bytes:
+        return self._navigation()
+
+    def _navigation(self) -> bytes:
+        """Navigation mesh of the present map; empty if none is served."""
+        if not self._switches.navigation:
+            return b""
+        name = self._world.map.name
+        if name not in self._meshes:
+            self._meshes[name] = navigation_mesh(self._world.map, self._switches.kerb)
+        return self._meshes[name]
 
     @rpc("query_lights_state")
     @rpc("get_names_of_all_objects")

@@ -149,6 +149,12 @@ def cosim(
             "--sensed-speed", help="Let sensors see speeds: vehicles keep physics, without gravity."
         ),
     ] = False,
+    wheel_calls: Annotated[
+        int,
+        typer.Option(
+            min=0, help="Calls in a tick, at most, that turn wheels near the ego; 0 for none."
+        ),
+    ] = 24,
     weather: Annotated[
         bool, typer.Option("--weather/--no-weather", help="Whether weather acts on driving.")
     ] = True,
@@ -215,6 +221,7 @@ def cosim(
         load_map=load_map,
         parity=parity,
         sensed_speed=sensed_speed,
+        wheel_calls=wheel_calls,
         sensors=_sensors(sensor),
         hook=None if hook is None else load_hook(hook),
         pictures=Wish(frames, video, picture_rate),

@@ -25,13 +25,14 @@ from odscen.carla.server.protocol_transcript import (
 )
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
-from tests.carla.conftest import MAPS, Sample
+from tests.carla.conftest import MAPS, Sample, hero_pose, scenario_of
+from tests.carla.driver import Car, Driver
 from tests.carla_standin.process import Replay, StandIn
 from tests.carla_standin.replay import read
 
 carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
 
-CROSSING = MAPS / "signal_crossing.xodr"
+CROSSING, WEAVE = MAPS / "signal_crossing.xodr", MAPS / "motorway_weave.xodr"
 
 
 def mirrored(
@@ -91,6 +92,44 @@ def test_a_run_against_its_recording_makes_the_same_calls_and_comes_to_the_same(
     assert outcome["made"] > 60
     assert again == told
     for name in ("trajectories.parquet", "parity.parquet", "parity_lights.parquet"):
+        assert (folder / name).read_bytes() == (before / name).read_bytes(), name
+
+
+@pytest.mark.slow
+def test_a_run_by_another_clients_clock_can_be_replayed_as_well(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    """Which tick each call comes behind is in the recording, however fast the replay is."""
+    actor = {"id": "a", "category": "car", "spawn": "2.1.-1.40", "goal": "4.1.-1.200", "ego": True}
+    path = scenario_of(workspace, WEAVE, [actor], tmp_path)
+    transcript = tmp_path / "run.jsonl.gz"
+    parked = Car(hero_pose(workspace, WEAVE, "36.0.-1.40"), [(0.0, 0.0)])
+
+    def followed(address: Address, name: str) -> tuple[Path, int]:
+        (tmp_path / name).mkdir()
+        result, report = cosim(
+            workspace,
+            path,
+            CosimOptions(address, follow=True),
+            out=tmp_path / name,
+            settings=RunSettings(until=2.0, step_length=0.5),
+        )
+        assert (result.status, report.error, report.spawned) == ("completed", None, 1)
+        return result.folder, report.ticks
+
+    with (
+        StandIn(WEAVE, map_name=WEAVE.stem, refuse_grounded=False) as server,
+        Driver(server, parked, led=0.1),
+        recorded_protocol(Address(server.host, server.port, 30.0), transcript) as address,
+    ):
+        before, ticks = followed(address, "recorded")
+    assert not [frame for frame in read(transcript) if frame.name == "tick_cue"]
+    with Replay(transcript) as replay:
+        folder, again = followed(Address(replay.host, replay.port, 30.0), "replayed")
+        outcome = replay.outcome()
+    assert (outcome["differences"], outcome["left"], again) == ([], [], ticks)
+    assert outcome["made"] > 60
+    for name in ("trajectories.parquet", "parity.parquet"):
         assert (folder / name).read_bytes() == (before / name).read_bytes(), name
 
 

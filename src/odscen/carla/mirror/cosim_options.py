@@ -50,7 +50,10 @@ class CosimOptions:
     parity
         Whether both worlds are taken down and compared.
     sensed_speed
-        Whether vehicles keep physics, without gravity, so that sensors see their velocity.
+        Whether vehicles keep physics, without gravity, so that sensors see their velocity. Their
+        wheels are left alone then: a server turns none that has physics.
+    wheel_calls
+        Calls in a tick, at most, by which wheels of the vehicles nearest to the ego are turned.
     sensors
         What is attached to the ego and recorded, into ``sensors`` of the run's folder.
     hook
@@ -73,6 +76,7 @@ class CosimOptions:
     load_map: bool = True
     parity: bool = True
     sensed_speed: bool = False
+    wheel_calls: int = 24
     sensors: tuple[SensorWish, ...] = ()
     hook: Callable[[Any, Mapping[str, Any]], object] | None = None
     pictures: Wish = field(default_factory=Wish)

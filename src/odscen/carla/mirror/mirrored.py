@@ -12,6 +12,7 @@ from odscen.carla.mirror.actor_mirror import Mirror
 from odscen.carla.mirror.ego import ExternalEgo
 from odscen.carla.mirror.foreign_actors import ForeignActors
 from odscen.carla.mirror.walking_ground import WalkingGround
+from odscen.carla.mirror.wheels import Wheels
 from odscen.carla.server.batch import HEROES
 from odscen.carla.server.blueprints import choose_blueprints, size_differences
 from odscen.carla.server.environment import vehicle_lights, weather_parameters
@@ -48,6 +49,8 @@ class MirroredPlan:
         Who else is on the server and is to be seen by SUMO's traffic.
     ground
         Where pedestrians walk on the server.
+    wheels
+        How wheels are turned, if the server turns any.
     sizes
         Metres by which the length of a blueprint differs from the road user it represents.
     """
@@ -58,6 +61,7 @@ class MirroredPlan:
     ego: ExternalEgo | None
     foreign: ForeignActors | None
     ground: WalkingGround
+    wheels: Wheels | None
     sizes: dict[str, float]
 
     @classmethod
@@ -97,7 +101,10 @@ class MirroredPlan:
             )
         walks = np.array([actor.person for actor in plan.actors], dtype=np.bool_)
         ground = WalkingGround(server, walks)
-        return cls(mirror, blueprints, shapes, ego, foreign, ground, sizes)
+        wheels = None
+        if server.release.turns_wheels and not options.sensed_speed:
+            wheels = Wheels(plan, calls=options.wheel_calls)
+        return cls(mirror, blueprints, shapes, ego, foreign, ground, wheels, sizes)
 
 
 def _spectator(server: Server) -> tuple[float, float]:

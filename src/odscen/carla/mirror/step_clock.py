@@ -60,7 +60,7 @@ class FollowedTicks:
             If no tick comes.
         """
         if self._zero is None:
-            now, delta = self._server.clock()
+            now, delta = self._server.first_clock()
             self._zero = now + delta - step.time
         while True:
             now, delta = self._server.clock()

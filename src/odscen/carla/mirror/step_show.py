@@ -66,6 +66,7 @@ class StepShow:
         self._heads = heads
         self._ego = mirrored.ego
         self._ground = mirrored.ground
+        self._wheels = mirrored.wheels
         self._foreign = mirrored.foreign
         self._foreign_seen = False
         self._clock = clock
@@ -159,6 +160,7 @@ class StepShow:
             self._look(batch)
             waited = self._server.waited
             start = time.perf_counter()
+            self._turn_wheels(batch)
             self._mirror.answered(self._server.apply(batch))
             self._refuse_an_empty_world()
             took = time.perf_counter() - start
@@ -173,6 +175,12 @@ class StepShow:
         if shown is not None:
             for view in self.views:
                 batch.views.update(view(shown))
+
+    def _turn_wheels(self, batch: Batch) -> None:
+        """Let wheels near the ego go with what the tick shows."""
+        shown = self._mirror.shown
+        if shown is not None and self._wheels is not None:
+            batch.wheels.update(self._wheels.turned(shown, self._mirror.actors))
 
     def _refuse_an_empty_world(self) -> None:
         """Raise once one was tried again and again and the server has not taken any."""

@@ -178,7 +178,7 @@ class Traffic:
             if state is None:
                 continue
             pose = seen[row] = _pose(state)
-            speed = _length(state.get_velocity())
+            speed = _ground_speed(state, pose)
             if one.plan.person or not self._physics:
                 # The walker AI, and the Traffic Manager without physics, put road users where
                 # they are to be: at no velocity.
@@ -412,8 +412,10 @@ def _pose(state: Any) -> XodrPose:
     return carla_to_xodr(CarlaPose(place.x, place.y, place.z, turn.yaw, turn.pitch))
 
 
-def _length(vector: Any) -> float:
-    return math.hypot(vector.x, vector.y, vector.z)
+def _ground_speed(state: Any, pose: XodrPose) -> float:
+    """Speed along the slope, m/s; a vehicle that has just been made still falls, which is none."""
+    velocity = state.get_velocity()
+    return math.hypot(velocity.x, velocity.y) / math.cos(float(pose.pitch))
 
 
 def _free_port() -> int:

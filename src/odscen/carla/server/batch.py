@@ -16,6 +16,9 @@ A server refuses bodies that touch the ground, and takes them from 0.15 m on (is
 8313 of carla-simulator/carla); they are put on their place before the tick.
 """
 
+WHEEL_CALLS = 6
+"""Calls that turn the wheels of one vehicle: four that roll, two that are steered."""
+
 POSITION, LOW_BEAM, HIGH_BEAM, BRAKE, RIGHT, LEFT, FOG, SIREN = 1, 2, 4, 8, 16, 32, 128, 512
 """Bits of CARLA's ``VehicleLightState``; the siren's light is its ``Special1``."""
 
@@ -46,6 +49,13 @@ class Move(NamedTuple):
     velocity: Velocity
     speed: float
     walks: bool
+
+
+class WheelTurn(NamedTuple):
+    """How a vehicle's wheels stand, degrees: steered to the right, and rolled, ahead negative."""
+
+    steer: float
+    pitch: float
 
 
 class Shine(NamedTuple):
@@ -93,3 +103,5 @@ class Batch:
     """New places of cameras and of the spectator, by actor id."""
     signals: dict[int, str] = field(default_factory=dict)
     """New state (``Red``, ``Yellow``, ``Green``, ``Off``) of traffic lights, by actor id."""
+    wheels: dict[int, WheelTurn] = field(default_factory=dict)
+    """Wheels of vehicles without physics, by actor id."""

@@ -13,6 +13,7 @@ from odscen.carla.server.batch_commands import BatchCommands
 from odscen.carla.server.client import answering, connect
 from odscen.carla.server.releases import release_of
 from odscen.carla.server.server_lights import LightHold
+from odscen.carla.server.wheel_calls import WheelCalls
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -82,6 +83,7 @@ class BorrowedServer:
         self._settings: Any = None
         self._weather: Any = None
         self._lights = LightHold(self._carla)
+        self._wheels = WheelCalls(self._carla)
         self._unsure = False
         self._frame: int | None = None
         self._follows = follows
@@ -214,6 +216,12 @@ class BorrowedServer:
         stamp = self._world.get_snapshot().timestamp
         return float(stamp.elapsed_seconds), float(stamp.delta_seconds)
 
+    def first_clock(self) -> tuple[float, float]:
+        """As :meth:`clock`, behind a call that is answered: a recording then has when this was."""
+        with self._answering():
+            self._world.get_settings()
+        return self.clock()
+
     def synchronize(self, delta: float, *, sensed_speed: bool = False) -> None:
         """Let the server wait for our ticks, each of ``delta`` simulated seconds.
 
@@ -233,7 +241,7 @@ class BorrowedServer:
 
     # ------------------------------------------------------------------------------- ticks
     def apply(self, batch: Batch) -> list[int | str]:
-        """Do all of a batch, in one call but for lights that change, and make the tick.
+        """Do all of a batch, in one call but for lights and wheels, and make the tick.
 
         Returns
         -------
@@ -243,7 +251,9 @@ class BorrowedServer:
         commands = self._wording.commands(batch)
         with self._answering():
             self._lights.switch(batch.signals)
-            # Lights are switched without an answer, and a call that is answered keeps them from
+            self._wheels.turn(self._world, batch.wheels)
+            self._wheels.forget(batch.destroy)
+            # Lights and wheels get no answer, and a call that is answered keeps them from
             # landing after the tick (issue 8263 of carla-simulator/carla).
             responses = self._apply(commands) if commands or batch.signals else []
             self._own -= set(batch.destroy)

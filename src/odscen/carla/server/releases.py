@@ -43,6 +43,8 @@ class ReleaseAdapter:
         Whether a world can be made of an OpenDRIVE text.
     labels_ground
         Whether places carry the label of what they are of. Otherwise whatever is below is taken.
+    turns_wheels
+        Whether the wheels of vehicles without physics can be steered and rolled.
     warning
         What a user should know of it, in words; empty if there is nothing.
     """
@@ -50,6 +52,7 @@ class ReleaseAdapter:
     number: str
     generates_worlds: bool = True
     labels_ground: bool = True
+    turns_wheels: bool = True
     warning: str = ""
 
     def fixed_delta(self, settings: Any) -> float | None:
@@ -85,13 +88,14 @@ _NEVER_TRIED = "CARLA {} was never tried, not even on a stand-in: {}"
 _AS_TRIED = "it is taken to be as 0.9.16"
 
 RELEASES = (
-    ReleaseAdapter("0.9.15", warning=_NEVER_TRIED.format("0.9.15", _AS_TRIED)),
+    ReleaseAdapter("0.9.15", turns_wheels=False, warning=_NEVER_TRIED.format("0.9.15", _AS_TRIED)),
     ReleaseAdapter("0.9.16"),
     ReleaseAdapter(
         "0.10.0",
         generates_worlds=False,
         # Semantic labels were made anew, and Town 10's road has potholes and speed bumps.
         labels_ground=False,
+        turns_wheels=False,
         warning=_NEVER_TRIED.format(
             "0.10.0",
             "it is said to have two maps and 13 models of vehicles, none on two wheels, other "
