@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.app.runs import run
 from odscen.app.scenario_imports import import_scenario
-from odscen.base.errors import OdscenError
+from odscen.base.errors import NoMapError, OdscenError
 from odscen.base.xml_reading import read_xml
 from odscen.workspace.store import Workspace
 
@@ -100,6 +100,10 @@ def _one(file: Path, maps: Path, folder: Path, ego: EgoDriver) -> None:
     workspace = Workspace.open(folder / "workspace")
     try:
         found = import_scenario(workspace, file, maps=maps if maps.is_dir() else None, ego=ego)
+    except NoMapError as error:
+        counts = {one: len(error.lists[one]) for one in VERDICTS}
+        print(json.dumps({"run": "no map", "report": counts}))
+        return
     except OdscenError as error:
         print(json.dumps({"run": f"no import: {error}"}))
         return
@@ -139,10 +143,12 @@ def _totals(rows: list[dict[str, Any]]) -> None:
     checked = [one for one in imported if not one["errors"]]
     ran = [one for one in rows if one.get("run") == "completed"]
     rules, fired = (sum(one.get(key, 0) for one in ran) for key in ("rules", "fired"))
+    share = 100 * len(whole) / max(len(rows), 1)
+    mapless = sum("report" in one for one in rows)
     print(
-        f"{len(rows)} files: {len(imported)} imported, {len(whole)} of them with nothing refused "
-        f"({100 * len(whole) / max(len(rows), 1):.0f} %), {len(checked)} without errors, "
-        f"{len(ran)} ran; of {rules} rules {fired} fired"
+        f"{len(rows)} files: {mapless} without a map have a report, {len(imported)} imported, "
+        f"{len(whole)} of them with nothing refused ({share:.0f} %), "
+        f"{len(checked)} without errors, {len(ran)} ran; of {rules} rules {fired} fired"
     )
 
 

@@ -296,10 +296,14 @@ def test_two_that_start_on_one_node_start_behind_one_another(
     assert [one for one in found.problems if one.severity == "error"] == []
 
 
-def test_a_gap_ahead_in_the_story_is_kept_ahead(workspace: Workspace, tmp_path: Path) -> None:
+@pytest.mark.parametrize("once", [True, False])
+def test_a_gap_ahead_in_the_story_is_kept_ahead_or_reached_once(
+    workspace: Workspace, tmp_path: Path, *, once: bool
+) -> None:
+    continuous = "false" if once else "true"
     gap = (
         '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="30" '
-        'continuous="true" freespace="true" displacement="leadingReferencedEntity"/>'
+        f'continuous="{continuous}" freespace="true" displacement="leadingReferencedEntity"/>'
         "</LongitudinalAction>"
     )
     found = read(workspace, tmp_path, init=added(101), story=event(private(gap)))
@@ -307,7 +311,7 @@ def test_a_gap_ahead_in_the_story_is_kept_ahead(workspace: Workspace, tmp_path: 
     (rule,) = (one for one in found.scenario.rules if one.id == "e")
     keep = rule.then[0].keep_gap
     assert keep is not None
-    assert (keep.to, keep.metres, keep.ahead) == ("Ego", 30, True)
+    assert (keep.to, keep.metres, keep.ahead, keep.once) == ("Ego", 30, True, once)
 
 
 def lane_change(lane: int) -> str:

@@ -222,7 +222,7 @@ def _keep_gap(made: Actions, part: Any, _actor: str, where: str) -> list[_Elemen
                     "LongitudinalDistanceAction",
                     limits,
                     entityRef=part.to,
-                    continuous=True,
+                    continuous=not part.once,
                     freespace=True,
                     distance=part.metres,
                     timeGap=part.seconds,

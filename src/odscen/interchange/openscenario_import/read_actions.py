@@ -272,10 +272,13 @@ def _gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
         rate = report.number(limits, "maxAcceleration", 3.0)
         part["rate"] = min(max(rate, 0.1), 100.0)
         report.mark(limits, "approximated", "maxAcceleration holds for braking too")
+    if kind.get("continuous") == "false":
+        part["once"] = True
+        if limits is None:
+            words = "reached by driving with 3 m/s², not at once"
+            report.mark(kind, "approximated", words)
     if kind.get("freespace") == "false":
         report.mark(kind, "approximated", "between bodies, not reference points")
-    elif kind.get("continuous") == "false":
-        report.mark(kind, "approximated", "kept on when it is reached")
     return {"keep_gap": part}
 
 
