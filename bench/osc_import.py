@@ -37,7 +37,7 @@ def main() -> None:
     options = _options()
     rows = []
     with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
-        files = sorted(one for one in options.folder.rglob(options.files) if _is_scenario(one))
+        files = sorted(one for one in options.folder.rglob(options.files) if is_scenario(one))
         head = [one[:8] for one in VERDICTS]
         print(f"{'file':<60} {' '.join(f'{one:>8}' for one in head)}  rules  fired  run")
         for file in files:
@@ -63,7 +63,8 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _is_scenario(file: Path) -> bool:
+def is_scenario(file: Path) -> bool:
+    """Whether a file is no catalog; one that cannot be read may be a scenario."""
     try:
         return read_xml(file.read_bytes(), bare=True).find("Catalog") is None
     except OdscenError:

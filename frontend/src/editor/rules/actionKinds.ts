@@ -153,7 +153,8 @@ export const ACTION_KINDS: Record<ActionKind, Kind> = {
       { is: "flag", name: "once", label: "Only until it is reached", otherwise: false },
     ],
     words: (v) =>
-      `${v.once === true ? "reach" : "keep"} a gap of ${given(v.metres) ? amount(v.metres, "m") : amount(v.seconds, "s")} ` +
+      `${v.once === true ? "reach" : "keep"} a gap of ` +
+      `${given(v.metres) ? amount(v.metres, "m") : amount(v.seconds, "s")} ` +
       `${v.ahead === true ? "ahead of" : "to"} ${text(v.to)}` +
       `, at ${amount(v.rate, "m/s²")} at most` +
       maybe(v.lasting, ", for", "s"),
