@@ -296,6 +296,22 @@ def test_two_that_start_on_one_node_start_behind_one_another(
     assert [one for one in found.problems if one.severity == "error"] == []
 
 
+@pytest.mark.parametrize(("ahead", "refused"), [(0, 0), (5, 2)])
+def test_who_is_only_lifted_stays_and_who_jumps_from_where_it_is_then_is_refused(
+    workspace: Workspace, tmp_path: Path, ahead: float, refused: int
+) -> None:
+    jump = (
+        '<TeleportAction><Position><RelativeObjectPosition entityRef="Other" '
+        f'dx="{ahead}" dy="0" dz="0.3"/></Position></TeleportAction>'
+    )
+    found = read(workspace, tmp_path, init=added(101), story=event(private(jump)))
+    assert len(found.lists["refused"]) == refused
+    assert not any(rule.id == "e" for rule in found.scenario.rules)
+    words = "height or tilt" if not refused else "is known in the run only"
+    said = reasons(found, "refused" if refused else "approximated")
+    assert any(words in one for one in said)
+
+
 @pytest.mark.parametrize("once", [True, False])
 def test_a_gap_ahead_in_the_story_is_kept_ahead_or_reached_once(
     workspace: Workspace, tmp_path: Path, *, once: bool
