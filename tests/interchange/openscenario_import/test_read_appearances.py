@@ -285,14 +285,18 @@ def test_a_vehicle_that_starts_beside_all_lanes_is_there_a_step_later(
     )
 
 
-def test_two_that_start_on_one_node_start_behind_one_another(
-    workspace: Workspace, tmp_path: Path
+@pytest.mark.parametrize(
+    ("s", "spawn", "metres"), [(51, "0.0.-1.22", 6), (54, "0.0.-1.21", 12), (60, "0.0.-1.29", 0)]
+)
+def test_two_that_start_on_one_ground_start_behind_one_another(
+    workspace: Workspace, tmp_path: Path, s: float, spawn: str, metres: int
 ) -> None:
-    found = read(workspace, tmp_path, init=f"{at_first(place(51))}</Private>")
+    found = read(workspace, tmp_path, init=f"{at_first(place(s))}</Private>")
     ego, other = found.scenario.actors
     assert ego.spawn == "0.0.-1.25"
-    assert other.spawn == "0.0.-1.22"
-    assert "about 6 m behind, as another one starts there" in reasons(found, "approximated")
+    assert other.spawn == spawn
+    words = f"about {metres} m behind, as another one starts there"
+    assert (words in reasons(found, "approximated")) == (metres > 0)
     assert [one for one in found.problems if one.severity == "error"] == []
 
 

@@ -159,7 +159,8 @@ class InitReader:
                 else:
                     report.mark(error.element, "refused", error.reason)
                 continue
-            self._places.leave_room(entity, made, {str(one["spawn"]) for one in found})
+            if entity.own is None:  # others of ours may depart later from one place
+                self._places.leave_room(entity, made, {str(one["spawn"]) for one in found})
             found.append(made)
             self.placed.add(entity.id)
         for name in [n for n, one in self._entities.items() if one.id not in self.placed]:
@@ -211,7 +212,7 @@ class InitReader:
             left = self._places.aside(entity, centre)
             made |= self._places.vehicle(entity, centre) | {"style": STEADY, "initial_speed": first}
             goals = [one["goal"]["to"] for one in then if "goal" in one]
-            made |= {"goal": goals[-1]} if goals else {}
+            made |= {"goal": self._places.reached(entity, made, goals[-1])} if goals else {}
             then = [one for one in then if "goal" not in one]
             if not changes:
                 then.append({"speed": {"to": 0.0, "shape": "step"}})
