@@ -286,7 +286,7 @@ def test_a_vehicle_that_starts_beside_all_lanes_is_there_a_step_later(
 
 
 @pytest.mark.parametrize(
-    ("s", "spawn", "metres"), [(51, "0.0.-1.22", 6), (54, "0.0.-1.21", 12), (60, "0.0.-1.29", 0)]
+    ("s", "spawn", "metres"), [(51, "0.0.-1.22", 6), (54, "0.0.-1.21", 12), (60, "0.0.-1.30", 0)]
 )
 def test_two_that_start_on_one_ground_start_behind_one_another(
     workspace: Workspace, tmp_path: Path, s: float, spawn: str, metres: int
