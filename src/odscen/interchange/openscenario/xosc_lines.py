@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario.dialect import xml
@@ -12,12 +12,14 @@ from odscen.interchange.openscenario.xosc_places import GroundPose
 from odscen.interchange.openscenario.xosc_presence import private, speed_action
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from lxml.etree import _Element
 
-    from odscen.interchange.openscenario.dialect import Dialect
-    from odscen.interchange.openscenario.xosc_actions import Actions
+    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes
+    from odscen.interchange.openscenario.xosc_places import Places
+    from odscen.scenario.document.rules_document import StoryRule
+    from odscen.scenario.document.scenario_document import Actor
 
 _USUAL_SPEED: Final = 10.0
 """m/s of paths without a speed."""
@@ -27,6 +29,34 @@ _RUN_UP: Final = 0.1
 """Metres by which a line begins before its first point, of who is elsewhere by then."""
 _STAYS: Final = frozenset({"appear", "stop", "brake", "lights", "horn", "signal", "ignore"})
 """Actions after which a standing actor is where it was, or where it appears."""
+
+
+class Making(Protocol):
+    """What makes the actions of rules, as lines need it."""
+
+    @property
+    def places(self) -> Places:
+        """Nodes and bodies."""
+
+    @property
+    def notes(self) -> ExportNotes:
+        """What is only approximated."""
+
+    @property
+    def actors(self) -> Mapping[str, Actor]:
+        """Actors of the scenario by id."""
+
+    @property
+    def rules(self) -> Sequence[StoryRule]:
+        """Rules of the scenario."""
+
+    def before(self, part: Any, actor: str) -> Iterator[Any]:
+        """Actions of an actor that stand before one."""
+
+    def trajectory(
+        self, name: str, spots: Sequence[GroundPose], times: Sequence[float], *, timed: bool
+    ) -> _Element:
+        """``RoutingAction`` that leads along points."""
 
 
 def follow_line(
@@ -60,7 +90,7 @@ def follow_line(
     return private(xml("RoutingAction", follow))
 
 
-def path(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
+def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     """Trajectory of the reference point of an actor whose front follows a path."""
     spots, times = [made.places.spot(place) for place in part.points], list(part.times or ())
     own = made.actors[actor]
@@ -97,7 +127,7 @@ def timed(spots: Sequence[GroundPose], speed: float) -> tuple[list[GroundPose], 
     return list(spots), times
 
 
-def replay(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
+def replay(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     """Trajectory of a recording; a jump if it only puts the actor somewhere."""
     back = made.places.centre_ahead(made.actors[actor])
     level = made.places.start(made.actors[actor]).z
@@ -109,7 +139,7 @@ def replay(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     return [made.trajectory(f"{actor}: {where}", spots, times, timed=True)]
 
 
-def _begins(made: Actions, part: Any, actor: str) -> GroundPose | None:
+def _begins(made: Making, part: Any, actor: str) -> GroundPose | None:
     """Where the reference point of an actor is when it begins a path, if that is known.
 
     It is known at first, and of who stands until then.

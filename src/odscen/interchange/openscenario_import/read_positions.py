@@ -383,5 +383,11 @@ class Nowhere(PositionReader):
         object.__setattr__(self, "why", why)
 
     def point(self, position: _Element) -> MapPoint:
-        """Refuse a position."""
+        """Refuse a position.
+
+        Raises
+        ------
+        RefusedError
+            Always.
+        """
         raise RefusedError(self.report.only(position), self.why)
