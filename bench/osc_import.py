@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.app.runs import run
 from odscen.app.scenario_imports import import_scenario
-from odscen.base.errors import OdscenError
+from odscen.base.errors import NoMapError, OdscenError
 from odscen.base.xml_reading import read_xml
 from odscen.workspace.store import Workspace
 
@@ -37,7 +37,7 @@ def main() -> None:
     options = _options()
     rows = []
     with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
-        files = sorted(one for one in options.folder.rglob(options.files) if _is_scenario(one))
+        files = sorted(one for one in options.folder.rglob(options.files) if is_scenario(one))
         head = [one[:8] for one in VERDICTS]
         print(f"{'file':<60} {' '.join(f'{one:>8}' for one in head)}  rules  fired  run")
         for file in files:
@@ -63,7 +63,8 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _is_scenario(file: Path) -> bool:
+def is_scenario(file: Path) -> bool:
+    """Whether a file is no catalog; one that cannot be read may be a scenario."""
     try:
         return read_xml(file.read_bytes(), bare=True).find("Catalog") is None
     except OdscenError:
@@ -100,6 +101,10 @@ def _one(file: Path, maps: Path, folder: Path, ego: EgoDriver) -> None:
     workspace = Workspace.open(folder / "workspace")
     try:
         found = import_scenario(workspace, file, maps=maps if maps.is_dir() else None, ego=ego)
+    except NoMapError as error:
+        counts = {one: len(error.lists[one]) for one in VERDICTS}
+        print(json.dumps({"run": "no map", "report": counts}))
+        return
     except OdscenError as error:
         print(json.dumps({"run": f"no import: {error}"}))
         return
@@ -139,10 +144,12 @@ def _totals(rows: list[dict[str, Any]]) -> None:
     checked = [one for one in imported if not one["errors"]]
     ran = [one for one in rows if one.get("run") == "completed"]
     rules, fired = (sum(one.get(key, 0) for one in ran) for key in ("rules", "fired"))
+    share = 100 * len(whole) / max(len(rows), 1)
+    mapless = sum("report" in one for one in rows)
     print(
-        f"{len(rows)} files: {len(imported)} imported, {len(whole)} of them with nothing refused "
-        f"({100 * len(whole) / max(len(rows), 1):.0f} %), {len(checked)} without errors, "
-        f"{len(ran)} ran; of {rules} rules {fired} fired"
+        f"{len(rows)} files: {mapless} without a map have a report, {len(imported)} imported, "
+        f"{len(whole)} of them with nothing refused ({share:.0f} %), "
+        f"{len(checked)} without errors, {len(ran)} ran; of {rules} rules {fired} fired"
     )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from odscen.app.scenario_imports import import_scenario
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, NoMapError
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
@@ -161,7 +161,6 @@ def test_an_action_without_its_value_costs_its_event_and_no_more(
         ("$kph /", "$mph /", r"names \$mph, which is no parameter"),
         ("</OpenSCENARIO>", "", "not well-formed XML"),
         ("Storyboard>", "Board>", "there is no Storyboard"),
-        ('<LogicFile filepath="road.xodr"/>', "", "names no map"),
     ],
 )
 def test_broken_files_say_what_is_wrong(
@@ -170,6 +169,37 @@ def test_broken_files_say_what_is_wrong(
     text = FILE.replace("ACTION", SPEED).replace(old, new)
     with pytest.raises(InputError, match=words):
         import_scenario(workspace, given(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        ("", "names no map"),
+        ('<LogicFile filepath="elsewhere.xodr"/>', "its map 'elsewhere' is not found"),
+    ],
+)
+def test_without_its_map_a_file_has_a_report_and_with_a_given_one_it_is_read(
+    named: str, words: str, workspace: Workspace, tmp_path: Path
+) -> None:
+    text = FILE.replace("ACTION", SPEED).replace('<LogicFile filepath="road.xodr"/>', named)
+    file = given(tmp_path, text)
+    out = tmp_path / "out.scenario.json"
+    with pytest.raises(NoMapError, match=f"{words}.*; give one with --map") as missing:
+        import_scenario(workspace, file, out=out)
+    lists = missing.value.lists
+    refused = {row.xpath.rpartition("/")[2] for row in lists["refused"]}
+    assert {"RoadNetwork", "LanePosition", "RelativeLanePosition"} <= refused
+    assert "Event[1]" not in refused
+    taken = {row.xpath.rpartition("/")[2] for row in lists["taken"]}
+    assert {"AbsoluteTargetSpeed", "TimeHeadwayCondition", "LaneChangeAction"} <= taken
+    assert not out.exists()
+    found = import_scenario(workspace, file, out=out, on_map=str(tmp_path / "road.xodr"))
+    assert (found.lists["refused"], [one.spawn for one in found.scenario.actors]) == (
+        [],
+        ["0.0.-1.25", "0.0.-2.44"],
+    )
+    same = import_scenario(workspace, file, on_map=found.scenario.map.name)
+    assert same.scenario == found.scenario
 
 
 def test_names_are_not_computed(workspace: Workspace, tmp_path: Path) -> None:
@@ -225,8 +255,10 @@ def test_what_starts_with_an_act_starts_by_its_trigger(
     found = import_scenario(workspace, given(tmp_path, text))
     assert found.lists["refused"] == []
     rules = {rule.id: rule.when for rule in found.scenario.rules}
-    held = [part.time.after for part in rules["later"].all or () if part.time is not None]
-    assert held == [4, 4]  # the act's own trigger, and the state of what it starts
+    held = rules["later"].time
+    # The act's own trigger and the state of what it starts are the same, and are said once.
+    assert held is not None
+    assert held.after == 4
 
 
 def test_what_appears_does_the_rest_when_it_is_there(workspace: Workspace, tmp_path: Path) -> None:

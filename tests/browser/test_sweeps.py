@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
 
+import polars as pl
 import pytest
 from playwright.sync_api import expect
 
-from odscen.app.scenarios import SUFFIX
+from odscen.app.runs import run
+from odscen.app.scenarios import SUFFIX, write_scenario
+from odscen.app.sweeps.sweep_runs import WATCHES_CLOSENESS
+from odscen.app.template_scenarios import template_scenario
+from odscen.scenario import edits
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+from tests.browser.conftest import SHIPPED
 from tests.browser.pages import OdscenPage
 from tools import page as tool
 
@@ -66,3 +75,64 @@ def test_a_number_becomes_a_slider_is_swept_and_a_case_opened_by_a_click(
     opened = user.document()
     assert opened["actors"][0]["depart"] == 2
     assert opened["formulas"] == {}
+
+
+WEAVE = "motorway_weave"
+
+
+@pytest.fixture
+def cut_in(served: tool.Served) -> str:
+    """Name of the cut-in of the template with two parameters."""
+    workspace = Workspace.open(served.workspace)
+    workspace.add_map(SHIPPED / f"{WEAVE}.xodr")
+    scenario = template_scenario(workspace, "cut-in", WEAVE, values={}, name="cut-in")
+    scenario = edits.set_simulation(scenario, duration=20.0)
+    speeds = ("actors/challenger/speed", "actors/challenger/initial_speed")
+    for name, value, places in (
+        ("ttc", 2.0, ("rules/cut-in/when/ttc/below",)),
+        ("challenger_speed", 11.0, (*speeds, "rules/cruise/then/0/speed/to")),
+    ):
+        scenario = edits.set_parameter(scenario, parameter=name, value=value, min=0.5, max=15)
+        for place in places:
+            scenario = edits.set_formula(scenario, place=place, formula=f"${name}")
+    write_scenario(scenario, workspace.scenarios / f"cut-in{SUFFIX}")
+    return "cut-in"
+
+
+@pytest.mark.slow
+def test_a_cut_in_is_swept_by_mouse_and_a_case_of_its_plane_runs_alone_with_the_same_figures(
+    user: OdscenPage, served: tool.Served, cut_in: str
+) -> None:
+    page = user.page
+    user.open_editor(cut_in)
+    user.step("Parameters").click()
+    page.get_by_role("link", name="Sweep the parameters").click()
+    for name, low, high, count in (("ttc", "1", "3", "2"), ("challenger_speed", "8", "11", "2")):
+        page.get_by_label(f"From of {name}").fill(low)
+        page.get_by_label(f"To of {name}").fill(high)
+        page.get_by_label(f"Values of {name}").fill(count)
+    page.get_by_label("Runs at a time").fill("2")
+    page.get_by_role("button", name="Plan the sweep").click()
+    page.get_by_role("button", name="Run 4 cases").click(timeout=60_000)
+    rows = page.get_by_role("table", name="Cases of the sweep").get_by_role("row")
+    expect(rows).to_have_count(5, timeout=120_000)
+
+    plane = page.get_by_role("figure").filter(has_text="the line is the boundary")
+    dots = plane.locator("circle[data-case]")
+    verdicts = [one.get_attribute("data-verdict") for one in dots.all()]
+    assert sorted(verdicts) == ["safe", "safe", "unsafe", "unsafe"]
+    expect(plane.locator("path.plane-boundary")).to_have_attribute("d", re.compile("M.+L"))
+    plane.locator('circle[data-verdict="safe"]').first.click()
+    user.wait_for_editor()
+    case = user.scenario.removeprefix("cut-in-1-")
+    assert user.document()["rules"][0]["id"] == "cruise"
+
+    workspace = Workspace.open(served.workspace)
+    table = pl.read_parquet(served.workspace / "sweeps" / "cut-in-1" / "cases.parquet")
+    row = table.row(by_predicate=pl.col("case") == case, named=True)
+    file = workspace.scenarios / f"{user.scenario}{SUFFIX}"
+    settings = RunSettings(recording=WATCHES_CLOSENESS)
+    alone = run(workspace, file, settings=settings, out=served.workspace / "alone").figures
+    assert row["min_ttc"] is not None
+    names = ("min_ttc", "min_pet", "max_drac")
+    assert [alone.get(one) for one in names] == [row[one] for one in names]

@@ -140,10 +140,22 @@ def test_what_cannot_be_written_is_refused_before_anything_is(
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.parametrize("version", ["1.0", "1.2"])
+def test_a_scenario_that_says_nothing_of_weather_writes_none_but_for_scenario_runner(
+    tmp_path: Path, version: str
+) -> None:
+    files = export(
+        workspace(), scenario(), tmp_path, to="openscenario", options={"version": version}
+    )
+    (file,) = (path for path in files if path.suffix == ".xosc")
+    found = etree.parse(file).find(".//EnvironmentAction")
+    assert (found is not None) == (version == "1.0")
+
+
 @pytest.mark.parametrize(
     ("preset", "clock", "time"),
     [
-        ("ClearNoon", 0.0, "12:00:00"),
+        ("WetNoon", 0.0, "12:00:00"),
         ("ClearSunset", 0.0, "18:00:00"),
         ("ClearNight", 0.0, "00:00:00"),
         ("ClearNoon", 27_000.0, "07:30:00"),

@@ -3390,7 +3390,7 @@ export interface components {
          * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
          *
-         *     ``ahead``: drive in front of it at that gap, seconds at its speed.
+         *     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
          */
         "GapKeeping-Input": {
             /** To */
@@ -3411,12 +3411,17 @@ export interface components {
              * @default 3
              */
             rate?: number;
+            /**
+             * Once
+             * @default false
+             */
+            once?: boolean;
         };
         /**
          * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
          *
-         *     ``ahead``: drive in front of it at that gap, seconds at its speed.
+         *     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
          */
         "GapKeeping-Output": {
             /** To */
@@ -3437,6 +3442,11 @@ export interface components {
              * @default 3
              */
             rate: number;
+            /**
+             * Once
+             * @default false
+             */
+            once: boolean;
         };
         /**
          * GoOn
@@ -8876,7 +8886,7 @@ export interface components {
          * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
          *
-         *     ``ahead``: drive in front of it at that gap, seconds at its speed.
+         *     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
          */
         "GapKeeping-File": {
             /** To */
@@ -8906,6 +8916,11 @@ export interface components {
              * @default 3
              */
             rate?: number;
+            /**
+             * Once
+             * @default false
+             */
+            once?: boolean;
         };
         /**
          * Going

@@ -30,40 +30,42 @@ export function Parallel({ table, onOpen }: { table: SweepCases; onOpen: (name: 
         Parallel coordinates: each line is a case; it ends where a case has no value
       </figcaption>
       {/* The table below has all of this for readers of the screen. */}
-      <svg viewBox={`0 0 ${W} ${H}`} aria-hidden="true">
-        {lines.map(({ one, verdict, path }) => (
-          <path
-            key={one.case}
-            className="parallel-line"
-            data-case={one.case}
-            data-verdict={verdict}
-            data-open={one.status !== "refused"}
-            d={path}
-            onClick={() => {
-              if (one.status !== "refused") onOpen(one.case);
-            }}
-          >
-            <title>{titleOf(one, table, verdict)}</title>
-          </path>
-        ))}
-        {axes.map((axis, n) => {
-          const side = n === 0 ? "start" : n === axes.length - 1 ? "end" : "middle";
-          const at = n === 0 ? 4 : n === axes.length - 1 ? W - 4 : axis.x;
-          return (
-            <g key={axis.name}>
-              <line className="parallel-axis" x1={axis.x} x2={axis.x} y1={BOX.top} y2={BOX.bottom} />
-              <text x={at} y={14} textAnchor={side}>
-                {axis.label}
-              </text>
-              {axis.ends.map((value, end) => (
-                <text key={end} className="parallel-end" x={axis.x + 5} y={axis.y(value) + (end ? 12 : -3)}>
-                  {shortNumber(value)}
+      <div className="plane-scroll" role="group" aria-label="Parallel coordinates of the cases" tabIndex={0}>
+        <svg viewBox={`0 0 ${W} ${H}`} aria-hidden="true">
+          {lines.map(({ one, verdict, path }) => (
+            <path
+              key={one.case}
+              className="parallel-line"
+              data-case={one.case}
+              data-verdict={verdict}
+              data-open={one.status !== "refused"}
+              d={path}
+              onClick={() => {
+                if (one.status !== "refused") onOpen(one.case);
+              }}
+            >
+              <title>{titleOf(one, table, verdict)}</title>
+            </path>
+          ))}
+          {axes.map((axis, n) => {
+            const side = n === 0 ? "start" : n === axes.length - 1 ? "end" : "middle";
+            const at = n === 0 ? 4 : n === axes.length - 1 ? W - 4 : axis.x;
+            return (
+              <g key={axis.name}>
+                <line className="parallel-axis" x1={axis.x} x2={axis.x} y1={BOX.top} y2={BOX.bottom} />
+                <text x={at} y={14} textAnchor={side}>
+                  {axis.label}
                 </text>
-              ))}
-            </g>
-          );
-        })}
-      </svg>
+                {axis.ends.map((value, end) => (
+                  <text key={end} className="parallel-end" x={axis.x + 5} y={axis.y(value) + (end ? 12 : -3)}>
+                    {shortNumber(value)}
+                  </text>
+                ))}
+              </g>
+            );
+          })}
+        </svg>
+      </div>
     </figure>
   );
 }

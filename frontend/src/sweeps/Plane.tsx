@@ -66,52 +66,54 @@ export function Plane({ table, onOpen }: { table: SweepCases; onOpen: (name: str
         </Group>
       )}
       {/* The table below has all of this for readers of the screen. */}
-      <svg viewBox={`0 0 ${W} ${H}`} aria-hidden="true">
-        {xs.map((v) => (
-          <g key={v}>
-            <line className="plane-grid" x1={px(v)} x2={px(v)} y1={BOX.top} y2={BOX.bottom} />
-            <text x={px(v)} y={BOX.bottom + 18} textAnchor="middle">
-              {shortNumber(v)}
-            </text>
-          </g>
-        ))}
-        {ys.map((v) => (
-          <g key={v}>
-            <line className="plane-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
-            <text x={BOX.left - 8} y={py(v) + 4} textAnchor="end">
-              {shortNumber(v)}
-            </text>
-          </g>
-        ))}
-        <text x={(BOX.left + BOX.right) / 2} y={H - 8} textAnchor="middle">
-          {across.label}
-        </text>
-        <text transform={`translate(14 ${(BOX.top + BOX.bottom) / 2}) rotate(-90)`} textAnchor="middle">
-          {up.label}
-        </text>
-        {line && <path className="plane-boundary" d={line} />}
-        {ORDER.flatMap((verdict) =>
-          dots
-            .filter((dot) => dot.verdict === verdict)
-            .map(({ one, x, y }) => (
-              <circle
-                key={one.case}
-                className="plane-dot"
-                data-case={one.case}
-                data-verdict={verdict}
-                data-open={one.status !== "refused"}
-                cx={px(x)}
-                cy={py(y)}
-                r={table.cases.length > 400 ? 4 : 6}
-                onClick={() => {
-                  if (one.status !== "refused") onOpen(one.case);
-                }}
-              >
-                <title>{titleOf(one, table, verdict)}</title>
-              </circle>
-            )),
-        )}
-      </svg>
+      <div className="plane-scroll" role="group" aria-label="Plane of the cases" tabIndex={0}>
+        <svg viewBox={`0 0 ${W} ${H}`} aria-hidden="true">
+          {xs.map((v) => (
+            <g key={v}>
+              <line className="plane-grid" x1={px(v)} x2={px(v)} y1={BOX.top} y2={BOX.bottom} />
+              <text x={px(v)} y={BOX.bottom + 18} textAnchor="middle">
+                {shortNumber(v)}
+              </text>
+            </g>
+          ))}
+          {ys.map((v) => (
+            <g key={v}>
+              <line className="plane-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
+              <text x={BOX.left - 8} y={py(v) + 4} textAnchor="end">
+                {shortNumber(v)}
+              </text>
+            </g>
+          ))}
+          <text x={(BOX.left + BOX.right) / 2} y={H - 8} textAnchor="middle">
+            {across.label}
+          </text>
+          <text transform={`translate(14 ${(BOX.top + BOX.bottom) / 2}) rotate(-90)`} textAnchor="middle">
+            {up.label}
+          </text>
+          {line && <path className="plane-boundary" d={line} />}
+          {ORDER.flatMap((verdict) =>
+            dots
+              .filter((dot) => dot.verdict === verdict)
+              .map(({ one, x, y }) => (
+                <circle
+                  key={one.case}
+                  className="plane-dot"
+                  data-case={one.case}
+                  data-verdict={verdict}
+                  data-open={one.status !== "refused"}
+                  cx={px(x)}
+                  cy={py(y)}
+                  r={table.cases.length > 400 ? 4 : 6}
+                  onClick={() => {
+                    if (one.status !== "refused") onOpen(one.case);
+                  }}
+                >
+                  <title>{titleOf(one, table, verdict)}</title>
+                </circle>
+              )),
+          )}
+        </svg>
+      </div>
       <div className="plane-key" aria-hidden="true">
         {ORDER.filter((verdict) => dots.some((dot) => dot.verdict === verdict)).map((verdict) => (
           <span key={verdict} className="verdict" data-verdict={verdict}>

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from odscen.app.exchange.road_points import RoadPoints
-from odscen.app.exchange.xosc_files import FolderFiles
+from odscen.app.exchange.xosc_files import FolderFiles, given_map
 from odscen.app.maps import load_map
 from odscen.app.scenarios import check_scenario, write_scenario
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, NoMapError, NotFoundError
 from odscen.base.text_files import write_text
 from odscen.interchange.openscenario.xosc_signals import movement_of
 from odscen.interchange.openscenario_import.import_report import ImportReport
 from odscen.interchange.openscenario_import.read_distributions import read_distribution
 from odscen.interchange.openscenario_import.resolved_tree import TreeResolver
-from odscen.interchange.openscenario_import.xosc_reader import XoscSource, read_openscenario
+from odscen.interchange.openscenario_import.xosc_reader import (
+    MaplessSource,
+    XoscSource,
+    read_openscenario,
+    report_without_map,
+)
 from odscen.workspace.store import name_from_file
 
 if TYPE_CHECKING:
@@ -32,6 +37,10 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
     from odscen.workspace.store import Workspace
+
+
+_NO_MAP: Final = "its map is missing: no place can be found"
+_NAMES_NONE: Final = "the file names no map (RoadNetwork/LogicFile)"
 
 
 class ImportedScenario(NamedTuple):
@@ -67,6 +76,7 @@ def import_scenario(
     *,
     out: Path | None = None,
     maps: Path | None = None,
+    on_map: str | None = None,
     ego: EgoDriver = "story",
 ) -> ImportedScenario:
     """Read an OpenSCENARIO file as a scenario, and write that if ``out`` is given.
@@ -79,17 +89,23 @@ def import_scenario(
 
     Parameters
     ----------
+    on_map
+        The map on which it plays, whatever the file names: an OpenDRIVE file, or the name of a map
+        of the workspace.
     ego
         What drives the ego: SUMO, or the story of the file.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or has no map or storyboard; names element and line.
+        If the file cannot be read, or has no storyboard; names element and line.
     NotFoundError
-        If its map is not found.
+        If the map ``on_map`` is not found.
+    NoMapError
+        If the map of the file is not found, or it names none; has the report of the rest.
     """
-    files = FolderFiles(file, maps)
+    entry = None if on_map is None else given_map(workspace, on_map)
+    files = FolderFiles(file, maps, entry)
     scenario, lists, plan = read_files(workspace, files, name=name_from_file(file), ego=ego)
     plan_file = None
     if out is not None:
@@ -110,17 +126,28 @@ def read_files(
 
     Raises
     ------
-    InputError, NotFoundError
+    InputError, NoMapError
         As of :func:`import_scenario`.
     """
     told = _told(files)
-    entry = told.files.map(workspace, told.map_named())
+    weather = workspace.assets().weather
+    try:
+        entry = told.files.map(workspace, told.map_named())
+    except NotFoundError as error:
+        bare = MaplessSource(
+            root=told.root, values=told.values, report=told.report, weather=weather
+        )
+        report_without_map(bare, _NO_MAP, ego=ego)
+        what = f"its map {error.name!r} is not found" if error.name else _NAMES_NONE
+        msg = f"{what}; give one with --map, a file (.xodr) or the name of a map"
+        raise NoMapError(msg, file=files.where, lists=told.report.lists()) from error
     loaded = load_map(entry).sumo
     roads = RoadPoints(entry)
     source = XoscSource(
-        told.root, told.values, told.report, loaded.graph, entry.name, entry.sha256,
-        roads.point, roads.lane_t, partial(movement_of, loaded), workspace.assets().weather,
-        told.parameters, told.varied is not None,
+        root=told.root, values=told.values, report=told.report, weather=weather,
+        graph=loaded.graph, map_name=entry.name, sha256=entry.sha256, road_point=roads.point,
+        lane_t=roads.lane_t, movement=partial(movement_of, loaded), parameters=told.parameters,
+        varied=told.varied is not None,
     )  # fmt: skip
     scenario = read_openscenario(source, name=name, ego=ego)
     plan = None
@@ -130,12 +157,12 @@ def read_files(
 
 
 def wanted_map(files: XoscFiles) -> str:
-    """The map that a file names, as it names it.
+    """The map that a file names, as it names it; empty if it names none.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or has no map or storyboard; names element and line.
+        If the file cannot be read, or has no storyboard; names element and line.
     """
     return _told(files).map_named()
 
@@ -151,12 +178,9 @@ class _Told(NamedTuple):
     varied: _Element | None
 
     def map_named(self) -> str:
+        """Map of the file as it names it, empty without one."""
         logic = self.root.find("RoadNetwork/LogicFile")
-        named = "" if logic is None else logic.get("filepath", "").replace("\\", "/")
-        if not named:
-            msg = "the file names no map (RoadNetwork/LogicFile)"
-            raise InputError(msg, file=self.files.where)
-        return named
+        return "" if logic is None else logic.get("filepath", "").replace("\\", "/")
 
 
 def _told(files: XoscFiles) -> _Told:

@@ -6,6 +6,7 @@
     |   |-- GraphFormatError        a GraphML or npz file that is not one of ours
     |   |-- ScenarioError           a scenario document or its graph form; carries all problems
     |   |-- NotFoundError           a name that is not in the catalogue, with close names
+    |   |-- NoMapError              a scenario of others without its map; has a report of the rest
     |   |-- ConflictError           it is taken, in use, or has changed meanwhile
     |   |-- DamagedError            stored files are not as they were written; names each
     |   `-- LimitError (3)          it needs more memory, time or disk than it may have
@@ -24,10 +25,16 @@ from __future__ import annotations
 
 import difflib
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+
+
+class ReportedRow(Protocol):
+    """A row of a report, which can be had as a dictionary."""
+
+    def _asdict(self) -> dict[str, Any]: ...
 
 
 class OdscenError(Exception):
@@ -114,6 +121,22 @@ class NotFoundError(InputError):
         else:
             hint = f"; there is no {what} yet"
         super().__init__(f"no {what} named {name!r}{hint}")
+
+
+class NoMapError(InputError):
+    """The map of a scenario of others is not there, or it names none.
+
+    Parameters
+    ----------
+    lists
+        Rows of the report of the import by their verdict: what could be read, and what not.
+    """
+
+    def __init__(
+        self, problem: str, *, lists: Mapping[str, Sequence[ReportedRow]], file: str | None = None
+    ) -> None:
+        self.lists = lists
+        super().__init__(problem, file=file)
 
 
 class ConflictError(InputError):

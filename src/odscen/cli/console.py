@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from odscen.base.durations import parse_duration
-from odscen.base.errors import InputError, OdscenError
+from odscen.base.errors import InputError, NoMapError, OdscenError
 from odscen.base.shown import visible
 
 if TYPE_CHECKING:
+    from odscen.base.errors import ReportedRow
     from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 
 WorkspaceOption = Annotated[
@@ -159,7 +160,13 @@ def report_error(error: OdscenError) -> None:
     """Write an error to stderr, and as JSON to stdout if the command line asked for JSON."""
     typer.secho(f"error: {visible(str(error))}", err=True, fg=typer.colors.RED)
     if "--json" in sys.argv[1:]:
-        print_json({"error": error_fields(error)})
+        report = as_rows(error.lists) if isinstance(error, NoMapError) else {}
+        print_json({"error": error_fields(error), **report})
+
+
+def as_rows(lists: Mapping[str, Sequence[ReportedRow]]) -> dict[str, list[dict[str, Any]]]:
+    """Lists of a report as data."""
+    return {name: [row._asdict() for row in rows] for name, rows in lists.items()}
 
 
 def report_usage(message: str) -> None:

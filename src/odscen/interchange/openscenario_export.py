@@ -41,7 +41,10 @@ def openscenario_files(source: ExportSource) -> ExportFiles:
     dialect, notes = Dialect.of(source.options.get("version", LATEST)), ExportNotes()
     scenario, places = source.scenario, Places(source)
     _note_traffic(source, dialect, notes)
-    story = Story(scenario, places, dialect, notes, _weather(source, dialect))
+    said = scenario.environment.model_dump(exclude_defaults=True) or scenario.demand.clock
+    # ScenarioRunner asks each file for its weather.
+    sky = _weather(source, dialect) if said or dialect.for_scenario_runner else None
+    story = Story(scenario, places, dialect, notes, sky)
     entities = [entity(actor, places, dialect) for actor in scenario.actors]
     signals = traffic_signals(source, notes)
     return _files(source, dialect, entities, story.storyboard(), notes, signals)
@@ -153,7 +156,6 @@ def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) ->
         not in ([], [STEADY_DRIVER]),
         "simulation": scenario.simulation != usual,
         "variant": scenario.variant is not None,
-        "parameters": bool(scenario.parameters),
         "study": bool(scenario.study.model_dump(exclude_defaults=True)),
         "description": scenario.description not in ("", _title(scenario, dialect)),
         "flows": bool(scenario.flows),
@@ -162,6 +164,8 @@ def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) ->
         "measures": bool(scenario.measures),
         "signals": bool(scenario.signals.model_dump(exclude_defaults=True)),
     }
+    if scenario.parameters:
+        notes.approximated.append(("parameters", "their values are put in where they are used"))
     for part, there in given.items():
         if there:
             notes.left_out.append((part, "OpenSCENARIO has no word for it"))

@@ -285,21 +285,45 @@ def test_a_vehicle_that_starts_beside_all_lanes_is_there_a_step_later(
     )
 
 
-def test_two_that_start_on_one_node_start_behind_one_another(
-    workspace: Workspace, tmp_path: Path
+@pytest.mark.parametrize(
+    ("s", "spawn", "metres"), [(51, "0.0.-1.22", 6), (54, "0.0.-1.21", 12), (60, "0.0.-1.30", 0)]
+)
+def test_two_that_start_on_one_ground_start_behind_one_another(
+    workspace: Workspace, tmp_path: Path, s: float, spawn: str, metres: int
 ) -> None:
-    found = read(workspace, tmp_path, init=f"{at_first(place(51))}</Private>")
+    found = read(workspace, tmp_path, init=f"{at_first(place(s))}</Private>")
     ego, other = found.scenario.actors
     assert ego.spawn == "0.0.-1.25"
-    assert other.spawn == "0.0.-1.22"
-    assert "about 6 m behind, as another one starts there" in reasons(found, "approximated")
+    assert other.spawn == spawn
+    words = f"about {metres} m behind, as another one starts there"
+    assert (words in reasons(found, "approximated")) == (metres > 0)
     assert [one for one in found.problems if one.severity == "error"] == []
 
 
-def test_a_gap_ahead_in_the_story_is_kept_ahead(workspace: Workspace, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("ahead", "refused"), [(0, 0), (5, 2)])
+def test_who_is_only_lifted_stays_and_who_jumps_from_where_it_is_then_is_refused(
+    workspace: Workspace, tmp_path: Path, ahead: float, refused: int
+) -> None:
+    jump = (
+        '<TeleportAction><Position><RelativeObjectPosition entityRef="Other" '
+        f'dx="{ahead}" dy="0" dz="0.3"/></Position></TeleportAction>'
+    )
+    found = read(workspace, tmp_path, init=added(101), story=event(private(jump)))
+    assert len(found.lists["refused"]) == refused
+    assert not any(rule.id == "e" for rule in found.scenario.rules)
+    words = "height or tilt" if not refused else "is known in the run only"
+    said = reasons(found, "refused" if refused else "approximated")
+    assert any(words in one for one in said)
+
+
+@pytest.mark.parametrize("once", [True, False])
+def test_a_gap_ahead_in_the_story_is_kept_ahead_or_reached_once(
+    workspace: Workspace, tmp_path: Path, *, once: bool
+) -> None:
+    continuous = "false" if once else "true"
     gap = (
         '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="30" '
-        'continuous="true" freespace="true" displacement="leadingReferencedEntity"/>'
+        f'continuous="{continuous}" freespace="true" displacement="leadingReferencedEntity"/>'
         "</LongitudinalAction>"
     )
     found = read(workspace, tmp_path, init=added(101), story=event(private(gap)))
@@ -307,7 +331,7 @@ def test_a_gap_ahead_in_the_story_is_kept_ahead(workspace: Workspace, tmp_path: 
     (rule,) = (one for one in found.scenario.rules if one.id == "e")
     keep = rule.then[0].keep_gap
     assert keep is not None
-    assert (keep.to, keep.metres, keep.ahead) == ("Ego", 30, True)
+    assert (keep.to, keep.metres, keep.ahead, keep.once) == ("Ego", 30, True, once)
 
 
 def lane_change(lane: int) -> str:

@@ -125,6 +125,17 @@ def test_a_missing_map_is_named_with_what_to_do(client: TestClient) -> None:
     assert client.get("/api/scenarios").json() == []
 
 
+def test_a_file_that_names_no_map_plays_on_the_one_that_was_sent_with_it(
+    client: TestClient,
+) -> None:
+    bare = CUT_IN.replace('<LogicFile filepath="road.xodr"/>', "")
+    assert bare != CUT_IN
+    words = failure(client, ("cut_in.xosc", bare))
+    assert "names no map" in words
+    assert words.endswith("send one map together with it")
+    assert report_of(client, ("cut_in.xosc", bare), ("town.xodr", ROAD))["map"] == "town"
+
+
 def test_names_in_a_file_reach_nothing_on_the_disk(client: TestClient, tmp_path: Path) -> None:
     """The map is on the disk where the file says, and so is a catalog that it names."""
     (tmp_path / "road.xodr").write_text(ROAD, encoding="utf-8")

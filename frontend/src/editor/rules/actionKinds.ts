@@ -150,9 +150,11 @@ export const ACTION_KINDS: Record<ActionKind, Kind> = {
       { is: "flag", name: "ahead", label: "Ahead of it, not behind", otherwise: false },
       number("rate", "Acceleration at most", " m/s²", 3, { min: 0.1, max: 100 }),
       number("lasting", "For", " s", undefined, { min: 0.1 }),
+      { is: "flag", name: "once", label: "Only until it is reached", otherwise: false },
     ],
     words: (v) =>
-      `keep a gap of ${given(v.metres) ? amount(v.metres, "m") : amount(v.seconds, "s")} ` +
+      `${v.once === true ? "reach" : "keep"} a gap of ` +
+      `${given(v.metres) ? amount(v.metres, "m") : amount(v.seconds, "s")} ` +
       `${v.ahead === true ? "ahead of" : "to"} ${text(v.to)}` +
       `, at ${amount(v.rate, "m/s²")} at most` +
       maybe(v.lasting, ", for", "s"),

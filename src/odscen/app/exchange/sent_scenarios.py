@@ -135,6 +135,11 @@ def _map(
     """The map that a file names: the one that was sent with it, else that of the workspace."""
     bare = bare_map(wanted)
     maps = [one for one in files if _is_map(one.name)]
+    if not bare:
+        if len(maps) == 1:
+            return _added(workspace, maps[0], progress)
+        msg = "it names no map (RoadNetwork/LogicFile): send one map together with it"
+        raise InputError(msg, file=file)
     for one in maps:
         if bare_map(one.name).lower() == bare.lower():
             return _added(workspace, one, progress)

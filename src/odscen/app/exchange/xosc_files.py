@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from odscen.base.checksums import digest
@@ -12,7 +13,6 @@ from odscen.base.xml_reading import read_xml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     from lxml.etree import _Element
 
@@ -57,10 +57,13 @@ class FolderFiles:
         The file.
     maps
         Another folder of maps.
+    on_map
+        The map that is taken whatever the file names.
     """
 
     file: Path
     maps: Path | None = None
+    on_map: MapEntry | None = None
 
     @property
     def name(self) -> str:
@@ -78,7 +81,7 @@ class FolderFiles:
 
     def other(self, named: str) -> FolderFiles:
         """A file that it names, relative to its folder."""
-        return FolderFiles(self.file.parent / _slashes(named), self.maps)
+        return FolderFiles(self.file.parent / _slashes(named), self.maps, self.on_map)
 
     def catalogs(self, folders: tuple[str, ...]) -> Iterator[tuple[_Element, str]]:
         """All OpenSCENARIO files in these folders, relative to its own."""
@@ -94,15 +97,17 @@ class FolderFiles:
         NotFoundError
             If there is no such file, and no map of that name in the workspace.
         """
+        if self.on_map is not None:
+            return self.on_map
         bare = bare_map(named)
+        if not bare:
+            raise NotFoundError("map", "", workspace.map_names())
         folders = (self.file.parent, self.file.parent.parent / "xodr")
         places = [self.file.parent / _slashes(named)]
         places += [one / f"{bare}.xodr" for one in (*folders, *((self.maps,) if self.maps else ()))]
         for place in places:
             if place.is_file():
-                content = read_given(place)
-                same = [one for one in workspace.maps() if one.sha256 == digest(content)]
-                return same[0] if same else workspace.add_map(place)
+                return known_or_added(workspace, place)
         if bare in workspace.map_names():
             return workspace.map(bare)
         raise NotFoundError("map", bare, workspace.map_names())
@@ -178,6 +183,28 @@ class SentFiles:
         """
         name = self.map_name or bare_map(named)
         return workspace.map(name)
+
+
+def given_map(workspace: Workspace, given: str) -> MapEntry:
+    """Map that somebody names: an OpenDRIVE file, or the name of a map of the workspace.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    NotFoundError
+        If there is no map of that name.
+    """
+    if given.lower().endswith(".xodr"):
+        return known_or_added(workspace, Path(given))
+    return workspace.map(given)
+
+
+def known_or_added(workspace: Workspace, file: Path) -> MapEntry:
+    """The map of the workspace that has the content of a file; added if there is none."""
+    content = read_given(file)
+    same = [one for one in workspace.maps() if one.sha256 == digest(content)]
+    return same[0] if same else workspace.add_map(file)
 
 
 def bare_map(named: str) -> str:

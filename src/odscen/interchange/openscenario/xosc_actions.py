@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.interchange.openscenario.dialect import xml
+from odscen.interchange.openscenario.xosc_lines import follow_line, path, replay, timed
 from odscen.interchange.openscenario.xosc_places import GroundPose
 from odscen.interchange.openscenario.xosc_presence import (
     BELOW,
     add_entity,
     delete_entity,
     private,
+    speed_action,
 )
 from odscen.interchange.openscenario.xosc_signals import (
     light_action,
@@ -24,12 +25,13 @@ from odscen.interchange.openscenario.xosc_signals import (
 from odscen.interchange.openscenario.xosc_triggers import CannotSayError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario.dialect import Dialect, ExportNotes
     from odscen.interchange.openscenario.xosc_places import Places
+    from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.document.scenario_document import Actor
 
 _SHAPES: Final = {"step": "step", "linear": "linear", "cosine": "sinusoidal"}
@@ -38,17 +40,22 @@ _WALKING: Final = 1.4
 """m/s of pedestrians whose speed is not given."""
 _USUAL_SPEED: Final = 10.0
 """m/s of others."""
+_SAME: Final = 0.05
+"""Metres."""
+_STILL: Final = 1e-6
+"""m/s² below which nothing moves."""
 IGNORES: Final = "left out, for only rules are obeyed there"
 
 
 @dataclass(frozen=True, slots=True)
 class Actions:
-    """Makes actions; ``actors`` are those of the scenario by id."""
+    """Makes actions; ``actors`` are those of the scenario by id, ``rules`` all of them."""
 
     places: Places
     dialect: Dialect
     notes: ExportNotes
     actors: Mapping[str, Actor]
+    rules: Sequence[StoryRule] = ()
 
     def actions(self, kind: str, part: Any, actor: str, where: str) -> list[_Element]:
         """Contents of the actions that an action of a rule is in OpenSCENARIO.
@@ -70,55 +77,14 @@ class Actions:
         """``RoutingAction`` that leads along points; times are relative to its begin."""
         return follow_line(self.dialect, name, spots, times, clock="relative" if timed else None)
 
-
-def follow_line(
-    dialect: Dialect,
-    name: str,
-    spots: Sequence[GroundPose],
-    times: Sequence[float],
-    *,
-    clock: str | None,
-) -> _Element:
-    """``PrivateAction`` that leads along points.
-
-    ``clock``: whether ``times`` (s) are ``absolute``, ``relative`` to its begin, or do not count.
-    """
-    vertices = [
-        xml("Vertex", spot.element(), time=float(time))
-        for spot, time in zip(spots, times, strict=True)
-    ]
-    shape = xml("Shape", xml("Polyline", *vertices))
-    line = xml("Trajectory", xml("ParameterDeclarations"), shape, name=name, closed=False)
-    timing = xml("None")
-    if clock is not None:
-        timing = xml("Timing", domainAbsoluteRelative=clock, scale=1.0, offset=0.0)
-    follow = xml(
-        "FollowTrajectoryAction",
-        line if dialect.minor == 0 else None,
-        xml("TimeReference", timing),
-        xml("TrajectoryFollowingMode", followingMode="position"),
-        None if dialect.minor == 0 else xml("TrajectoryRef", line),
-    )
-    return private(xml("RoutingAction", follow))
-
-
-def speed_action(speed: float, shape: str, dimension: str, value: float) -> _Element:
-    """``PrivateAction`` that changes the speed."""
-    return private(
-        xml(
-            "LongitudinalAction",
-            xml(
-                "SpeedAction",
-                xml(
-                    "SpeedActionDynamics",
-                    dynamicsShape=shape,
-                    dynamicsDimension=dimension,
-                    value=float(value),
-                ),
-                xml("SpeedActionTarget", xml("AbsoluteTargetSpeed", value=float(speed))),
-            ),
-        )
-    )
+    def before(self, part: Any, actor: str) -> Iterator[Any]:
+        """Yield actions of rules of an actor that stand before an action, in their order."""
+        for rule in self.rules:
+            for one in (one for item in rule.then for one in item.parts):
+                if getattr(one, one.kind) is part:
+                    return
+                if rule.actor == actor:
+                    yield one
 
 
 def _speed(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
@@ -186,13 +152,16 @@ def _cut_in(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]
     return [_lane_change(part.over, xml("RelativeTargetLane", entityRef=part.to, value=0))]
 
 
-def _offset(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
+def _offset(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     made.notes.approximated.append((where, "an offset has no duration but an acceleration"))
-    greatest = math.pi**2 * abs(part.to) / (2.0 * part.over**2)
+    asked = [one.offset.to for one in made.before(part, actor) if one.offset is not None]
+    moves = abs(part.to - (asked[-1] if asked else made.actors[actor].lateral_offset))
+    # Greatest of y = moves / 2 (1 - cos(pi t / over)).
+    greatest = math.pi**2 * moves / (2.0 * part.over**2)
     dynamics = xml(
         "LaneOffsetActionDynamics",
         dynamicsShape="sinusoidal",
-        maxLateralAcc=max(greatest, 1e-3),
+        maxLateralAcc=greatest if greatest > _STILL else None,
     )
     target = xml("LaneOffsetTarget", xml("AbsoluteTargetLaneOffset", value=float(part.to)))
     return [
@@ -222,7 +191,7 @@ def _keep_gap(made: Actions, part: Any, _actor: str, where: str) -> list[_Elemen
                     "LongitudinalDistanceAction",
                     limits,
                     entityRef=part.to,
-                    continuous=True,
+                    continuous=not part.once,
                     freespace=True,
                     distance=part.metres,
                     timeGap=part.seconds,
@@ -238,41 +207,9 @@ def _walk(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     made.notes.approximated.append((where, "the walk begins where the walker is, not at a point"))
     spots = [made.places.spot(place) for place in (*part.through, part.to)]
     return [
-        made.trajectory(f"{actor}: {where}", *_timed(spots, speed), timed=len(spots) > 1),
+        made.trajectory(f"{actor}: {where}", *timed(spots, speed), timed=len(spots) > 1),
         speed_action(speed, "step", "time", 0.0),
     ]
-
-
-def _timed(spots: Sequence[GroundPose], speed: float) -> tuple[list[GroundPose], list[float]]:
-    steps = [math.hypot(b.x - a.x, b.y - a.y) / speed for a, b in itertools.pairwise(spots)]
-    times = [0.0, *itertools.accumulate(steps)]
-    if len(spots) == 1:  # a line has two points at least
-        return [*spots, *spots], [0.0, 1.0]
-    return list(spots), times
-
-
-def _path(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
-    spots = [made.places.spot(place) for place in part.points]
-    made.notes.approximated.append((where, "the reference point follows it, from its first point"))
-    times = list(map(float, part.times or ()))
-    if len(spots) == 1:  # a line of one point is none
-        made.notes.approximated.append((where, "it leads there from where the actor begins"))
-        spots, times = [made.places.start(made.actors[actor]), *spots], [0.0, *times]
-    if part.times:
-        return [made.trajectory(f"{actor}: {where}", spots, times, timed=True)]
-    if part.speeds:
-        made.notes.approximated.append((where, "speeds at the points are left out"))
-    line = made.trajectory(f"{actor}: {where}", *_timed(spots, part.speed or 10.0), timed=False)
-    return [line] if part.speed is None else [line, speed_action(part.speed, "step", "time", 0.0)]
-
-
-def _replay(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
-    made.notes.approximated.append((where, "a trajectory, which odscen reads as a path"))
-    back = made.places.centre_ahead(made.actors[actor])
-    level = made.places.start(made.actors[actor]).z
-    spots = [GroundPose(x, y, level, hdg).back(back) for _, x, y, hdg in part.rows]
-    times = [row[0] for row in part.rows]
-    return [made.trajectory(f"{actor}: {where}", spots, times, timed=True)]
 
 
 def _goal(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
@@ -312,11 +249,13 @@ def _appear(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     if made.dialect.for_scenario_runner:
         made.notes.approximated.append((where.partition(".")[0], BELOW))
     own = made.actors[actor]
-    spot = made.places.start(own)
+    start = spot = made.places.start(own)
     if part.at is not None:
-        spot = GroundPose(part.at[0], part.at[1], spot.z, part.at[2]).back(
+        spot = GroundPose(part.at[0], part.at[1], start.z, part.at[2]).back(
             made.places.centre_ahead(own)
         )
+        if math.hypot(spot.x - start.x, spot.y - start.y) < _SAME:
+            made.notes.approximated.append((where, "it appears where it is placed"))
     speed = own.initial_speed if part.speed is None else part.speed
     there = add_entity(own.id, spot, made.dialect)
     return [there, speed_action(speed or 0.0, "step", "time", 0.0)]
@@ -385,8 +324,8 @@ _MAKERS: Final[Mapping[str, Callable[[Actions, Any, str, str], list[_Element]]]]
     "offset": _offset,
     "keep_gap": _keep_gap,
     "walk": _walk,
-    "path": _path,
-    "replay": _replay,
+    "path": path,
+    "replay": replay,
     "goal": _goal,
     "arrive": _arrive,
     "appear": _appear,

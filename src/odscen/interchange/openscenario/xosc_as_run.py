@@ -9,10 +9,8 @@ from odscen.base.categories import DEFAULT_BODY, Body, Category
 from odscen.base.errors import InputError
 from odscen.convert.lane_table.light_heads import Heads
 from odscen.interchange.openscenario.dialect import xml
-from odscen.interchange.openscenario.xosc_actions import (
-    follow_line,
-)
 from odscen.interchange.openscenario.xosc_entities import EntityFacts, entity_of
+from odscen.interchange.openscenario.xosc_lines import follow_line
 from odscen.interchange.openscenario.xosc_places import GroundPose, reference_behind
 from odscen.interchange.openscenario.xosc_presence import add_entity, delete_entity, private
 from odscen.interchange.openscenario.xosc_signals import light_action

@@ -40,3 +40,22 @@ def add_entity(name: str, at: GroundPose, dialect: Dialect) -> _Element:
         return private(xml("TeleportAction", at.element()))
     added = xml("AddEntityAction", at.element())
     return xml("GlobalAction", xml("EntityAction", added, entityRef=name))
+
+
+def speed_action(speed: float, shape: str, dimension: str, value: float) -> _Element:
+    """``PrivateAction`` that changes the speed."""
+    return private(
+        xml(
+            "LongitudinalAction",
+            xml(
+                "SpeedAction",
+                xml(
+                    "SpeedActionDynamics",
+                    dynamicsShape=shape,
+                    dynamicsDimension=dimension,
+                    value=float(value),
+                ),
+                xml("SpeedActionTarget", xml("AbsoluteTargetSpeed", value=float(speed))),
+            ),
+        )
+    )

@@ -10,9 +10,13 @@ from odscen.interchange.openscenario.xosc_actions import (
     IGNORES,
     Actions,
     acquire,
+)
+from odscen.interchange.openscenario.xosc_presence import (
+    BELOW,
+    add_entity,
+    private,
     speed_action,
 )
-from odscen.interchange.openscenario.xosc_presence import BELOW, add_entity, private
 from odscen.interchange.openscenario.xosc_triggers import CannotSayError, Triggers
 
 if TYPE_CHECKING:
@@ -151,7 +155,7 @@ class Story:
         if rule.times > 1 and self.dialect.for_scenario_runner:
             self.notes.approximated.append((where, "ScenarioRunner lets it happen once"))
         triggers = Triggers(self.places, self.dialect, self.notes, events)
-        makes = Actions(self.places, self.dialect, self.notes, actors)
+        makes = Actions(self.places, self.dialect, self.notes, actors, self.scenario.rules)
         made: list[_Element] = []
         said = _said(rule)
         for index in {*range(len(rule.then))} - {*said}:

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from odscen.base.categories import Category
+from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.read_actions import put_there
+from odscen.interchange.openscenario_import.read_positions import MapPoint
+from odscen.interchange.openscenario_import.read_teleports import put_there
 from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.query import node_id, walk_node_id
+from odscen.lanegraph.shortest_paths import reachable
 
 if TYPE_CHECKING:
     from odscen.interchange.openscenario_import.import_report import ImportReport
     from odscen.interchange.openscenario_import.read_entities import ReadEntity
-    from odscen.interchange.openscenario_import.read_positions import MapPoint, PositionReader
+    from odscen.interchange.openscenario_import.read_positions import PositionReader
 
 _BESIDE: Final = 10.0
 """Metres that an actor can be beside its lane."""
@@ -33,24 +35,61 @@ class ActorPlaces:
     def __init__(self, report: ImportReport, positions: PositionReader) -> None:
         self._report = report
         self._positions = positions
+        self._bodies: list[tuple[MapPoint, Category]] = []
 
     def leave_room(self, entity: ReadEntity, made: dict[str, Any], taken: set[str]) -> None:
-        """Let an actor start behind one whose node it would have."""
+        """Let an actor start behind one whose node or ground it would have."""
         graph, steps = self._positions.graph, 0
-        if made["spawn"] not in taken or entity.category is Category.PEDESTRIAN:
-            return
         there = self._positions.of_node(made["spawn"])
-        node = None if there is None else there.node
-        while node is not None and str(node_id(graph, node)) in taken:
+        if entity.category is Category.PEDESTRIAN or there is None:
+            return
+        left, node = float(made.get("lateral_offset", 0.0)), there.node
+        while node is not None and (
+            str(node_id(graph, node)) in taken or self._meets(entity, node, left)
+        ):
             steps += 1
             back = self._positions.along(node, -math.ceil(entity.length + 1.0))
             node = None if back == node else back
         if node is None:
             return
+        self._bodies.append((self._centre(node, left), entity.category))
+        if steps == 0:
+            return
         made["spawn"] = str(node_id(graph, node))
         metres = steps * math.ceil(entity.length + 1.0)
         words = f"about {metres} m behind, as another one starts there"
         self._report.mark(entity.element, "approximated", words)
+
+    def _centre(self, node: int, left: float) -> MapPoint:
+        lanes = self._positions.graph.lanes
+        at = MapPoint(float(lanes.x[node]), float(lanes.y[node]), float(lanes.hdg[node]))
+        return at.moved(0.0, left)
+
+    def _meets(self, entity: ReadEntity, node: int, left: float) -> bool:
+        """Whether the body of an actor at a node would have ground of one that starts before."""
+        own, size = self._centre(node, left), DEFAULT_BODY[entity.category]
+        for other, category in self._bodies:
+            body = DEFAULT_BODY[category]
+            dx, dy = own.x - other.x, own.y - other.y
+            along = abs(dx * math.cos(other.hdg) + dy * math.sin(other.hdg))
+            across = abs(dy * math.cos(other.hdg) - dx * math.sin(other.hdg))
+            if along < (size.length + body.length) / 2 and across < (size.width + body.width) / 2:
+                return True
+        return False
+
+    def reached(self, entity: ReadEntity, made: Made, goal: str) -> str:
+        """The goal of the file, or that straight on if it cannot be reached from where it starts.
+
+        A vehicle that stands across its lane starts along it.
+        """
+        spawn, there = (self._positions.of_node(one) for one in (made["spawn"], goal))
+        if spawn is None or there is None or spawn.node is None or there.node is None:
+            return goal
+        if bool(reachable(self._positions.graph, spawn.node)[there.node]):
+            return goal
+        words = "straight on: the goal of the file cannot be reached from its lane"
+        self._report.mark(entity.element, "approximated", words)
+        return str(made["goal"])
 
     def walker(self, centre: MapPoint) -> dict[str, Any]:
         """Node of the pedestrian graph nearest to a point."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.read_teleports import JUMP, put_there, stays
 from odscen.interchange.openscenario_import.read_trajectories import read_trajectory
 from odscen.lanegraph.query import node_id
 
@@ -19,15 +20,12 @@ if TYPE_CHECKING:
 
     from odscen.interchange.openscenario_import.read_conditions import ConditionReader
     from odscen.interchange.openscenario_import.read_entities import ReadEntity
-    from odscen.interchange.openscenario_import.read_positions import MapPoint
 
 Made = dict[str, Any]
 _SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}
 _MEASURES: Final = {"time": "over", "rate": "rate", "distance": "within"}
 FOLLOWING: Final = "following"
 """Key of actions that follow one another, of one action of the file."""
-_JUMP: Final = 0.1
-"""Seconds that a teleport takes."""
 _CAR_WIDTH: Final = 1.8
 _USUAL: Final = 3.0
 """Seconds of a lateral action that gives no measure that can be turned into some."""
@@ -72,6 +70,9 @@ class ActionReader:
         make = _MAKERS.get(str(kind.tag))
         if make is None:
             raise RefusedError(kind, f"odscen has no {kind.tag}")
+        names = [name for name, one in self.conditions.entities.items() if one is entity]
+        if kind.tag == "TeleportAction" and stays(report, kind, names):
+            return []
         return [make(self, kind, entity)]
 
     def absolute_speed(self, target: _Element) -> float:
@@ -272,10 +273,13 @@ def _gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
         rate = report.number(limits, "maxAcceleration", 3.0)
         part["rate"] = min(max(rate, 0.1), 100.0)
         report.mark(limits, "approximated", "maxAcceleration holds for braking too")
+    if kind.get("continuous") == "false":
+        part["once"] = True
+        if limits is None:
+            words = "reached by driving with 3 m/s², not at once"
+            report.mark(kind, "approximated", words)
     if kind.get("freespace") == "false":
         report.mark(kind, "approximated", "between bodies, not reference points")
-    elif kind.get("continuous") == "false":
-        report.mark(kind, "approximated", "kept on when it is reached")
     return {"keep_gap": part}
 
 
@@ -312,18 +316,8 @@ def _teleport(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report, positions = read.conditions.report, read.conditions.positions
     with positions.exactly():
         centre = positions.point(report.only(kind)).moved(entity.ahead)
-    report.mark(kind, "approximated", f"it is led there for {_JUMP:g} s, and drives on")
+    report.mark(kind, "approximated", f"it is led there for {JUMP:g} s, and drives on")
     return put_there(centre, read.speeds.get(entity.id, 0.0))
-
-
-def put_there(centre: MapPoint, speed: float) -> Made:
-    """Recording that puts the centre of an actor at a place, with its heading there."""
-    after = centre.moved(_JUMP * speed)
-    rows = [
-        [time, round(float(at.x), 4), round(float(at.y), 4), round(float(at.hdg), 6)]
-        for time, at in ((0.0, centre), (_JUMP, after))
-    ]
-    return {"replay": {"rows": rows}}
 
 
 def _profile(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:

@@ -98,12 +98,7 @@ class ConditionReader:
 
     def _when(self, element: _Element, made: Made) -> Made:
         edge, delay = element.get("conditionEdge", "none"), self.report.number(element, "delay", 0)
-        if edge == "falling":
-            made = {"not": made, "edge": "rising"}
-        elif edge == "risingOrFalling":
-            made = {"any": [{**made, "edge": "rising"}, {"not": made, "edge": "rising"}]}
-        elif edge == "rising" and "time" not in made and "rule" not in made:
-            made = {**made, "edge": "rising"}
+        made = _at_edge(made, edge)
         return {**made, "delay": delay} if delay > 0 else made
 
     def _by_value(self, kind: _Element) -> Made:
@@ -228,6 +223,32 @@ class ConditionReader:
         return node or [round(point.x, 4), round(point.y, 4)]
 
 
+def _at_edge(made: Made, edge: str) -> Made:
+    """Condition that holds at an edge of another one.
+
+    What stays so once it has come true, times and ends of rules, has a rising edge when it comes
+    true and no falling one: it holds from then on, so that what it is combined with can be later.
+    """
+    if edge == "none":
+        return made
+    if _stays(made):
+        return NEVER if edge == "falling" else made
+    if "not" in made and _stays(made["not"]) and edge != "rising":
+        return dict(made["not"])
+    if edge == "rising":
+        return {**made, "edge": "rising"}
+    falls = {"not": made, "edge": "rising"}
+    return falls if edge == "falling" else {"any": [{**made, "edge": "rising"}, falls]}
+
+
+def _stays(made: Made) -> bool:
+    """Whether a condition holds for good once it does."""
+    (kind,) = (key for key in made if key not in ("edge", "delay"))
+    if kind in ("all", "any"):
+        return "edge" not in made and all(_stays(one) for one in made[kind])
+    return kind in ("time", "rule")
+
+
 def _holds(kind: _Element, have: str) -> bool:
     """Whether a value is to the one of a condition as its rule says."""
     want, rule = kind.get("value", ""), kind.get("rule")
@@ -250,8 +271,12 @@ def _headed(position: _Element) -> bool:
 
 
 def joined(kind: str, parts: list[Made]) -> Made:
-    """Combine conditions; one alone stays as it is."""
-    rest = [one for one in parts if kind != "all" or one != ALWAYS]
+    """Combine conditions, each once; one alone stays as it is."""
+    rest = [
+        one
+        for row, one in enumerate(parts)
+        if (kind != "all" or one != ALWAYS) and one not in parts[:row]
+    ]
     if not rest:
         return ALWAYS
     return rest[0] if len(rest) == 1 else {kind: rest}

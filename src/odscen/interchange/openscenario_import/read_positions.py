@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, cast
 
 import numpy as np
 
@@ -366,3 +366,28 @@ class PositionReader:
         key = lanes.lanes.keys[int(lanes.lane[there])]
         t = self.side * self.report.number(inside, "t", 0.0)
         return self._on_road(kind, key.road, float(lanes.s[there]), t)
+
+
+@dataclass(frozen=True, slots=True, init=False)
+class Nowhere(PositionReader):
+    """Reads positions of a file without a map: each is refused.
+
+    Who has no place asks for no lanes, so that there are none.
+    """
+
+    why: str = ""
+
+    def __init__(self, report: ImportReport, *, side: float, why: str) -> None:
+        graph = cast("MapGraph", None)
+        PositionReader.__init__(self, report, graph, lambda *_: None, lambda *_: None, side)
+        object.__setattr__(self, "why", why)
+
+    def point(self, position: _Element) -> MapPoint:
+        """Refuse a position.
+
+        Raises
+        ------
+        RefusedError
+            Always.
+        """
+        raise RefusedError(self.report.only(position), self.why)

@@ -105,7 +105,7 @@ class LateralMove(Part):
 class GapKeeping(Part):
     """Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
 
-    ``ahead``: drive in front of it at that gap, seconds at its speed.
+    ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
     """
 
     to: Identifier
@@ -114,6 +114,7 @@ class GapKeeping(Part):
     ahead: bool = False
     lasting: Positive | None = None
     rate: Rate = 3.0
+    once: bool = False
 
     @model_validator(mode="after")
     def _one_gap(self) -> Self:

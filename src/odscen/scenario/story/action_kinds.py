@@ -73,6 +73,8 @@ _HELD = 1e-3
 """Metres of a line on which a person stands."""
 _GAP_GAIN = 1.0
 """Of a gap that is too long: metres per second faster than the one ahead, for each metre."""
+_GAP_REACHED = 0.1
+"""Metres and m/s within which a gap is reached."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,17 +174,22 @@ def _go(_: Going, one: ActingActor) -> float:
 
 
 def _keep_gap(part: GapKeeping, one: ActingActor) -> float:
-    _follow(part, one)
+    there = _follow(part, one)
+    if part.once and there:
+        return one.instant
     return math.inf if part.lasting is None else one.instant + part.lasting
 
 
 def _follow_on(part: GapKeeping, one: ActingActor, end: float) -> float:
-    _follow(part, one)
-    return end
+    there = _follow(part, one)
+    return min(end, one.instant) if part.once and there else end
 
 
-def _follow(part: GapKeeping, one: ActingActor) -> None:
-    """Choose the speed of this step by the gap: faster where it is too long, slower if short."""
+def _follow(part: GapKeeping, one: ActingActor) -> bool:
+    """Choose the speed of this step by the gap: faster where it is too long, slower if short.
+
+    Returns whether the gap is what it should be, at the speed of the other one.
+    """
     other = one.view.actor(part.to)
     if other is None:
         msg = f"{part.to!r} is not on the road"
@@ -203,6 +210,7 @@ def _follow(part: GapKeeping, one: ActingActor) -> None:
     left = one.view.time + one.step - one.instant
     law = SpeedLaw(one.instant, speed, reached, max(left, 1e-9))
     one.channel.take_speed(law, one.owner)
+    return abs(error) < _GAP_REACHED and abs(other.speed - speed) < _GAP_REACHED
 
 
 def _vanish(_: Vanishing, one: ActingActor) -> float:
@@ -272,7 +280,8 @@ ACTIONS = {
         ActionKind(
             "keep_gap", "follow `to`, or drive `ahead` of it, at a free gap of `metres`, or of "
             "`seconds` at the speed of the one behind, "
-            "with `rate` at most; for `lasting` seconds", "m, s, m/s²", "`setSpeed` each step",
+            "with `rate` at most; for `lasting` seconds, or `once`: until it is that", "m, s, m/s²",
+            "`setSpeed` each step",
             "LongitudinalDistanceAction", _MIRRORED, _keep_gap, _follow_on, _keep,
             vehicles_only=True,
         ),

@@ -158,6 +158,20 @@ def test_a_gap_is_reached_and_kept(tmp_path: Path, gap: dict[str, float], step: 
     assert found.instant("r", "ended") == pytest.approx(17.0, abs=1e-6)
 
 
+def test_a_gap_that_is_reached_once_lets_the_next_rule_begin(tmp_path: Path) -> None:
+    actors = [fast("ego", 430.0, MIDDLE, 15.0, ego=True), fast("van", 370.0, MIDDLE)]
+    reach = {"keep_gap": {"to": "ego", "metres": 15.0, "once": True}}
+    rules = [after(1.0, reach, {"speed": {"to": 5.0, "rate": 2.0}})]
+    found = run(document(MOTORWAY, actors, rules), tmp_path / "run")
+    ego, van = found.tracks["ego"], found.tracks["van"]
+    end = found.instant("r", "ended")
+    there = end - 10.0 / 2.0  # from the 15 m/s of the ego to 5 m/s with 2 m/s²
+    between = (np.interp(there, ego.time, ego.x) - ego.length) - np.interp(there, van.time, van.x)
+    assert between == pytest.approx(15.0, abs=0.2)
+    assert there < 17.0
+    assert van.speed[-1] == pytest.approx(5.0, abs=0.1)
+
+
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("gap", [{"metres": 15.0}, {"seconds": 1.0}])
 def test_a_gap_is_kept_ahead(tmp_path: Path, gap: dict[str, float], step: float) -> None:
