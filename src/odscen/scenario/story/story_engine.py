@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
 from odscen.scenario.story.channels import Channel, WantedMove
-from odscen.scenario.story.condition_tree import NEVER_IN_STEP, ConditionTrees
+from odscen.scenario.story.condition_tree import NEVER_IN_STEP, ConditionTree
 from odscen.scenario.story.own_kinds import action_kind
 from odscen.scenario.story.quiet_spells import QuietSpells
 
@@ -96,8 +96,10 @@ class StoryEngine:
         self.patient = True
         self._rules = {rule.id: rule for rule in rules}
         self._step = step
-        self._trees = ConditionTrees(step)
+        self._trees = {rule.id: ConditionTree(rule, step) for rule in rules}
         self._quiet = QuietSpells(step)
+        self._looked: dict[str, ConditionTree] = {}
+        self._nothing_before = -math.inf
         self._states = {rule.id: _RuleState() for rule in rules}
         self._channels: dict[str, Channel] = {}
         self._events: list[StoryEvent] = []
@@ -118,11 +120,14 @@ class StoryEngine:
     def add(self, rule: StoryRule) -> None:
         """Add a rule to those that there are."""
         self._rules[rule.id] = rule
+        self._trees[rule.id] = ConditionTree(rule, self._step)
         self._states[rule.id] = _RuleState()
+        self._nothing_before = -math.inf
 
     def look_at_all(self) -> None:
         """Look at all rules in the next step: somebody is elsewhere than he drove."""
         self._quiet.end()
+        self._nothing_before = -math.inf
 
     def may_fire(self, rule: str) -> bool:
         """Whether a rule can fire yet, or is about something."""
@@ -132,6 +137,8 @@ class StoryEngine:
     def step(self, view: RoadView) -> tuple[dict[str, WantedMove], list[StoryEvent]]:
         """Look at the road; what is wanted of whom until the next look, and what happened."""
         self._events, self._asked = [], []
+        if view.time < self._nothing_before:
+            return {}, self._events
         self._begin_step(view)
         now = view.time
         for _ in range(_MOST_TURNS):
@@ -140,7 +147,10 @@ class StoryEngine:
                 break
             now, rule = turn
             self._turn(view, now, self._rules[rule])
-        self._trees.next_step()
+        for tree in self._looked.values():
+            tree.next_step()
+        self._looked = {}
+        self._nothing_before = self._until_something(view.time)
         moves = {}
         for name, channel in sorted(self._channels.items()):
             if (one := view.actor(name)) is not None:
@@ -151,8 +161,12 @@ class StoryEngine:
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
+        kept = [tree.state() for tree in self._trees.values()]
         return {
-            "trees": self._trees.state(),
+            "trees": {
+                "leaves": {key: one for leaves, _ in kept for key, one in leaves.items()},
+                "past": {key: one for _, past in kept for key, one in past.items()},
+            },
             "quiet": self._quiet.state(),
             "rules": {
                 name: {**asdict(state), "running": [one.state() for one in state.running]}
@@ -163,7 +177,9 @@ class StoryEngine:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
-        self._trees.restore(state["trees"])
+        self._nothing_before = -math.inf
+        for tree in self._trees.values():
+            tree.restore(state["trees"]["leaves"], state["trees"]["past"])
         self._quiet.restore(state.get("quiet", {}), self._rules)
         for name, kept in state["rules"].items():
             running = [_Running.from_state(one) for one in kept["running"]]
@@ -192,36 +208,58 @@ class StoryEngine:
                     self._say(view.time, FAILED, rule, "it has left the road")
                 self._over(rule, view.time)
 
-    def _next_turn(self, view: RoadView, now: float) -> tuple[float, str] | None:
-        """First instant at which something happens, and the rule to which it does."""
-        found: list[tuple[float, int, str]] = []
-        end = view.time + self._step
-        for index, (name, rule) in enumerate(self._rules.items()):
+    def _until_something(self, time: float) -> float:
+        """Instant before which nothing can happen if nobody is put elsewhere."""
+        if self._channels:
+            return -math.inf
+        least = math.inf
+        for name, rule in self._rules.items():
             state = self._states[name]
             if state.item is not None:
-                due = min((one.end for one in state.running), default=now)
-                if due < end:
-                    found.append((max(due, now), index, name))
-            elif state.fired < rule.times:
-                if self._quiet.lasts(rule, view.time, self._channels):
-                    continue
-                holds = self._trees.look(rule.when, f"{name}.when", rule.actor, view)
-                if state.fired:
-                    instant = holds.first_rise(now, end, after=state.ready)
-                else:
-                    instant = holds.first(now, end)
-                if instant is not None:
-                    found.append((instant, index, name))
-                elif (
-                    self.patient
-                    and holds == NEVER_IN_STEP
-                    and self._quiet.begins(rule, view, self._channels)
-                ):
-                    self._trees.forget(f"{name}.when")
-        if not found:
-            return None
-        instant, _, name = min(found)
-        return instant, name
+                return -math.inf
+            if state.fired < rule.times:
+                least = min(least, self._quiet.until.get(name, -math.inf))
+                if least <= time:
+                    return -math.inf
+        return least
+
+    def _next_turn(self, view: RoadView, now: float) -> tuple[float, str] | None:
+        """First instant at which something happens, and the rule to which it does."""
+        found: tuple[float, str] | None = None
+        time, until = view.time, self._quiet.until
+        first = time + self._step
+        end = first
+        for name, rule in self._rules.items():
+            state = self._states[name]
+            if state.item is not None:
+                due = max(min((one.end for one in state.running), default=now), now)
+                instant = due if due < end else None
+            elif state.fired < rule.times and time >= until.get(name, time):
+                instant = self._instant(rule, state, view, now, end)
+            else:
+                continue
+            if instant is not None and instant < first:  # of several at once the first one
+                first, found = instant, (instant, name)
+        return found
+
+    def _instant(
+        self, rule: StoryRule, state: _RuleState, view: RoadView, now: float, end: float
+    ) -> float | None:
+        """Instant from ``now`` on, before ``end``, at which a rule fires."""
+        tree = self._looked[rule.id] = self._trees[rule.id]
+        holds = tree.look(view)
+        if state.fired:
+            instant = holds.first_rise(now, end, after=state.ready)
+        else:
+            instant = holds.first(now, end)
+        if (
+            instant is None
+            and self.patient
+            and holds == NEVER_IN_STEP
+            and self._quiet.begins(rule, view, self._channels)
+        ):
+            tree.forget()
+        return instant
 
     def _turn(self, view: RoadView, now: float, rule: StoryRule) -> None:
         state = self._states[rule.id]
@@ -239,7 +277,7 @@ class StoryEngine:
         state.fired += 1
         state.item = -1
         state.started = state.started or [now]
-        values = self._trees.values(f"{rule.id}.when.", now - view.time)
+        values = self._trees[rule.id].values(now - view.time)
         self._say(now, STARTED, rule, values=values or None)
         self._next_item(view, now, rule)
 
@@ -326,6 +364,7 @@ class StoryEngine:
         channel = self._channels.get(actor.id)
         if channel is None:
             channel = self._channels[actor.id] = Channel()
+            self._quiet.end(actor.id)
             channel.begin_step(actor, view.time)
         owner = f"{rule.id}/{one.number}"
         return ActingActor(view, actor, channel, now, self._step, owner, self._channels)

@@ -152,6 +152,10 @@ class MovedActors:
         """Highest speed that a vehicle's type allows, m/s."""
         return float(self._sumo.vehicle.getMaxSpeed(vehicle))
 
+    def gain(self, vehicle: str) -> float:
+        """Most that a vehicle accelerates by itself, m/s²."""
+        return float(self._sumo.vehicle.getAccel(vehicle))
+
     def limit(self, vehicle: str, speed: float) -> None:
         """Set the highest speed that a vehicle can go, m/s."""
         self._sumo.vehicle.setMaxSpeed(vehicle, speed)
