@@ -30,8 +30,8 @@ BEFORE = 3
 """Steps."""
 LONGEST = 10.0
 """Seconds; for longer the bound says little."""
-_ASIDE = 10.0
-"""Metres that changes of lanes put a vehicle aside at once: several lanes."""
+_ASIDE = 8.0
+"""Metres that changes of lanes put a vehicle aside at once: two of them."""
 _RUNS = 10.0
 """m/s; nobody on foot is faster, and SUMO lets a person have any speed at once."""
 _AGAIN = 5
@@ -170,7 +170,9 @@ def _speed(part: OwnBounded, actor: str, view: RoadView) -> float:
     if part.above is None:  # whoever collides stands at once
         return 0.0
     one = view.actor(part.of or actor)
-    if one is None or one.person:
+    if one is None:
+        return _absent(view, part.of or actor)
+    if one.person:
         return 0.0
     return (part.above - one.speed) / one.gain if one.gain > 0.0 else LONGEST
 
@@ -179,7 +181,14 @@ def _travelled(part: OwnBounded, actor: str, view: RoadView) -> float:
     if part.above is None:
         return 0.0
     one = view.actor(part.of or actor)
-    return 0.0 if one is None else _covers(part.above - one.travelled, *_pace(one))
+    if one is None:
+        return _absent(view, part.of or actor)
+    return _covers(part.above - one.travelled, *_pace(one))
+
+
+def _absent(view: RoadView, *actors: str) -> float:
+    """Seconds for which a condition on actors, one of whom is not there, is not met."""
+    return LONGEST if any(map(view.gone, actors)) else 0.0
 
 
 def _pace(one: ActorView) -> tuple[float, float]:
@@ -204,7 +213,7 @@ def _distance(part: DistanceBounded, actor: str, view: RoadView) -> float:
         return _to_point(name, view.place(part.place or ""), part.below, view)
     one, other = view.actor(name), view.actor(part.to)
     if one is None or other is None:
-        return 0.0
+        return _absent(view, name, part.to)
     away = math.dist((one.x, one.y), (other.x, other.y)) - part.below
     (speed, gain), (speeds, gains) = _pace(one), _pace(other)
     return _covers(away - _farthest(one) - _farthest(other), speed + speeds, gain + gains)
@@ -213,7 +222,7 @@ def _distance(part: DistanceBounded, actor: str, view: RoadView) -> float:
 def _to_point(actor: str, point: Point, bound: float, view: RoadView) -> float:
     one = view.actor(actor)
     if one is None:
-        return 0.0
+        return _absent(view, actor)
     away = math.dist((one.x, one.y), point) - _farthest(one) - bound
     return _covers(away, *_pace(one))
 

@@ -82,6 +82,9 @@ class RoadView(Protocol):
     def actor(self, name: str) -> ActorView | None:
         """Return an actor, ``None`` if it is not on the road."""
 
+    def gone(self, name: str) -> bool:
+        """Whether an actor has left the road for good."""
+
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""
 

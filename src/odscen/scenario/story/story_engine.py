@@ -101,6 +101,7 @@ class StoryEngine:
         self._looked: dict[str, ConditionTree] = {}
         self._nothing_before = -math.inf
         self._states = {rule.id: _RuleState() for rule in rules}
+        self._busy: set[str] = set()
         self._channels: dict[str, Channel] = {}
         self._events: list[StoryEvent] = []
         self._asked: list[Wanted] = []
@@ -184,6 +185,7 @@ class StoryEngine:
         for name, kept in state["rules"].items():
             running = [_Running.from_state(one) for one in kept["running"]]
             self._states[name] = _RuleState(**{**kept, "running": running})
+        self._busy = {name for name, one in self._states.items() if one.item is not None}
         self._channels = {name: Channel.from_state(one) for name, one in state["channels"].items()}
 
     def _begin_step(self, view: RoadView) -> None:
@@ -194,6 +196,8 @@ class StoryEngine:
                 self._gone(view, name)
             else:
                 self._channels[name].begin_step(actor, view.time)
+        if not self._busy:
+            return
         for name, rule in self._rules.items():
             if running := self._states[name].running:
                 for one in list(running):
@@ -210,14 +214,11 @@ class StoryEngine:
 
     def _until_something(self, time: float) -> float:
         """Instant before which nothing can happen if nobody is put elsewhere."""
-        if self._channels:
+        if self._channels or self._busy:
             return -math.inf
         least = math.inf
         for name, rule in self._rules.items():
-            state = self._states[name]
-            if state.item is not None:
-                return -math.inf
-            if state.fired < rule.times:
+            if self._states[name].fired < rule.times:
                 least = min(least, self._quiet.until.get(name, -math.inf))
                 if least <= time:
                     return -math.inf
@@ -276,6 +277,7 @@ class StoryEngine:
         state = self._states[rule.id]
         state.fired += 1
         state.item = -1
+        self._busy.add(rule.id)
         state.started = state.started or [now]
         values = self._trees[rule.id].values(now - view.time)
         self._say(now, STARTED, rule, values=values or None)
@@ -396,6 +398,7 @@ class StoryEngine:
     def _over(self, rule: StoryRule, now: float) -> None:
         state = self._states[rule.id]
         state.item, state.ready = None, now
+        self._busy.discard(rule.id)
         state.running = []
         state.ended = state.ended or [now]
 

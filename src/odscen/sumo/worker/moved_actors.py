@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -119,6 +120,14 @@ class MovedActors:
             return SeenPerson(x, y, one.getAngle(name), one.getSpeed(name), one.getLaneID(name))
         except self._errors:
             return None
+
+    def knows(self, name: str) -> bool:
+        """Whether SUMO has such a vehicle or person, on the road or not."""
+        for domain in (self._sumo.vehicle, self._sumo.person):
+            with suppress(*self._errors):
+                domain.getTypeID(name)
+                return True
+        return False
 
     def lane_of(self, name: str, *, person: bool) -> str:
         """Lane that a road user is on; empty if it is on none."""

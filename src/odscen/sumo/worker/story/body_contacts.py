@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 BODIES = "bodies"
 """Kind of collision, where odscen has found it."""
 _HALVINGS = 20
-_LONG = 1.0
+_LONG = 3.0
 """Seconds after which a body is read again."""
 _ASIDE = 20.0
 """Metres that changes of lanes put a vehicle aside at once, and more."""

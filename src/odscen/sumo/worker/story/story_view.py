@@ -67,6 +67,7 @@ class StoryView:
         self._nearest: dict[Point, tuple[str, float, int]] = {}
         self._half_widths: dict[str, float] = {}
         self._gains: dict[str, float] = {}
+        self._gone: set[str] = set()
         self._eager: tuple[str, ...] | None = None
         self._travelled: dict[str, float] = {}
         self._standing: dict[str, float] = {}
@@ -100,8 +101,10 @@ class StoryView:
             return views[name]
         planned = self._actors.get(name)
         found = None
-        if planned is not None:
+        if planned is not None and name not in self._gone:
             found = self._person(planned) if planned.person else self._vehicle(planned)
+            if found is None and name in self._gains and not self._road.knows(name):
+                self._gone.add(name)  # asking SUMO for it would cost more than all who are there
         views[name] = found
         return found
 
@@ -113,6 +116,10 @@ class StoryView:
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""
         return tuple(one for one in map(self.actor, self._actors) if one is not None)
+
+    def gone(self, name: str) -> bool:
+        """Whether an actor has left the road for good."""
+        return name in self._gone
 
     def _there(self, name: str) -> ActorView:
         one = self.actor(name)
