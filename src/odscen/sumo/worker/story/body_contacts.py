@@ -67,7 +67,7 @@ class BodyContacts:
             self._touching = set()
             return []
         touching: set[tuple[str, str]] = set()
-        events: list[Event] = []
+        begun: list[tuple[ActorView, ActorView]] = []
         for name in sorted(moved):
             one = view.actor(name)
             if one is None:
@@ -77,12 +77,14 @@ class BodyContacts:
                 if pair not in touching and overlap(one.corners, other.corners):
                     touching.add(pair)
                     if pair not in self._touching:
-                        events.append(_contact(one, other, time, step))
+                        begun.append((one, other))
         self._touching = touching
-        if events:
-            known = road.collisions()
-            return [one for one in events if frozenset((one.actor, one.partner or "")) not in known]
-        return []
+        known = road.collisions() if begun else set()
+        return [
+            _contact(one, other, time, step)
+            for one, other in begun
+            if frozenset((one.id, other.id)) not in known
+        ]
 
     def _others(
         self, one: ActorView, road: MovedActors, view: StoryView, moves: Mapping[str, WantedMove]

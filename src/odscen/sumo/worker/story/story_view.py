@@ -189,6 +189,7 @@ class StoryView:
         return {
             "travelled": self._travelled,
             "standing": self._standing,
+            "gone": sorted(self._gone),
             "last": {name: list(one) for name, one in self._last.items()},
         }
 
@@ -196,6 +197,7 @@ class StoryView:
         """Inverse of :meth:`state`."""
         self._travelled = dict(state["travelled"])
         self._standing = dict(state["standing"])
+        self._gone = set(state["gone"])
         self._last = {name: (x, y, v) for name, (x, y, v) in state["last"].items()}
 
     def _where(self, place: str | Point) -> tuple[str, float, int]:
