@@ -221,9 +221,7 @@ class _Combined:
 class _Late:
     """A condition with a delay, or its risings; both need what was before this step."""
 
-    def __init__(
-        self, key: str, below: _Node, delay: float, step: float, *, rising: bool
-    ) -> None:
+    def __init__(self, key: str, below: _Node, delay: float, step: float, *, rising: bool) -> None:
         self.key = key
         self.past: Flips | None = None
         self.now: Flips | None = None
