@@ -97,20 +97,24 @@ stories = given(
 )
 
 
-@settings(max_examples=40, deadline=None)
-@stories
-def test_the_same_happens_at_the_same_instants(
-    when: list[dict[str, Any]], car: Any, other: Any, step: float, changes: Any
-) -> None:
+def _same(when: list[dict[str, Any]], car: Any, other: Any, step: float, changes: Any) -> None:
     bodies = (car, replace(other, id="other"))
     patient, _ = _story(when, patient=True, step=step, bodies=bodies, changes=changes)
     always, _ = _story(when, patient=False, step=step, bodies=bodies, changes=changes)
     assert patient == always
 
 
-test_the_same_happens_in_many_stories = pytest.mark.slow(
-    settings(max_examples=1500)(test_the_same_happens_at_the_same_instants)
-)
+@settings(max_examples=40, deadline=None)
+@stories
+def test_the_same_happens_at_the_same_instants(**story: Any) -> None:
+    _same(**story)
+
+
+@pytest.mark.slow
+@settings(max_examples=1500, deadline=None)
+@stories
+def test_the_same_happens_in_many_stories(**story: Any) -> None:
+    _same(**story)
 
 
 @pytest.mark.parametrize("step", [0.05, 0.1, 0.5])
