@@ -250,7 +250,10 @@ class MovedActors:
         self._sumo.vehicle.remove(vehicle, self._sumo.REMOVE_ARRIVED)
 
     def insert(self, name: str, one: HeldActor, speed: float | None) -> bool:
-        """Let a road user depart as soon as there is room; false if SUMO cannot."""
+        """Let a road user depart as soon as there is room; false if SUMO cannot.
+
+        A vehicle at no higher speed than SUMO takes there, see :meth:`begin_at`.
+        """
         own = one.attributes
         try:
             if one.person:
@@ -260,7 +263,10 @@ class MovedActors:
                 persons.appendWalkingStage(name, list(one.edges), float(own["arrivalPos"]))
             else:
                 route, begin = f"{name} appears", own["departSpeed"]
-                begin = begin if speed is None else f"{speed:.4f}"
+                if speed is not None:
+                    begin = f"{min(speed, float(own['mostSpeed'])):.4f}"
+                elif begin != "avg":
+                    begin = f"{min(float(begin), float(own['mostSpeed'])):.4f}"
                 self._sumo.route.add(route, one.edges)
                 self._sumo.vehicle.add(
                     name, route, own["type"], "now", own["departLane"], own["departPos"],
@@ -270,6 +276,10 @@ class MovedActors:
         except self._errors:
             return False
         return True
+
+    def begin_at(self, vehicle: str, speed: float) -> None:
+        """Let a vehicle that has just departed have another speed."""
+        self._sumo.vehicle.setPreviousSpeed(vehicle, speed)
 
     def show_lights(self, vehicle: str, lights: Sequence[str] | None) -> None:
         """Set the lights of a vehicle, or give them back to the driver."""

@@ -128,6 +128,7 @@ class StoryRun:
         if recorder.jumps != self._jumps:
             self._jumps = recorder.jumps
             self._look_at_all()
+        self._hands.departures(road)
         self._view.look(road, time, self._step, self._driven() if moved else {})
         self._hands.arrivals(road, recorder, time)
         contacts = self._contacts.look(road, self._view, moved, time, self._step)
