@@ -8,7 +8,7 @@ ends, the next begins, another rule has waited for that.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
@@ -16,6 +16,7 @@ from odscen.scenario.story.channels import Channel, WantedMove
 from odscen.scenario.story.condition_tree import NEVER_IN_STEP, ConditionTree
 from odscen.scenario.story.own_kinds import action_kind
 from odscen.scenario.story.quiet_spells import QuietSpells
+from odscen.scenario.story.rule_states import RuleState, Running
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -46,38 +47,6 @@ class StoryEvent(NamedTuple):
     values: dict[str, float] | None = None
 
 
-@dataclass
-class _Running:
-    """An action that runs: its place in the item of ``then``, and when it is over."""
-
-    number: int
-    end: float
-
-    def state(self) -> dict[str, Any]:
-        """Values that JSON can hold."""
-        return {"number": self.number, "end": None if self.end == math.inf else self.end}
-
-    @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> _Running:
-        """Inverse of :meth:`state`."""
-        return cls(state["number"], math.inf if state["end"] is None else state["end"])
-
-
-@dataclass
-class _RuleState:
-    """A rule: how often it has fired, what it does, and when it may fire again.
-
-    ``started`` and ``ended`` have the first instant of each, if there was one.
-    """
-
-    fired: int = 0
-    ready: float = 0.0
-    item: int | None = None
-    running: list[_Running] = field(default_factory=list)
-    started: list[float] = field(default_factory=list)
-    ended: list[float] = field(default_factory=list)
-
-
 class StoryEngine:
     """The rules of one run.
 
@@ -100,7 +69,7 @@ class StoryEngine:
         self._quiet = QuietSpells(step)
         self._looked: dict[str, ConditionTree] = {}
         self._nothing_before = -math.inf
-        self._states = {rule.id: _RuleState() for rule in rules}
+        self._states = {rule.id: RuleState() for rule in rules}
         self._busy: set[str] = set()
         self._channels: dict[str, Channel] = {}
         self._events: list[StoryEvent] = []
@@ -122,7 +91,7 @@ class StoryEngine:
         """Add a rule to those that there are."""
         self._rules[rule.id] = rule
         self._trees[rule.id] = ConditionTree(rule, self._step)
-        self._states[rule.id] = _RuleState()
+        self._states[rule.id] = RuleState()
         self._nothing_before = -math.inf
 
     def look_at_all(self) -> None:
@@ -183,8 +152,8 @@ class StoryEngine:
             tree.restore(state["trees"]["leaves"], state["trees"]["past"])
         self._quiet.restore(state.get("quiet", {}), self._rules)
         for name, kept in state["rules"].items():
-            running = [_Running.from_state(one) for one in kept["running"]]
-            self._states[name] = _RuleState(**{**kept, "running": running})
+            running = [Running.from_state(one) for one in kept["running"]]
+            self._states[name] = RuleState(**{**kept, "running": running})
         self._busy = {name for name, one in self._states.items() if one.item is not None}
         self._channels = {name: Channel.from_state(one) for name, one in state["channels"].items()}
 
@@ -244,7 +213,7 @@ class StoryEngine:
         return found
 
     def _instant(
-        self, rule: StoryRule, state: _RuleState, view: RoadView, now: float, end: float
+        self, rule: StoryRule, state: RuleState, view: RoadView, now: float, end: float
     ) -> float | None:
         """Instant from ``now`` on, before ``end``, at which a rule fires."""
         tree = self._looked[rule.id] = self._trees[rule.id]
@@ -292,14 +261,14 @@ class StoryEngine:
             self._over(rule, now)
             return
         for number, action in enumerate(rule.then[state.item].parts):
-            one = _Running(number, math.inf)
+            one = Running(number, math.inf)
             state.running.append(one)
             self._begin(view, now, rule, action, one)
             if state.item is None:  # that failed
                 return
 
     def _begin(
-        self, view: RoadView, now: float, rule: StoryRule, action: Action, one: _Running
+        self, view: RoadView, now: float, rule: StoryRule, action: Action, one: Running
     ) -> None:
         kind, part = action_kind(action), getattr(action, action.kind)
         try:
@@ -321,7 +290,7 @@ class StoryEngine:
         rule: StoryRule,
         kind: ActionKind,
         part: Any,
-        one: _Running,
+        one: Running,
     ) -> None:
         """Begin an action of an actor that is on the road."""
         acting = self._acting(view, now, rule, one)
@@ -338,7 +307,7 @@ class StoryEngine:
             if owner is not None and new != owner:
                 self._override(owner, now, rule)
 
-    def _update(self, view: RoadView, rule: StoryRule, one: _Running, now: float) -> None:
+    def _update(self, view: RoadView, rule: StoryRule, one: Running, now: float) -> None:
         state = self._states[rule.id]
         if view.actor(rule.actor) is None or state.item is None:
             return
@@ -352,13 +321,13 @@ class StoryEngine:
         except CannotAct as error:
             self._fail(rule, now, str(error))
 
-    def _finish(self, view: RoadView, now: float, rule: StoryRule, one: _Running) -> None:
+    def _finish(self, view: RoadView, now: float, rule: StoryRule, one: Running) -> None:
         action = rule.then[self._states[rule.id].item or 0].parts[one.number]
         kind = action_kind(action)
         if kind.finish is not None and view.actor(rule.actor) is not None:
             kind.finish(getattr(action, action.kind), self._acting(view, now, rule, one))
 
-    def _acting(self, view: RoadView, now: float, rule: StoryRule, one: _Running) -> ActingActor:
+    def _acting(self, view: RoadView, now: float, rule: StoryRule, one: Running) -> ActingActor:
         actor = view.actor(rule.actor)
         if actor is None:
             msg = f"{rule.actor!r} is not on the road"

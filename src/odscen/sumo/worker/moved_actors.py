@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -75,7 +74,13 @@ class SavedWalk(NamedTuple):
 
 
 class MovedActors:
-    """Reads and moves road users by name."""
+    """Reads and moves road users by name.
+
+    Attributes
+    ----------
+    knows
+        Says whether SUMO has a vehicle or person of a name, on the road or not.
+    """
 
     def __init__(
         self,
@@ -84,7 +89,9 @@ class MovedActors:
         lanes_of_edge: Mapping[str, Sequence[str]],
         admits: Callable[[str, str], bool],
         native: Callable[[str, str], Callable[[str], Any]],
+        knows: Callable[[str], bool],
     ) -> None:
+        self.knows = knows
         self._position = native("vehicle", "getPosition")
         self._angle, self._speed = native("vehicle", "getAngle"), native("vehicle", "getSpeed")
         self._more = tuple(native("vehicle", getter) for getter in _MORE)
@@ -120,14 +127,6 @@ class MovedActors:
             return SeenPerson(x, y, one.getAngle(name), one.getSpeed(name), one.getLaneID(name))
         except self._errors:
             return None
-
-    def knows(self, name: str) -> bool:
-        """Whether SUMO has such a vehicle or person, on the road or not."""
-        for domain in (self._sumo.vehicle, self._sumo.person):
-            with suppress(*self._errors):
-                domain.getTypeID(name)
-                return True
-        return False
 
     def lane_of(self, name: str, *, person: bool) -> str:
         """Lane that a road user is on; empty if it is on none."""
