@@ -7,8 +7,8 @@ on the road at once, on average.
 
 ``ratio`` is all that a run with rules costs more; it has two parts, whose product it is. ``rules``
 is what odscen does between the steps: the whole run over what is left of it without that. ``SUMO``
-is what is left over the run without rules: who is slower or stops lets others queue, and the
-traffic, or where it is, is not the same any more.
+is what is left over the run without rules: the processor's caches hold less of SUMO, and who is
+slower or stops lets others queue.
 """
 
 from __future__ import annotations
