@@ -4,6 +4,11 @@
 the processes take turns of a twentieth of a second, so that both meet the same machine. Seconds are
 those of the processor, and of the steps alone: starting is not in them. Vehicles are those that are
 on the road at once, on average.
+
+``ratio`` is all that a run with rules costs more; it has two parts, whose product it is. ``rules``
+is what odscen does between the steps: the whole run over what is left of it without that. ``SUMO``
+is what is left over the run without rules: the processor's caches hold less of SUMO, and who is
+slower or stops lets others queue.
 """
 
 from __future__ import annotations
@@ -13,7 +18,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.in_turns import seconds_of
+from bench.in_turns import shares_of
 from odscen.app.maps import load_map
 from odscen.app.runs import check_run, prepare_run
 from odscen.lanegraph.query import node_id
@@ -42,22 +47,25 @@ PER_KM = 27.5
 
 
 def main() -> None:
-    """Print the ratio of each round, and median and spread of all."""
+    """Print the ratios of each round, and median and spread of all."""
     with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
         root = Path(folder)
         workspace = Workspace.open(root / "workspace")
         loaded = load_map(workspace.add_map(MAP))
         plain, ruled = (_made(workspace, traffic(loaded, rules=r), root / str(r)) for r in (0, 1))
-        mean, ratios = _on_the_road(plain), []
-        print(f"{'round':>5} {'without, s':>10} {'with, s':>8} {'ratio':>6} {'vehicles':>8}")
+        print("vehicles:", ", ".join(f"{_on_the_road(run):.0f}" for run in (plain, ruled)))
+        names = ("ratio", "rules", "SUMO")
+        rounds: list[tuple[float, float, float]] = []
+        print(f"{'round':>5} {'without, s':>10} {'with, s':>8}", *(f"{one:>6}" for one in names))
         for number in range(ROUNDS + 1):
-            seconds = seconds_of([(plain.folder, "run"), (ruled.folder, "run")])
+            (without, _), (whole, own) = shares_of([(plain.folder, "run"), (ruled.folder, "run")])
             if number:  # the first round warms up
-                ratios.append(seconds[1] / seconds[0])
-                line = f"{number:>5} {seconds[0]:>10.2f} {seconds[1]:>8.2f} {ratios[-1]:>6.3f}"
-                print(f"{line} {mean:>8.0f}", flush=True)
-        least, most = min(ratios), max(ratios)
-        print(f"median ratio {statistics.median(ratios):.3f} ({least:.3f} to {most:.3f})")
+                rounds.append((whole / without, whole / (whole - own), (whole - own) / without))
+                line = f"{number:>5} {without:>10.2f} {whole:>8.2f}"
+                print(line, *(f"{one:>6.3f}" for one in rounds[-1]), flush=True)
+        for name, ratios in zip(names, zip(*rounds, strict=True), strict=True):
+            middle, least, most = statistics.median(ratios), min(ratios), max(ratios)
+            print(f"median {name} {middle:.3f} ({least:.3f} to {most:.3f})")
 
 
 def traffic(loaded: LoadedMap, *, rules: int) -> Scenario:

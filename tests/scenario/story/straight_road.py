@@ -49,6 +49,9 @@ class Road:
             off_road=abs(y) >= 6.02,
         )  # fmt: skip
 
+    def gone(self, _: str) -> bool:
+        return False
+
     def named(self) -> tuple[ActorView, ...]:
         found = (self.actor(one.id) for one in self.actors)
         return tuple(one for one in found if one is not None)

@@ -68,6 +68,27 @@ def test_a_condition_comes_true_at_its_instant(
 
 
 @pytest.mark.parametrize("step", STEPS)
+def test_seconds_that_leap_as_somebody_sets_off_are_not_drawn_out_beyond_the_bound(
+    step: float,
+) -> None:
+    closes = replace(EGO, x=-64.0, speed=9.99, acceleration=2.0)
+    [found] = started(story([rule({"ttc": {"to": "ego", "below": 3.0}})], CAR, closes, step=step))
+    # gap 60 + 0.01 t - t², closing -0.01 + 2 t
+    assert found == pytest.approx((-5.99 + math.sqrt(5.99**2 + 4 * 60.03)) / 2, abs=0.1 * step)
+    stands, starts = replace(CAR, speed=0.0), replace(closes, speed=0.01)
+    when = {"headway": {"to": "ego", "below": 2.0}}
+    [found] = started(story([rule(when)], stands, starts, step=step))
+    # gap 60 - 0.01 t - t², speed 0.01 + 2 t
+    assert found == pytest.approx((-4.01 + math.sqrt(4.01**2 + 4 * 59.98)) / 2, abs=0.1 * step)
+
+
+def test_bodies_that_touch_and_stay_so_have_no_time_to_collision() -> None:
+    beside = replace(CAR, id="ego", x=-4.0)
+    assert started(story([rule({"ttc": {"to": "ego", "below": 3.0}})], CAR, beside)) == []
+    assert started(story([rule({"ttc": {"to": "ego", "above": 3.0}})], CAR, beside)) == [0.0]
+
+
+@pytest.mark.parametrize("step", STEPS)
 def test_what_only_steps_can_show_comes_true_on_the_next_step(step: float) -> None:
     def within_a_step(when: dict[str, Any], instant: float, **road: Any) -> None:
         brakes = replace(BRAKES, id="brakes", acceleration=-3.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -35,28 +36,51 @@ conditions = st.one_of(
 )
 actors = st.builds(
     lambda x, y, hdg, speed, gain: replace(
-        CAR, x=x, y=y, hdg=hdg, speed=speed, acceleration=gain
+        CAR, x=x, y=y, hdg=hdg, speed=speed, acceleration=gain, gain=max(gain, 0.0)
     ),
     st.floats(-200.0, 200.0), st.floats(-30.0, 30.0), st.floats(-3.1, 3.1),
     st.floats(0.0, 40.0), st.floats(-4.0, 9.0),
 )  # fmt: skip
 
 
+lane_changes = st.lists(
+    st.tuples(st.sampled_from(("car", "other")), st.floats(0.0, 15.0), st.sampled_from((-7, 3.5))),
+    max_size=2,
+    unique_by=lambda change: change[0],
+)
+
+
 class _CountedRoad(Road):
     looks = 0
+    changes_of_lanes: Any = ()
 
     def actor(self, name: str) -> Any:
         self.looks += 1
-        return super().actor(name)
+        one = super().actor(name)
+        for _, _, left in (
+            change
+            for change in self.changes_of_lanes
+            if change[0] == name and change[1] < self.time
+        ):
+            x, y = one.x - left * math.sin(one.hdg), one.y + left * math.cos(one.hdg)
+            one = replace(one, x=x, y=y)
+        return one
 
 
 def _story(
-    when: list[dict[str, Any]], *, patient: bool, step: float, bodies: Any, until: float = 15.0
+    when: list[dict[str, Any]],
+    *,
+    patient: bool,
+    step: float,
+    bodies: Any,
+    until: float = 15.0,
+    changes: Any = (),
 ) -> tuple[list[StoryEvent], int]:
     rules = [rule(one, name=f"r{n}", times=2) for n, one in enumerate(when)]
     engine = StoryEngine(rules, step=step)
     engine.patient = patient
     road = _CountedRoad(bodies, engine.rule_changes)
+    road.changes_of_lanes = changes
     events: list[StoryEvent] = []
     for number in range(round(until / step)):
         road.time = number * step
@@ -64,20 +88,50 @@ def _story(
     return events, road.looks
 
 
-@settings(max_examples=150, deadline=None)
-@given(
+stories = given(
     when=st.lists(conditions, min_size=1, max_size=3),
     car=actors,
     other=actors,
     step=st.sampled_from((0.05, 0.1, 0.2, 0.5)),
+    changes=lane_changes,
 )
-def test_the_same_happens_at_the_same_instants(
-    when: list[dict[str, Any]], car: Any, other: Any, step: float
-) -> None:
+
+
+def _same(when: list[dict[str, Any]], car: Any, other: Any, step: float, changes: Any) -> None:
     bodies = (car, replace(other, id="other"))
-    patient, _ = _story(when, patient=True, step=step, bodies=bodies)
-    always, _ = _story(when, patient=False, step=step, bodies=bodies)
+    patient, _ = _story(when, patient=True, step=step, bodies=bodies, changes=changes)
+    always, _ = _story(when, patient=False, step=step, bodies=bodies, changes=changes)
     assert patient == always
+
+
+@settings(max_examples=40, deadline=None)
+@stories
+def test_the_same_happens_at_the_same_instants(**story: Any) -> None:
+    _same(**story)
+
+
+@pytest.mark.slow
+@settings(max_examples=1500, deadline=None)
+@stories
+def test_the_same_happens_in_many_stories(**story: Any) -> None:
+    _same(**story)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.1, 0.5])
+def test_who_changes_two_lanes_while_no_one_looks_is_met_there(step: float) -> None:
+    when = [{"distance": {"to": "other", "below": 3.0}}]
+    car = replace(CAR, speed=2.0, gain=2.5)
+    bodies, left = (car, replace(car, id="other", y=11.0)), (("car", 1.03, 7.0),)
+    found, _ = _story(when, patient=True, step=step, bodies=bodies, changes=left, until=3.0)
+    assert started(found, "r0") == [pytest.approx(1.03, abs=step)]
+
+
+def test_a_person_who_runs_at_once_is_met_in_time() -> None:
+    walker = replace(CAR, id="car", speed=0.0, acceleration=60.0, person=True, length=0.4)
+    when = [{"speed": {"above": 2.9}}]
+    patient, _ = _story(when, patient=True, step=0.05, bodies=(walker,), until=0.2)
+    always, _ = _story(when, patient=False, step=0.05, bodies=(walker,), until=0.2)
+    assert started(patient, "r0") == started(always, "r0") == [pytest.approx(0.05)]
 
 
 @pytest.mark.parametrize(

@@ -58,3 +58,32 @@ def test_every_vehicle_of_a_flow_departs_however_near_the_light_is(
         assert min(first) == pytest.approx(WANTED, abs=1e-3)
     elif metres < 20.0:  # it could not stop at the light otherwise
         assert max(first) < 0.75 * WANTED
+
+
+def node_on_approach(name: str, metres: float) -> str:
+    """Node of a lane that ends at a light, so far before its end."""
+    sumo = loaded(name).sumo
+    rest: dict[str, dict[int, float]] = {}
+    for node in range(len(sumo.graph.lanes.x)):
+        if (place := sumo.lane_places.of(node)) is not None:
+            edge = sumo.net.lanes[place[0]].edge
+            rest.setdefault(place[0], {})[node] = sumo.net.edge_length(edge) - place[1]
+    links = (link for light in sumo.lights for link in light.links)
+    own = next(rest[link.source] for link in links if link.source in rest)
+    return node_id(sumo.graph, min(own, key=lambda node: abs(own[node] - metres)))
+
+
+def test_who_appears_too_near_a_red_light_to_stop_is_there_at_the_wanted_speed(
+    tmp_path: Path,
+) -> None:
+    actor = {"id": "a", "category": "car", "spawn": node_on_approach("town_5x5", 8.0)}
+    rule = {
+        "id": "r", "actor": "a", "when": {"time": {"after": 30.0}},
+        "then": [{"appear": {"speed": 13.0}}],
+    }  # fmt: skip
+    run = prepared(document("town_5x5", [actor], [rule], until=33.0))
+    found = told(run, tmp_path / "run")
+    assert [event.time for event in found.events if event.kind == "departed"] == [30.1]
+    speed = found.tracks["a"].speed
+    assert speed[0] < 5.0  # with more SUMO would have given up the departure
+    assert 13.0 - 0.91 <= speed[1] <= 13.0  # it brakes with 9 m/s² at once

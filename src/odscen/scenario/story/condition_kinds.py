@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 
 NEVER = -1.0
 """Margin of what is not so, for conditions that are true or not and nothing between."""
+_STILL = 1e-6
+"""m/s at which no gap closes."""
+_TOUCHING = 1e-3
+"""Metres between bodies that touch and stay so: as long as one likes."""
 _FAR = 60.0
 """Metres beyond a bound that no one covers in a step."""
 COLOURS = {"red": "ru", "yellow": "yY", "green": "gG"}
@@ -45,7 +49,7 @@ class Reading(NamedTuple):
     value
         The number that is held against the bound.
     margin
-        By how much the condition is met; negative where it is not.
+        By how much the condition is met, in any unit; negative where it is not.
     rate
         Change of the margin per second; ``None`` if only two readings can tell.
     """
@@ -150,16 +154,27 @@ def _ttc(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
     if (both := _pair(part, actor, view)) is None:
         return None
     found = _lengthwise(*both)
-    gap = max(found.gap, 0.0)
-    return _bounded(part, gap / found.closing if found.closing > 1e-6 else math.inf)
+    return _seconds(part, max(found.gap, 0.0), found.closing)
 
 
 def _headway(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
     if (both := _pair(part, actor, view)) is None:
         return None
     found = _lengthwise(*both)
-    speed = found.behind.speed
-    return _bounded(part, max(found.gap, 0.0) / speed if speed > 1e-6 else math.inf)
+    return _seconds(part, max(found.gap, 0.0), found.behind.speed)
+
+
+def _seconds(part: PairBounded, gap: float, speed: float) -> Reading:
+    """Seconds that a gap is long at a speed.
+
+    They leap where the speed is about 0, and no line through two readings says when they meet a
+    bound; the margin is in metres: speed * bound - gap.
+    """
+    bound = part.below if part.below is not None else (part.above or 0.0)
+    moves = speed > _STILL
+    margin = speed * bound - (gap if moves else max(gap, _TOUCHING))
+    value = gap / speed if moves else math.inf
+    return Reading(value, margin if part.below is not None else -margin)
 
 
 def _distance(part: DistanceBounded, actor: str, view: RoadView) -> Reading | None:

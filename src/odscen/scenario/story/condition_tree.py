@@ -7,16 +7,16 @@ last two readings says; if the next reading shows that it did not, it turns back
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from odscen.scenario.story.flips import Flips, together
 from odscen.scenario.story.own_kinds import condition_kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from odscen.scenario.document.conditions_document import Condition
+    from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.story.condition_kinds import Reading
     from odscen.scenario.story.road_view import RoadView
 
@@ -33,143 +33,143 @@ class LeafMemory(NamedTuple):
     value: float | None = None
 
 
-class _Node(NamedTuple):
-    """A condition, taken apart once.
+class ConditionTree:
+    """The condition of a rule, taken apart once, with what it remembers from step to step.
 
-    ``read`` and ``key`` are those of a leaf; ``late`` says that it has a delay or an edge.
-    """
-
-    kind: str
-    part: Any
-    late: bool
-    key: str | None = None
-    read: Callable[[Any, str, RoadView], Reading | None] | None = None
-    children: tuple[tuple[Condition, str], ...] = ()
-
-
-def _node(condition: Condition, where: str) -> _Node:
-    kind = condition.kind
-    part = getattr(condition, kind)
-    late = bool(condition.delay) or condition.edge == "rising"
-    if kind == "not_":
-        return _Node(kind, part, late, children=((part, f"{where}.not"),))
-    if kind in ("all", "any"):
-        below = tuple((one, f"{where}.{kind}[{n}]") for n, one in enumerate(part))
-        return _Node(kind, part, late, children=below)
-    read = condition_kind(condition).read
-    return _Node(kind, part, late, None if read is None else f"{where}.{kind}", read)
-
-
-@dataclass
-class ConditionTrees:
-    """The conditions of all rules, with what they remember from step to step.
-
-    Attributes
+    Parameters
     ----------
     step
         Seconds between two looks.
     """
 
-    step: float
-    _nodes: dict[str, _Node] = field(default_factory=dict)
-    _leaves: dict[str, LeafMemory] = field(default_factory=dict)
-    _past: dict[str, Flips] = field(default_factory=dict)
-    _seen: dict[str, Flips] = field(default_factory=dict)
-    _new_leaves: dict[str, LeafMemory] = field(default_factory=dict)
-    _new_past: dict[str, Flips] = field(default_factory=dict)
+    def __init__(self, rule: StoryRule, step: float) -> None:
+        self._start = f"{rule.id}.when"
+        self._step = step
+        self._leaves: list[_Leaf] = []
+        self._late: list[_Late] = []
+        self._root = self._taken_apart(rule.when, self._start, rule.actor)
 
-    def look(self, condition: Condition, where: str, actor: str, view: RoadView) -> Flips:
-        """When the condition of a rule holds from ``view.time`` on, for one step.
+    def look(self, view: RoadView) -> Flips:
+        """When the condition holds from ``view.time`` on, for one step.
 
         It can be asked several times for one step, and knows better each time which rules have
         started and ended meanwhile; :meth:`next_step` ends the step.
         """
-        node = self._nodes.get(where)
-        if node is None:
-            node = self._nodes[where] = _node(condition, where)
-        kind, part, late, key, read, children = node
-        if key is not None and read is not None:
-            flips = self._seen.get(key) or self._leaf(read, part, key, actor, view)
-        elif kind == "rule":
-            flips = Flips(False, view.rule_changes(part.id, part.has)[:1]).after(view.time)
-        elif kind == "not_":
-            [(one, below)] = children
-            flips = self.look(one, below, actor, view).opposite()
-        else:
-            parts = [self.look(one, below, actor, view) for one, below in children]
-            flips = together(parts, every=kind == "all")
-        if late:
-            flips = self._later(condition, where, flips, view.time)
-        return flips
+        return self._root.look(view)
 
-    def values(self, start: str, seconds: float) -> dict[str, float]:
-        """What leaves are about so many seconds after the last look.
-
-        Parameters
-        ----------
-        start
-            Of their places in the tree; they are named by what comes after it.
-        """
+    def values(self, seconds: float) -> dict[str, float]:
+        """What leaves are about so many seconds after the last look, by their place in the tree."""
         found = {}
-        for key, (_, _, value) in self._new_leaves.items():
-            if value is not None and key.startswith(start):
-                before = self._leaves.get(key)
-                last = None if before is None else before.value
-                rate = 0.0 if last is None else (value - last) / self.step
-                name = key.removeprefix(start).lstrip(".")
+        for leaf in self._leaves:
+            value = None if leaf.flips is None else leaf.now.value
+            if value is not None:
+                last = None if leaf.before is None else leaf.before.value
+                rate = 0.0 if last is None else (value - last) / self._step
+                name = leaf.key.removeprefix(self._start).lstrip(".")
                 found[name] = value + (rate * seconds if seconds else 0.0)
         return found
 
-    def forget(self, where: str) -> None:
-        """Forget the last readings of a rule that is not looked at for a while."""
-        for leaves in (self._leaves, self._new_leaves):
-            for key in [key for key in leaves if key.startswith(where)]:
-                leaves[key] = LeafMemory(None, leaves[key].holds)
+    def forget(self) -> None:
+        """Forget the last readings: the rule is not looked at for a while."""
+        for leaf in self._leaves:
+            leaf.now = LeafMemory(None, leaf.now.holds)
+            if leaf.before is not None:
+                leaf.before = LeafMemory(None, leaf.before.holds)
 
     def next_step(self) -> None:
         """Keep what was seen in this step."""
-        self._leaves.update(self._new_leaves)
-        self._past.update(self._new_past)
-        self._seen, self._new_leaves, self._new_past = {}, {}, {}
+        for leaf in self._leaves:
+            if leaf.flips is not None:
+                leaf.before, leaf.flips = leaf.now, None
+        for late in self._late:
+            late.past = late.now
 
-    def state(self) -> dict[str, Any]:
-        """What has to be remembered, for JSON."""
-        return {
-            "leaves": {key: list(value) for key, value in self._leaves.items()},
-            "past": {key: [value.was, list(value.at)] for key, value in self._past.items()},
-        }
+    def state(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What leaves and what is delayed have to remember, by place in the tree, for JSON."""
+        leaves = {one.key: list(one.before) for one in self._leaves if one.before is not None}
+        late = {one.key: [one.past.was, list(one.past.at)] for one in self._late if one.past}
+        return leaves, late
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, leaves: Mapping[str, Any], late: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
-        self._leaves = {key: LeafMemory(*value) for key, value in state["leaves"].items()}
-        self._past = {key: Flips(was, tuple(at)) for key, (was, at) in state["past"].items()}
+        for leaf in self._leaves:
+            if (kept := leaves.get(leaf.key)) is not None:
+                leaf.before = leaf.now = LeafMemory(*kept)
+        for one in self._late:
+            if (past := late.get(one.key)) is not None:
+                one.past = one.now = Flips(past[0], tuple(past[1]))
 
-    def _leaf(
+    def _taken_apart(self, condition: Condition, where: str, actor: str) -> _Node:
+        kind = condition.kind
+        part = getattr(condition, kind)
+        node: _Node
+        if kind == "not_":
+            node = _Not(self._taken_apart(part, f"{where}.not", actor))
+        elif kind in ("all", "any"):
+            below = [
+                self._taken_apart(one, f"{where}.{kind}[{n}]", actor) for n, one in enumerate(part)
+            ]
+            node = _Combined(below, every=kind == "all")
+        elif (read := condition_kind(condition).read) is None:
+            node = _AfterRule(part.id, part.has)
+        else:
+            node = _Leaf(f"{where}.{kind}", read, part, actor, self._step)
+            self._leaves.append(node)
+        rising = condition.edge == "rising"
+        if condition.delay or rising:
+            node = _Late(where, node, condition.delay, self._step, rising=rising)
+            self._late.append(node)
+        return node
+
+
+class _Node(Protocol):
+    """A part of a condition."""
+
+    def look(self, view: RoadView) -> Flips:
+        """When it holds from ``view.time`` on, for one step."""
+
+
+class _Leaf:
+    """A condition that is read; ``flips`` are ``None`` until it has been in this step."""
+
+    __slots__ = ("_actor", "_part", "_read", "_step", "before", "flips", "key", "now")
+
+    def __init__(
         self,
+        key: str,
         read: Callable[[Any, str, RoadView], Reading | None],
         part: Any,
-        where: str,
         actor: str,
-        view: RoadView,
-    ) -> Flips:
-        reading = read(part, actor, view)
-        before = self._leaves.get(where)
-        if reading is None:
-            was = before is not None and before.holds
-            flips = Flips(was, (view.time,) if was else ())
-            self._new_leaves[where] = LeafMemory(None, holds=False)
-        else:
-            value, margin, rate = reading
-            flips = self._read(margin, rate, before, view.time)
-            near = -math.inf < margin < math.inf
-            far = not -math.inf < value < math.inf
-            self._new_leaves[where] = LeafMemory(
-                margin if near else None, flips.last, None if far else value
-            )
-        self._seen[where] = flips
+        step: float,
+    ) -> None:
+        self.key = key
+        self.before: LeafMemory | None = None
+        self.now = LeafMemory(None, holds=False)
+        self.flips: Flips | None = None
+        self._read, self._part, self._actor, self._step = read, part, actor, step
+
+    def look(self, view: RoadView) -> Flips:
+        """When it holds; it is read once a step."""
+        flips = self.flips
+        if flips is None:
+            flips = self.flips = self._look(view)
         return flips
 
-    def _read(
+    def _look(self, view: RoadView) -> Flips:
+        reading = self._read(self._part, self._actor, view)
+        before = self.before
+        if reading is None:
+            was = before is not None and before.holds
+            self.now = LeafMemory(None, holds=False)
+            return Flips(was, (view.time,) if was else ())
+        value, margin, rate = reading
+        flips = self._turns(margin, rate, before, view.time)
+        near = -math.inf < margin < math.inf
+        far = not -math.inf < value < math.inf
+        self.now = LeafMemory(margin if near else None, flips.last, None if far else value)
+        return flips
+
+    def _turns(
         self, margin: float, rate: float | None, before: LeafMemory | None, time: float
     ) -> Flips:
         was = holds = margin >= 0.0
@@ -178,21 +178,61 @@ class ConditionTrees:
             if abs(margin) <= _CLOSE:
                 holds = was
             if rate is None and last is not None:
-                rate = (margin - last) / self.step
+                rate = (margin - last) / self._step
         at = () if holds == was else (time,)
         if rate and (rate > 0.0) != holds and abs(margin) < math.inf:
             turn = max(time - margin / rate, time)
-            if turn < time + self.step:
+            if turn < time + self._step:
                 at = (*at, turn)
         if not at:  # nearly always
             return _ALWAYS if was else NEVER_IN_STEP
         return Flips(was, at)
 
-    def _later(self, condition: Condition, where: str, flips: Flips, time: float) -> Flips:
-        """Delay what is seen, or take its risings; both need what was before this step."""
-        past = self._past.get(where, Flips(flips.was))
+
+class _AfterRule:
+    """Another rule has started, or ended."""
+
+    def __init__(self, rule: str, has: str) -> None:
+        self._rule, self._has = rule, has
+
+    def look(self, view: RoadView) -> Flips:
+        """When it holds."""
+        return Flips(False, view.rule_changes(self._rule, self._has)[:1]).after(view.time)
+
+
+class _Not:
+    def __init__(self, below: _Node) -> None:
+        self._below = below
+
+    def look(self, view: RoadView) -> Flips:
+        """When it holds."""
+        return self._below.look(view).opposite()
+
+
+class _Combined:
+    def __init__(self, below: Sequence[_Node], *, every: bool) -> None:
+        self._below, self._every = below, every
+
+    def look(self, view: RoadView) -> Flips:
+        """When it holds; all parts are read, as each remembers its readings."""
+        return together([one.look(view) for one in self._below], every=self._every)
+
+
+class _Late:
+    """A condition with a delay, or its risings; both need what was before this step."""
+
+    def __init__(self, key: str, below: _Node, delay: float, step: float, *, rising: bool) -> None:
+        self.key = key
+        self.past: Flips | None = None
+        self.now: Flips | None = None
+        self._below, self._delay, self._step, self._rising = below, delay, step, rising
+
+    def look(self, view: RoadView) -> Flips:
+        """When it holds."""
+        flips, time = self._below.look(view), view.time
+        past = self.past or Flips(flips.was)
         whole = Flips(past.was, (*(one for one in past.at if one < time), *flips.at))
-        self._new_past[where] = whole.after(time - condition.delay - 2.0 * self.step)
-        if condition.edge == "rising":
-            whole = whole.risings(self.step)
-        return whole.shifted(condition.delay).after(time)
+        self.now = whole.after(time - self._delay - 2.0 * self._step)
+        if self._rising:
+            whole = whole.risings(self._step)
+        return whole.shifted(self._delay).after(time)

@@ -72,10 +72,15 @@ class Flips(NamedTuple):
 
 def together(parts: Sequence[Flips], *, every: bool) -> Flips:
     """What is true where all parts are (``every``), or any of them."""
-    meet = all if every else any
-    was = meet(part.was for part in parts)
-    if not any(part.at for part in parts):
+    was, steady = every, True
+    for part in parts:
+        if part.was != every:
+            was = not every
+        if part.at:
+            steady = False
+    if steady:  # nearly always
         return Flips(was)
+    meet = all if every else any
     changes, now = [], was
     for instant in sorted({one for part in parts for one in part.at}):
         if (holds := meet(part.holds(instant) for part in parts)) != now:

@@ -1,7 +1,7 @@
 """Rules that cannot fire yet are not looked at: until when, follows from how fast bodies can be.
 
 Most conditions of most rules are far from met: the other one is two streets away, or the light is a
-minute off. Who drives as SUMO lets him drive gains at most :data:`MOST_GAIN`, so that such a
+minute off. Who drives as SUMO lets him drive gains no more than his vehicle can, so that such a
 condition stays unmet for a while that can be told. A rule is looked at again :data:`BEFORE` steps
 before, as the instant at which it comes true follows from its last two readings.
 """
@@ -24,14 +24,18 @@ if TYPE_CHECKING:
         Reaching,
     )
     from odscen.scenario.document.rules_document import StoryRule
-    from odscen.scenario.story.road_view import Point, RoadView
+    from odscen.scenario.story.road_view import ActorView, Point, RoadView
 
-MOST_GAIN = 10.0
-"""m/s²; what SUMO drives accelerates less."""
 BEFORE = 3
 """Steps."""
-LONGEST = 2.0
+LONGEST = 10.0
 """Seconds; for longer the bound says little."""
+_ASIDE = 8.0
+"""Metres that changes of lanes put a vehicle aside at once: two of them."""
+_RUNS = 10.0
+"""m/s; nobody on foot is faster, and SUMO lets a person have any speed at once."""
+_AGAIN = 5
+"""Steps after which it is asked again for how long a rule is far from met."""
 
 
 class QuietSpells:
@@ -41,23 +45,19 @@ class QuietSpells:
     ----------
     step
         Seconds between two looks.
+
+    Attributes
+    ----------
+    until
+        Instant before which a rule is not looked at, of those of which there is one.
     """
 
     def __init__(self, step: float) -> None:
+        self.until: dict[str, float] = {}
         self._step = step
-        self._until: dict[str, float] = {}
+        self._ask: dict[str, float] = {}
         self._actors: dict[str, frozenset[str]] = {}
         self._tellers: dict[str, _Teller | None] = {}
-
-    def lasts(self, rule: StoryRule, time: float, moved: Collection[str]) -> bool:
-        """Whether a rule is not to be looked at; it is when one of its actors is being moved."""
-        until = self._until.get(rule.id)
-        if until is None:
-            return False
-        if time < until and self._actors[rule.id].isdisjoint(moved):
-            return True
-        del self._until[rule.id]
-        return False
 
     def begins(self, rule: StoryRule, view: RoadView, moved: Collection[str]) -> bool:
         """Whether a rule whose condition is not met, and will not be in this step, is left now."""
@@ -65,29 +65,36 @@ class QuietSpells:
         if name not in self._tellers:
             self._tellers[name] = _teller(rule.when) if _can_be_told(rule) else None
             self._actors[name] = _about(rule)
-        teller = self._tellers[name]
-        if teller is None:
+        teller, time = self._tellers[name], view.time
+        if teller is None or time < self._ask.get(name, time):
+            return False
+        if not self._actors[name].isdisjoint(moved):
             return False
         seconds = min(quiet_seconds(teller, rule.actor, view), LONGEST)
-        until = view.time + seconds - BEFORE * self._step
-        if until <= view.time + self._step or not self._actors[name].isdisjoint(moved):
+        until = time + seconds - BEFORE * self._step
+        if until <= time + self._step:
+            self._ask[name] = time + _AGAIN * self._step
             return False
-        self._until[name] = until
+        self.until[name] = until
         return True
 
-    def end(self) -> None:
-        """Look at all rules again: somebody is elsewhere than he drove."""
-        self._until.clear()
+    def end(self, actor: str | None = None) -> None:
+        """Look again at the rules about an actor, who is moved, or at all."""
+        if actor is None:
+            self.until.clear()
+        else:
+            for name in [name for name in self.until if actor in self._actors[name]]:
+                del self.until[name]
 
     def state(self) -> dict[str, float]:
         """What has to be remembered, for JSON."""
-        return dict(self._until)
+        return dict(self.until)
 
     def restore(self, state: Mapping[str, float], rules: Mapping[str, StoryRule]) -> None:
         """Inverse of :meth:`state`."""
         for name, until in state.items():
             self._actors[name] = _about(rules[name])
-            self._until[name] = until
+            self.until[name] = until
 
 
 def quiet_seconds(teller: _Teller, actor: str, view: RoadView) -> float:
@@ -146,10 +153,12 @@ def _about(rule: StoryRule) -> frozenset[str]:
     return frozenset((rule.actor, *(name for _, _, part in parts for _, name in actors_of(part))))
 
 
-def _covers(metres: float, speed: float, gain: float = MOST_GAIN) -> float:
+def _covers(metres: float, speed: float, gain: float) -> float:
     """Seconds in which so many metres are covered at the earliest."""
     if metres <= 0.0:
         return 0.0
+    if gain <= 0.0:
+        return metres / speed if speed > 0.0 else math.inf
     return (math.sqrt(speed * speed + 2.0 * gain * metres) - speed) / gain
 
 
@@ -161,14 +170,35 @@ def _speed(part: OwnBounded, actor: str, view: RoadView) -> float:
     if part.above is None:  # whoever collides stands at once
         return 0.0
     one = view.actor(part.of or actor)
-    return 0.0 if one is None else (part.above - one.speed) / MOST_GAIN
+    if one is None:
+        return _absent(view, part.of or actor)
+    if one.person:
+        return 0.0
+    return (part.above - one.speed) / one.gain if one.gain > 0.0 else LONGEST
 
 
 def _travelled(part: OwnBounded, actor: str, view: RoadView) -> float:
     if part.above is None:
         return 0.0
     one = view.actor(part.of or actor)
-    return 0.0 if one is None else _covers(part.above - one.travelled, one.speed)
+    if one is None:
+        return _absent(view, part.of or actor)
+    return _covers(part.above - one.travelled, *_pace(one))
+
+
+def _absent(view: RoadView, *actors: str) -> float:
+    """Seconds for which a condition on actors, one of whom is not there, is not met."""
+    return LONGEST if any(map(view.gone, actors)) else 0.0
+
+
+def _pace(one: ActorView) -> tuple[float, float]:
+    """Speed, and how much of it can be gained in a second."""
+    return (max(one.speed, _RUNS), 0.0) if one.person else (one.speed, one.gain)
+
+
+def _farthest(one: ActorView) -> float:
+    """Metres from the centre of a body, with and without it, and of lanes beside."""
+    return (one.length + one.width) / 2.0 + (0.0 if one.person else _ASIDE)
 
 
 def _reaches(part: Reaching, actor: str, view: RoadView) -> float:
@@ -183,19 +213,18 @@ def _distance(part: DistanceBounded, actor: str, view: RoadView) -> float:
         return _to_point(name, view.place(part.place or ""), part.below, view)
     one, other = view.actor(name), view.actor(part.to)
     if one is None or other is None:
-        return 0.0
-    # The bodies' farthest points, so that it is right with and without them.
-    reach = (one.length + one.width + other.length + other.width) / 2.0
-    away = math.dist((one.x, one.y), (other.x, other.y)) - reach - part.below
-    return _covers(away, one.speed + other.speed, 2.0 * MOST_GAIN)
+        return _absent(view, name, part.to)
+    away = math.dist((one.x, one.y), (other.x, other.y)) - part.below
+    (speed, gain), (speeds, gains) = _pace(one), _pace(other)
+    return _covers(away - _farthest(one) - _farthest(other), speed + speeds, gain + gains)
 
 
 def _to_point(actor: str, point: Point, bound: float, view: RoadView) -> float:
     one = view.actor(actor)
     if one is None:
-        return 0.0
-    away = math.dist((one.x, one.y), point) - (one.length + one.width) / 2.0 - bound
-    return _covers(away, one.speed)
+        return _absent(view, actor)
+    away = math.dist((one.x, one.y), point) - _farthest(one) - bound
+    return _covers(away, *_pace(one))
 
 
 _TELL: dict[str, Callable[[Any, str, RoadView], float]] = {

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 Point = tuple[float, float]
+MOST_GAIN = 10.0
+"""m/s²; what SUMO drives accelerates less."""
 
 
 @dataclass(slots=True)  # not frozen: many are made in each step, and that takes three times as long
@@ -31,6 +33,8 @@ class ActorView:
         Instant since which it has been standing; ``None`` while it moves.
     off_road
         Whether its centre is on no lane.
+    gain
+        Most that its speed grows where no rule moves it, m/s².
     """
 
     id: str
@@ -45,6 +49,7 @@ class ActorView:
     person: bool
     standing: float | None = None
     off_road: bool = False
+    gain: float = MOST_GAIN
 
     @property
     def velocity(self) -> Point:
@@ -76,6 +81,9 @@ class RoadView(Protocol):
 
     def actor(self, name: str) -> ActorView | None:
         """Return an actor, ``None`` if it is not on the road."""
+
+    def gone(self, name: str) -> bool:
+        """Whether an actor has left the road for good."""
 
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""

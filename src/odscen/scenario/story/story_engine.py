@@ -8,14 +8,15 @@ ends, the next begins, another rule has waited for that.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
 from odscen.scenario.story.channels import Channel, WantedMove
-from odscen.scenario.story.condition_tree import NEVER_IN_STEP, ConditionTrees
+from odscen.scenario.story.condition_tree import NEVER_IN_STEP, ConditionTree
 from odscen.scenario.story.own_kinds import action_kind
 from odscen.scenario.story.quiet_spells import QuietSpells
+from odscen.scenario.story.rule_states import RuleState, Running
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -46,38 +47,6 @@ class StoryEvent(NamedTuple):
     values: dict[str, float] | None = None
 
 
-@dataclass
-class _Running:
-    """An action that runs: its place in the item of ``then``, and when it is over."""
-
-    number: int
-    end: float
-
-    def state(self) -> dict[str, Any]:
-        """Values that JSON can hold."""
-        return {"number": self.number, "end": None if self.end == math.inf else self.end}
-
-    @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> _Running:
-        """Inverse of :meth:`state`."""
-        return cls(state["number"], math.inf if state["end"] is None else state["end"])
-
-
-@dataclass
-class _RuleState:
-    """A rule: how often it has fired, what it does, and when it may fire again.
-
-    ``started`` and ``ended`` have the first instant of each, if there was one.
-    """
-
-    fired: int = 0
-    ready: float = 0.0
-    item: int | None = None
-    running: list[_Running] = field(default_factory=list)
-    started: list[float] = field(default_factory=list)
-    ended: list[float] = field(default_factory=list)
-
-
 class StoryEngine:
     """The rules of one run.
 
@@ -96,9 +65,12 @@ class StoryEngine:
         self.patient = True
         self._rules = {rule.id: rule for rule in rules}
         self._step = step
-        self._trees = ConditionTrees(step)
+        self._trees = {rule.id: ConditionTree(rule, step) for rule in rules}
         self._quiet = QuietSpells(step)
-        self._states = {rule.id: _RuleState() for rule in rules}
+        self._looked: dict[str, ConditionTree] = {}
+        self._nothing_before = -math.inf
+        self._states = {rule.id: RuleState() for rule in rules}
+        self._busy: set[str] = set()
         self._channels: dict[str, Channel] = {}
         self._events: list[StoryEvent] = []
         self._asked: list[Wanted] = []
@@ -118,11 +90,14 @@ class StoryEngine:
     def add(self, rule: StoryRule) -> None:
         """Add a rule to those that there are."""
         self._rules[rule.id] = rule
-        self._states[rule.id] = _RuleState()
+        self._trees[rule.id] = ConditionTree(rule, self._step)
+        self._states[rule.id] = RuleState()
+        self._nothing_before = -math.inf
 
     def look_at_all(self) -> None:
         """Look at all rules in the next step: somebody is elsewhere than he drove."""
         self._quiet.end()
+        self._nothing_before = -math.inf
 
     def may_fire(self, rule: str) -> bool:
         """Whether a rule can fire yet, or is about something."""
@@ -132,6 +107,8 @@ class StoryEngine:
     def step(self, view: RoadView) -> tuple[dict[str, WantedMove], list[StoryEvent]]:
         """Look at the road; what is wanted of whom until the next look, and what happened."""
         self._events, self._asked = [], []
+        if view.time < self._nothing_before:
+            return {}, self._events
         self._begin_step(view)
         now = view.time
         for _ in range(_MOST_TURNS):
@@ -140,7 +117,10 @@ class StoryEngine:
                 break
             now, rule = turn
             self._turn(view, now, self._rules[rule])
-        self._trees.next_step()
+        for tree in self._looked.values():
+            tree.next_step()
+        self._looked = {}
+        self._nothing_before = self._until_something(view.time)
         moves = {}
         for name, channel in sorted(self._channels.items()):
             if (one := view.actor(name)) is not None:
@@ -151,8 +131,12 @@ class StoryEngine:
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
+        kept = [tree.state() for tree in self._trees.values()]
         return {
-            "trees": self._trees.state(),
+            "trees": {
+                "leaves": {key: one for leaves, _ in kept for key, one in leaves.items()},
+                "past": {key: one for _, past in kept for key, one in past.items()},
+            },
             "quiet": self._quiet.state(),
             "rules": {
                 name: {**asdict(state), "running": [one.state() for one in state.running]}
@@ -163,11 +147,14 @@ class StoryEngine:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
-        self._trees.restore(state["trees"])
+        self._nothing_before = -math.inf
+        for tree in self._trees.values():
+            tree.restore(state["trees"]["leaves"], state["trees"]["past"])
         self._quiet.restore(state.get("quiet", {}), self._rules)
         for name, kept in state["rules"].items():
-            running = [_Running.from_state(one) for one in kept["running"]]
-            self._states[name] = _RuleState(**{**kept, "running": running})
+            running = [Running.from_state(one) for one in kept["running"]]
+            self._states[name] = RuleState(**{**kept, "running": running})
+        self._busy = {name for name, one in self._states.items() if one.item is not None}
         self._channels = {name: Channel.from_state(one) for name, one in state["channels"].items()}
 
     def _begin_step(self, view: RoadView) -> None:
@@ -178,6 +165,8 @@ class StoryEngine:
                 self._gone(view, name)
             else:
                 self._channels[name].begin_step(actor, view.time)
+        if not self._busy:
+            return
         for name, rule in self._rules.items():
             if running := self._states[name].running:
                 for one in list(running):
@@ -192,36 +181,55 @@ class StoryEngine:
                     self._say(view.time, FAILED, rule, "it has left the road")
                 self._over(rule, view.time)
 
+    def _until_something(self, time: float) -> float:
+        """Instant before which nothing can happen if nobody is put elsewhere."""
+        if self._channels or self._busy:
+            return -math.inf
+        least = math.inf
+        for name, rule in self._rules.items():
+            if self._states[name].fired < rule.times:
+                least = min(least, self._quiet.until.get(name, -math.inf))
+                if least <= time:
+                    return -math.inf
+        return least
+
     def _next_turn(self, view: RoadView, now: float) -> tuple[float, str] | None:
         """First instant at which something happens, and the rule to which it does."""
-        found: list[tuple[float, int, str]] = []
-        end = view.time + self._step
-        for index, (name, rule) in enumerate(self._rules.items()):
+        found: tuple[float, str] | None = None
+        time, until = view.time, self._quiet.until
+        first = time + self._step
+        end = first
+        for name, rule in self._rules.items():
             state = self._states[name]
             if state.item is not None:
-                due = min((one.end for one in state.running), default=now)
-                if due < end:
-                    found.append((max(due, now), index, name))
-            elif state.fired < rule.times:
-                if self._quiet.lasts(rule, view.time, self._channels):
-                    continue
-                holds = self._trees.look(rule.when, f"{name}.when", rule.actor, view)
-                if state.fired:
-                    instant = holds.first_rise(now, end, after=state.ready)
-                else:
-                    instant = holds.first(now, end)
-                if instant is not None:
-                    found.append((instant, index, name))
-                elif (
-                    self.patient
-                    and holds == NEVER_IN_STEP
-                    and self._quiet.begins(rule, view, self._channels)
-                ):
-                    self._trees.forget(f"{name}.when")
-        if not found:
-            return None
-        instant, _, name = min(found)
-        return instant, name
+                due = max(min((one.end for one in state.running), default=now), now)
+                instant = due if due < end else None
+            elif state.fired < rule.times and time >= until.get(name, time):
+                instant = self._instant(rule, state, view, now, end)
+            else:
+                continue
+            if instant is not None and instant < first:  # of several at once the first one
+                first, found = instant, (instant, name)
+        return found
+
+    def _instant(
+        self, rule: StoryRule, state: RuleState, view: RoadView, now: float, end: float
+    ) -> float | None:
+        """Instant from ``now`` on, before ``end``, at which a rule fires."""
+        tree = self._looked[rule.id] = self._trees[rule.id]
+        holds = tree.look(view)
+        if state.fired:
+            instant = holds.first_rise(now, end, after=state.ready)
+        else:
+            instant = holds.first(now, end)
+        if (
+            instant is None
+            and self.patient
+            and holds == NEVER_IN_STEP
+            and self._quiet.begins(rule, view, self._channels)
+        ):
+            tree.forget()
+        return instant
 
     def _turn(self, view: RoadView, now: float, rule: StoryRule) -> None:
         state = self._states[rule.id]
@@ -238,8 +246,9 @@ class StoryEngine:
         state = self._states[rule.id]
         state.fired += 1
         state.item = -1
+        self._busy.add(rule.id)
         state.started = state.started or [now]
-        values = self._trees.values(f"{rule.id}.when.", now - view.time)
+        values = self._trees[rule.id].values(now - view.time)
         self._say(now, STARTED, rule, values=values or None)
         self._next_item(view, now, rule)
 
@@ -252,14 +261,14 @@ class StoryEngine:
             self._over(rule, now)
             return
         for number, action in enumerate(rule.then[state.item].parts):
-            one = _Running(number, math.inf)
+            one = Running(number, math.inf)
             state.running.append(one)
             self._begin(view, now, rule, action, one)
             if state.item is None:  # that failed
                 return
 
     def _begin(
-        self, view: RoadView, now: float, rule: StoryRule, action: Action, one: _Running
+        self, view: RoadView, now: float, rule: StoryRule, action: Action, one: Running
     ) -> None:
         kind, part = action_kind(action), getattr(action, action.kind)
         try:
@@ -281,7 +290,7 @@ class StoryEngine:
         rule: StoryRule,
         kind: ActionKind,
         part: Any,
-        one: _Running,
+        one: Running,
     ) -> None:
         """Begin an action of an actor that is on the road."""
         acting = self._acting(view, now, rule, one)
@@ -298,7 +307,7 @@ class StoryEngine:
             if owner is not None and new != owner:
                 self._override(owner, now, rule)
 
-    def _update(self, view: RoadView, rule: StoryRule, one: _Running, now: float) -> None:
+    def _update(self, view: RoadView, rule: StoryRule, one: Running, now: float) -> None:
         state = self._states[rule.id]
         if view.actor(rule.actor) is None or state.item is None:
             return
@@ -312,13 +321,13 @@ class StoryEngine:
         except CannotAct as error:
             self._fail(rule, now, str(error))
 
-    def _finish(self, view: RoadView, now: float, rule: StoryRule, one: _Running) -> None:
+    def _finish(self, view: RoadView, now: float, rule: StoryRule, one: Running) -> None:
         action = rule.then[self._states[rule.id].item or 0].parts[one.number]
         kind = action_kind(action)
         if kind.finish is not None and view.actor(rule.actor) is not None:
             kind.finish(getattr(action, action.kind), self._acting(view, now, rule, one))
 
-    def _acting(self, view: RoadView, now: float, rule: StoryRule, one: _Running) -> ActingActor:
+    def _acting(self, view: RoadView, now: float, rule: StoryRule, one: Running) -> ActingActor:
         actor = view.actor(rule.actor)
         if actor is None:
             msg = f"{rule.actor!r} is not on the road"
@@ -326,6 +335,7 @@ class StoryEngine:
         channel = self._channels.get(actor.id)
         if channel is None:
             channel = self._channels[actor.id] = Channel()
+            self._quiet.end(actor.id)
             channel.begin_step(actor, view.time)
         owner = f"{rule.id}/{one.number}"
         return ActingActor(view, actor, channel, now, self._step, owner, self._channels)
@@ -357,6 +367,7 @@ class StoryEngine:
     def _over(self, rule: StoryRule, now: float) -> None:
         state = self._states[rule.id]
         state.item, state.ready = None, now
+        self._busy.discard(rule.id)
         state.running = []
         state.ended = state.ended or [now]
 

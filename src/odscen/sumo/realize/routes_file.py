@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 class HeldActor:
     """A road user that is not inserted before a rule says so: SUMO's words for its departure.
 
-    ``attributes`` are those of ``<vehicle>`` or of ``<person>`` with its ``<walk>``.
+    ``attributes`` are those of ``<vehicle>`` or of ``<person>`` with its ``<walk>``; ``mostSpeed``
+    is the highest ``departSpeed`` that SUMO takes.
     """
 
     edges: tuple[str, ...]
@@ -72,6 +73,7 @@ class RoutesFile:
         *,
         bays: Collection[str] = (),
         speed: float = 0.0,
+        most: float = math.inf,
         looks_every: float | None = None,
     ) -> None:
         """Add a vehicle that drives ``route``.
@@ -82,10 +84,13 @@ class RoutesFile:
             Stops at which vehicles stand beside the lane.
         speed
             At departure, m/s, of one that does not enter from outside.
+        most
+            Highest speed at which SUMO lets it depart, m/s.
         looks_every
             Seconds after which the driver looks for a quicker route again; ``None`` is never.
         """
-        appears = appears_at(user)
+        appears, held = appears_at(user), self.holds_back(user)
+        begin = speed if held else min(speed, most)
         attributes = [
             ("id", user.id),
             ("type", self._type(user.category.value, driver)),
@@ -94,13 +99,14 @@ class RoutesFile:
             ("departPos", "stop" if user.begins else number(route.depart_pos, digits=4)),
             # That of the vehicles ahead: a free lane then takes what HCM gives it. With "max" a
             # lane of a motorway takes a tenth less at steps of 1 s.
-            ("departSpeed", "avg" if user.entering else number(_bounded(speed), digits=4)),
+            ("departSpeed", "avg" if user.entering else number(_bounded(begin), digits=4)),
             ("departPosLat", number(route.depart_pos_lat, digits=4)),
             ("arrivalLane", "current" if route.arrival_lane is None else str(route.arrival_lane)),
             ("arrivalPos", number(route.arrival_pos, digits=4)),
             ("speedFactor", number(driver.speed_factor, digits=4)),
         ]
-        if user.id in self._held_back:
+        if held:
+            attributes.append(("mostSpeed", number(_bounded(most), digits=4)))
             self.held[user.id] = HeldActor(tuple(route.edges), dict(attributes))
             return
         if user.depart == 0.0:
@@ -115,6 +121,10 @@ class RoutesFile:
             "    </vehicle>",
         ]
         self._lines.append((appears, user.id, lines))
+
+    def holds_back(self, user: RoadUser) -> bool:
+        """Whether a road user is not inserted before a rule says so."""
+        return user.id in self._held_back
 
     def add_walk(self, user: RoadUser, driver: Driver, walk: Walk) -> None:
         """Add a person that walks ``walk``."""

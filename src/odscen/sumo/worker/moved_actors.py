@@ -74,7 +74,13 @@ class SavedWalk(NamedTuple):
 
 
 class MovedActors:
-    """Reads and moves road users by name."""
+    """Reads and moves road users by name.
+
+    Attributes
+    ----------
+    knows
+        Says whether SUMO has a vehicle or person of a name, on the road or not.
+    """
 
     def __init__(
         self,
@@ -83,7 +89,9 @@ class MovedActors:
         lanes_of_edge: Mapping[str, Sequence[str]],
         admits: Callable[[str, str], bool],
         native: Callable[[str, str], Callable[[str], Any]],
+        knows: Callable[[str], bool],
     ) -> None:
+        self.knows = knows
         self._position = native("vehicle", "getPosition")
         self._angle, self._speed = native("vehicle", "getAngle"), native("vehicle", "getSpeed")
         self._more = tuple(native("vehicle", getter) for getter in _MORE)
@@ -151,6 +159,10 @@ class MovedActors:
     def fastest(self, vehicle: str) -> float:
         """Highest speed that a vehicle's type allows, m/s."""
         return float(self._sumo.vehicle.getMaxSpeed(vehicle))
+
+    def gain(self, vehicle: str) -> float:
+        """Most that a vehicle accelerates by itself, m/s²."""
+        return float(self._sumo.vehicle.getAccel(vehicle))
 
     def limit(self, vehicle: str, speed: float) -> None:
         """Set the highest speed that a vehicle can go, m/s."""
@@ -237,7 +249,10 @@ class MovedActors:
         self._sumo.vehicle.remove(vehicle, self._sumo.REMOVE_ARRIVED)
 
     def insert(self, name: str, one: HeldActor, speed: float | None) -> bool:
-        """Let a road user depart as soon as there is room; false if SUMO cannot."""
+        """Let a road user depart as soon as there is room; false if SUMO cannot.
+
+        A vehicle at no higher speed than SUMO takes there, see :meth:`begin_at`.
+        """
         own = one.attributes
         try:
             if one.person:
@@ -247,7 +262,10 @@ class MovedActors:
                 persons.appendWalkingStage(name, list(one.edges), float(own["arrivalPos"]))
             else:
                 route, begin = f"{name} appears", own["departSpeed"]
-                begin = begin if speed is None else f"{speed:.4f}"
+                if speed is not None:
+                    begin = f"{min(speed, float(own['mostSpeed'])):.4f}"
+                elif begin != "avg":
+                    begin = f"{min(float(begin), float(own['mostSpeed'])):.4f}"
                 self._sumo.route.add(route, one.edges)
                 self._sumo.vehicle.add(
                     name, route, own["type"], "now", own["departLane"], own["departPos"],
@@ -257,6 +275,10 @@ class MovedActors:
         except self._errors:
             return False
         return True
+
+    def begin_at(self, vehicle: str, speed: float) -> None:
+        """Let a vehicle that has just departed have another speed."""
+        self._sumo.vehicle.setPreviousSpeed(vehicle, speed)
 
     def show_lights(self, vehicle: str, lights: Sequence[str] | None) -> None:
         """Set the lights of a vehicle, or give them back to the driver."""

@@ -82,10 +82,14 @@ class Recorder:
     ----------
     drained
         How many events were drained before.
+    jumps
+        Steps after which somebody was elsewhere, or had another speed, than it drove: there was a
+        teleport or a collision.
     """
 
     def __init__(self, plan: Plan) -> None:
         self.drained = 0
+        self.jumps = 0
         self._events: list[Event] = []
         self._departed = 0
         self._arrived = 0
@@ -186,6 +190,8 @@ class Recorder:
         lists = session.happened()
         if lists is not None:
             self._put_by.append(_EventfulStep(self._number, time, lists))
+            if lists.teleports_started or lists.teleports_ended or lists.collisions:
+                self.jumps += 1
         if time >= self._jams.due:
             self.events.extend(self._jams.look(session, time))
 

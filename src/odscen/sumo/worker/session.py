@@ -251,7 +251,8 @@ class Session:
     def moved_actors(self) -> MovedActors:
         """Hand of rules on single road users."""
         native = partial(_native, self._sumo)
-        return MovedActors(self._sumo, self._errors, self._lanes_of_edge, self._admits, native)
+        lanes = self._lanes_of_edge
+        return MovedActors(self._sumo, self._errors, lanes, self._admits, native, self.knows)
 
     def driven_vehicles(self) -> DrivenVehicles:
         """Hand of behaviour models on all vehicles."""

@@ -181,36 +181,45 @@ class RoadUserWriter:
             if isinstance(planned.route, Walk):
                 self.demand.add_walk(user, behaviour, planned.route)
             else:
+                speed, most = self._initial_speeds(user, behaviour, planned.route)
                 self.demand.add_vehicle(
                     user,
                     behaviour,
                     planned.route,
                     bays=self._bays,
-                    speed=self._initial_speed(user, behaviour, planned.route),
+                    speed=speed,
+                    most=most,
                     looks_every=self._period if self._ways.informed(user) else None,
                 )
             self.notes += [f"{user.id}: {repair.words}" for repair in planned.route.repairs]
         return self._planned(user, body, behaviour, planned)
 
-    def _initial_speed(self, user: RoadUser, behaviour: Driver, route: Route) -> float:
-        """Speed at departure, m/s: SUMO ends a run in which one is above what the lane allows.
+    def _initial_speeds(
+        self, user: RoadUser, behaviour: Driver, route: Route
+    ) -> tuple[float, float]:
+        """Speed at departure, m/s, and the highest at which SUMO lets it depart.
 
-        Of one that departs later it gives up the departure if it could not stop before the next
-        junction, ``v t + v**2 / (2 b) > room``; those at 0 it takes unconditionally.
+        SUMO ends a run in which one is above what the lane allows. Of one that departs later it
+        gives up the departure if it could not stop before the next junction,
+        ``v t + v**2 / (2 b) > room``; those at 0 it takes unconditionally.
         """
-        wanted, place = user.initial_speed, self._lane_places.of(user.spawn)
-        if not wanted or place is None:
-            return 0.0
+        wanted, place = user.initial_speed or 0.0, self._lane_places.of(user.spawn)
+        appears = self.demand.holds_back(user)
+        if place is None or not (wanted or appears):
+            return 0.0, 0.0
         allowed = self._net.lanes[place[0]].speed * behaviour.speed_factor
-        wanted = min(wanted, allowed, behaviour.max_speed)
-        if user.depart == 0.0 or self._net.edge_lanes[route.edges[0]][0].internal:
-            return wanted
+        allowed = min(allowed, behaviour.max_speed)
+        wanted = min(wanted, allowed)
+        at_once = user.depart == 0.0 and not appears
+        if at_once or self._net.edge_lanes[route.edges[0]][0].internal:
+            return wanted, allowed
         lane = self._net.edge_lanes[route.edges[0]][route.depart_lane]
         room = self._net.room_to_stop(lane.id, route.depart_pos, route.edges, self._signalled)
         decel = float(dict(behaviour.attributes)["decel"])
         reacting = decel * max(self._step_length, self._scenario.simulation.action_step or 0.0)
         room = max(room - STOP_MARGIN, 0.0)
-        return min(wanted, math.sqrt(reacting**2 + 2.0 * decel * room) - reacting)
+        stops = math.sqrt(reacting**2 + 2.0 * decel * room) - reacting
+        return wanted, min(allowed, stops)
 
     def _planned(
         self, user: RoadUser, body: Body, behaviour: Driver, planned: _PlannedRoute

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 BODIES = "bodies"
 """Kind of collision, where odscen has found it."""
 _HALVINGS = 20
+_LONG = 3.0
+"""Seconds after which a body is read again."""
+_ASIDE = 20.0
+"""Metres that changes of lanes put a vehicle aside at once, and more."""
+_RUNS = 10.0
+"""m/s; nobody on foot is faster."""
 
 
 class BodyContacts:
@@ -33,6 +39,11 @@ class BodyContacts:
         self._planned = planned
         self._offset = net_offset
         self._touching: set[tuple[str, str]] = set()
+        self._seen: dict[str, tuple[float, ActorView]] = {}
+
+    def look_at_all(self) -> None:
+        """Read everybody again: somebody is elsewhere than he drove."""
+        self._seen.clear()
 
     def state(self) -> list[list[str]]:
         """What has to be remembered, for JSON."""
@@ -52,43 +63,63 @@ class BodyContacts:
     ) -> list[Event]:
         """Contacts that began in the step that led to ``time``; those that SUMO saw are left."""
         moved = [name for name, move in moves.items() if move.exact or move.pose is not None]
+        if not moved:
+            self._touching = set()
+            return []
         touching: set[tuple[str, str]] = set()
-        events: list[Event] = []
-        named = {one.id: one for one in view.named()} if moved else {}
+        begun: list[tuple[ActorView, ActorView]] = []
         for name in sorted(moved):
-            one = named.get(name)
+            one = view.actor(name)
             if one is None:
                 continue
-            for other in self._others(one, road, named):
+            for other in self._others(one, road, view, moves):
                 pair = min(one.id, other.id), max(one.id, other.id)
                 if pair not in touching and overlap(one.corners, other.corners):
                     touching.add(pair)
                     if pair not in self._touching:
-                        events.append(_contact(one, other, time, step))
+                        begun.append((one, other))
         self._touching = touching
-        if events:
-            known = road.collisions()
-            return [one for one in events if frozenset((one.actor, one.partner or "")) not in known]
-        return []
+        known = road.collisions() if begun else set()
+        return [
+            _contact(one, other, time, step)
+            for one, other in begun
+            if frozenset((one.id, other.id)) not in known
+        ]
 
     def _others(
-        self, one: ActorView, road: MovedActors, named: Mapping[str, ActorView]
+        self, one: ActorView, road: MovedActors, view: StoryView, moves: Mapping[str, WantedMove]
     ) -> Iterator[ActorView]:
         """Those whose bodies may overlap with another's."""
-        x, y, own = one.x, one.y, one.length + one.width
-        for other in named.values():
-            reach = (own + other.length + other.width) / 2.0
-            if abs(x - other.x) < reach and abs(y - other.y) < reach and other is not one:
+        time = view.time
+        for name in view.names:
+            seen = None if name in moves else self._seen.get(name)
+            if seen is not None and _still_far(one, seen[1], time - seen[0]):
+                continue
+            other = view.actor(name)
+            if other is None or other is one:
+                continue
+            self._seen[name] = time, other
+            if _near(one, other):
                 yield other
         lane = road.lane_of(one.id, person=one.person)
         if not lane:
             return
         for name, _ in road.bodies_near(lane):
             planned = self._planned.get(name)
-            if name not in named and planned is not None:
+            if planned is not None and name not in view.names:
                 found = stranger(road, planned, self._offset)
                 if found is not None and _near(one, found):
                     yield found
+
+
+def _still_far(one: ActorView, other: ActorView, seconds: float) -> bool:
+    """Whether one that SUMO drives cannot be near yet, so long after it was seen."""
+    if seconds > _LONG:
+        return False
+    speed = max(other.speed, _RUNS) if other.person else other.speed
+    driven = speed * seconds + other.gain * seconds * seconds / 2.0
+    reach = (one.length + one.width + other.length + other.width) / 2.0 + driven + _ASIDE
+    return abs(one.x - other.x) > reach or abs(one.y - other.y) > reach
 
 
 def _near(one: ActorView, other: ActorView) -> bool:

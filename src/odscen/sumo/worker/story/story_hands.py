@@ -43,6 +43,7 @@ class StoryHands:
         self._added: set[str] = set()
         self._dark: dict[str, str] = {}
         self._goals: dict[str, str] = {}
+        self._faster: dict[str, float] = {}
 
     def begin(self, road: MovedActors) -> None:
         """Begin with a simulation; a saved state forgets that a light is off."""
@@ -60,6 +61,13 @@ class StoryHands:
                 self._appear(road, one, time)
             else:
                 self._switch(road, one, time)
+
+    def departures(self, road: MovedActors) -> None:
+        """Give those who have appeared the speed with which SUMO would not have let them depart."""
+        for name, speed in list(self._faster.items()):
+            if road.motion(name) is not None:
+                road.begin_at(name, speed)
+                del self._faster[name]
 
     def arrivals(self, road: MovedActors, recorder: Recorder, time: float) -> None:
         """Let those arrive who have come to the goal that a rule has given them."""
@@ -90,12 +98,18 @@ class StoryHands:
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered, for JSON."""
-        return {"added": sorted(self._added), "dark": self._dark, "goals": self._goals}
+        return {
+            "added": sorted(self._added),
+            "dark": self._dark,
+            "goals": self._goals,
+            "faster": self._faster,
+        }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
         self._added, self._dark = set(state["added"]), dict(state["dark"])
         self._goals = dict(state["goals"])
+        self._faster = dict(state["faster"])
 
     def _appear(self, road: MovedActors, one: WantedActor, time: float) -> None:
         held = self._plan.held.get(one.actor)
@@ -105,7 +119,13 @@ class StoryHands:
         self._added.add(one.actor)
         if not road.insert(one.actor, held, one.speed):
             self._lose(one.actor, time, "SUMO does not let it appear")
-        elif one.at is not None:
+            return
+        if not held.person:
+            own = held.attributes
+            begin = own["departSpeed"] if one.speed is None else one.speed
+            if begin != "avg" and float(begin) > float(own["mostSpeed"]):
+                self._faster[one.actor] = float(begin)
+        if one.at is not None:
             x, y, hdg = one.at
             half = self._actors[one.actor].length / 2.0
             x += half * math.cos(hdg) + self._offset[0]

@@ -34,8 +34,6 @@ _ANY_SPEED = 200.0
 """m/s."""
 _MORE = frozenset({"acceleration", "travelled", "off_road", "arrive", "own"})
 """Conditions and actions that ask more of actors than where they are and how fast."""
-_MOVED = frozenset({EventKind.TELEPORT_START, EventKind.TELEPORT_END, EventKind.COLLISION})
-"""After these a vehicle is elsewhere, or has another speed, than it drove."""
 _LASTING = frozenset({"stopped", "own"})
 """Those that ask how long actors have been standing."""
 
@@ -69,7 +67,7 @@ class StoryRun:
         self._goal_edges: dict[str, str] = {}
         self._sent: dict[str, float] = {}
         self._lost: list[Event] = []
-        self._heard = 0
+        self._jumps = 0
 
     @classmethod
     def in_folder(cls, run: Path, plan: Plan) -> StoryRun:
@@ -94,6 +92,7 @@ class StoryRun:
         for name in _names(more):
             if name in self._planned:
                 self._actors[name] = self._planned[name]
+        self._view.others_named()
 
     def look_always(self) -> None:
         """Look at all rules in each step: not SUMO alone drives."""
@@ -125,29 +124,44 @@ class StoryRun:
 
     def after_step(self, time: float, recorder: Recorder) -> None:
         """Look at the road as it is at ``time``, say what rules do, and act for the next step."""
-        road = self._road
-        if any(event.kind in _MOVED for event in recorder.since(self._heard)):
-            self._engine.look_at_all()
-        self._heard = recorder.count
-        driven = {
+        road, moved = self._road, self._moves
+        if recorder.jumps != self._jumps:
+            self._jumps = recorder.jumps
+            self._look_at_all()
+        self._hands.departures(road)
+        self._view.look(road, time, self._step, self._driven() if moved else {})
+        self._hands.arrivals(road, recorder, time)
+        contacts = self._contacts.look(road, self._view, moved, time, self._step)
+        if contacts:
+            self._look_at_all()
+        wanted, events = self._engine.step(self._view)
+        if contacts or events:
+            recorder.events.extend([*contacts, *map(self._event, events)])
+        if not moved and not wanted and not self._engine.asked:
+            return
+        self._lost = self._hands.lost = []
+        self._hands.obey(road, self._engine.asked, time)
+        self._moves = {}
+        for name, move in wanted.items():
+            if self._view.actor(name) is not None:
+                self._act(road, name, move, moved.get(name))
+                if not move.vanishes:
+                    self._moves[name] = move
+        if self._lost:
+            recorder.events.extend(self._lost)
+
+    def _look_at_all(self) -> None:
+        """Somebody is elsewhere than he drove."""
+        self._engine.look_at_all()
+        self._contacts.look_at_all()
+
+    def _driven(self) -> dict[str, float]:
+        """Speeds of persons that rules have moved, m/s."""
+        return {
             name: move.speed or 0.0
             for name, move in self._moves.items()
             if move.pose is not None and self._actors[name].person
         }
-        self._view.look(road, time, self._step, driven)
-        self._hands.arrivals(road, recorder, time)
-        contacts = self._contacts.look(road, self._view, self._moves, time, self._step)
-        moves, events = self._engine.step(self._view)
-        recorder.events.extend([*contacts, *map(self._event, events)])
-        self._lost = self._hands.lost = []
-        self._hands.obey(road, self._engine.asked, time)
-        before, self._moves = self._moves, {}
-        for name, move in moves.items():
-            if self._view.actor(name) is not None:
-                self._act(road, name, move, before.get(name))
-                if not move.vanishes:
-                    self._moves[name] = move
-        recorder.events.extend(self._lost)
 
     def mend(self, state: Path) -> None:
         """Let a state that SUMO has saved be one that it can load."""
@@ -158,7 +172,6 @@ class StoryRun:
         """What has to be remembered from one slice of a run to the next, for JSON."""
         return {
             "engine": self._engine.state(),
-            "heard": self._heard,
             "view": self._view.state(),
             "contacts": self._contacts.state(),
             "hands": self._hands.state(),
@@ -173,7 +186,6 @@ class StoryRun:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
         self._engine.restore(state["engine"])
-        self._heard = state.get("heard", 0)
         self._view.restore(state["view"])
         self._contacts.restore(state["contacts"])
         self._hands.restore(state["hands"])

@@ -6,11 +6,11 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import SumoPose, body_centre, sumo_to_xodr
-from odscen.scenario.story.road_view import ActorView
+from odscen.scenario.story.road_view import MOST_GAIN, ActorView
 from odscen.scenario.story.side_motion import beside, line_length
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from odscen.results.records.run_records import PlannedActor
     from odscen.scenario.story.road_view import Point
@@ -23,6 +23,8 @@ _USUAL_WALK = 1.39
 """m/s at which pedestrians walk, see :data:`odscen.sumo.realize.driving.KINDS`."""
 _ON_LANE = 1.5
 """Metres from its centre line in which a place is on a lane."""
+_MORE = 0.5
+"""m/s² more than a vehicle type gains, for what steps round."""
 _BEHIND = -10.0
 """Metres; less than that is behind."""
 
@@ -64,6 +66,9 @@ class StoryView:
         self._views: dict[str, ActorView | None] = {}
         self._nearest: dict[Point, tuple[str, float, int]] = {}
         self._half_widths: dict[str, float] = {}
+        self._gains: dict[str, float] = {}
+        self._gone: set[str] = set()
+        self._eager: tuple[str, ...] | None = None
         self._travelled: dict[str, float] = {}
         self._standing: dict[str, float] = {}
         self._last: dict[str, tuple[float, float, float]] = {}
@@ -79,24 +84,42 @@ class StoryView:
         """Begin to read a step; ``driven`` are speeds of persons that were moved, m/s."""
         self._road, self._now, self._step, self._driven = road, time, step, driven
         self._views = {}
-        for name, actor in self._actors.items():
-            if actor.person or name in self.always:
-                self.actor(name)
+        if self._eager is None:
+            own = self._actors.items()
+            self._eager = tuple(name for name, one in own if one.person or name in self.always)
+        for name in self._eager:
+            self.actor(name)
+
+    def others_named(self) -> None:
+        """Take note that rules name more actors, or ask more of them."""
+        self._eager = None
 
     def actor(self, name: str) -> ActorView | None:
         """Return an actor, ``None`` if it is not on the road."""
-        if name in self._views:
-            return self._views[name]
+        views = self._views
+        if name in views:
+            return views[name]
         planned = self._actors.get(name)
         found = None
-        if planned is not None:
+        if planned is not None and name not in self._gone:
             found = self._person(planned) if planned.person else self._vehicle(planned)
-        self._views[name] = found
+            if found is None and name in self._gains and not self._road.knows(name):
+                self._gone.add(name)  # asking SUMO for it would cost more than all who are there
+        views[name] = found
         return found
+
+    @property
+    def names(self) -> Collection[str]:
+        """Actors that rules name, on the road or not."""
+        return self._actors.keys()
 
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""
         return tuple(one for one in map(self.actor, self._actors) if one is not None)
+
+    def gone(self, name: str) -> bool:
+        """Whether an actor has left the road for good."""
+        return name in self._gone
 
     def _there(self, name: str) -> ActorView:
         one = self.actor(name)
@@ -166,6 +189,7 @@ class StoryView:
         return {
             "travelled": self._travelled,
             "standing": self._standing,
+            "gone": sorted(self._gone),
             "last": {name: list(one) for name, one in self._last.items()},
         }
 
@@ -173,6 +197,7 @@ class StoryView:
         """Inverse of :meth:`state`."""
         self._travelled = dict(state["travelled"])
         self._standing = dict(state["standing"])
+        self._gone = set(state["gone"])
         self._last = {name: (x, y, v) for name, (x, y, v) in state["last"].items()}
 
     def _where(self, place: str | Point) -> tuple[str, float, int]:
@@ -239,11 +264,15 @@ class StoryView:
             standing = self._standing.setdefault(name, self._now)
         elif name in self._standing:
             del self._standing[name]
+        gain = self._gains.get(name)
+        if gain is None:
+            gain = MOST_GAIN if planned.person else min(self._road.gain(name) + _MORE, MOST_GAIN)
+            self._gains[name] = gain
         x, y = body_centre(front_x, front_y, angle, length=length, net_offset=self._offset)
         hdg = math.remainder(math.radians(90.0 - angle), math.tau)
         return ActorView(  # by place: by name it takes twice as long
             name, x, y, hdg, speed, acceleration, length, planned.width, travelled,
-            planned.person, standing, off_road,
+            planned.person, standing, off_road, gain,
         )  # fmt: skip
 
 
