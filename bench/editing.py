@@ -156,7 +156,7 @@ def _changes(user: OdscenPage) -> None:
         served.append(
             page.evaluate(
                 "performance.getEntriesByType('resource')"
-                ".filter(one => /(undo|redo)$/.test(one.name)).map(one => one.duration)[0] ?? NaN"
+                ".filter(one => /(undo|redo)\\?/.test(one.name)).map(one => one.duration)[0] ?? NaN"
             )
         )
     print(

@@ -3840,9 +3840,7 @@ export interface components {
             /** Job */
             job: string;
         };
-        JsonPart: string | number | boolean | components["schemas"]["JsonPart"][] | {
-            [key: string]: components["schemas"]["JsonPart"];
-        } | null;
+        JsonPart: unknown;
         /**
          * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.

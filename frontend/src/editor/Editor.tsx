@@ -45,9 +45,11 @@ export function Editor({
   const { undo, redo, saving } = store();
   const { scenario } = now;
   // Anew with each version of the scenario: any edit may have changed the program.
+  const { name, version } = scenario;
   const loadProgram = useCallback(
-    (junction: string) => signals.ofScenario(scenario.name, junction),
-    [scenario],
+    (junction: string) => signals.ofScenario(name, junction),
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+    [name, version],
   );
   const { light } = now;
   const lightEditing = useMemo(() => {

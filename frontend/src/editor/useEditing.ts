@@ -14,7 +14,7 @@ import type { Editing, Handler, Hover, Tool } from "./handlers/handler";
 import { usePick } from "./pick";
 import type { Draft } from "./rules/draft";
 import { everyone } from "./placing";
-import { firstStep, ofProblem, type Step, STEPS } from "./scene";
+import { firstStep, ofProblem, type Step, STEPS, wrongOnes } from "./scene";
 import { type Sights, sightsOf } from "./sights";
 import type { EditorStore } from "./store";
 import { useShown } from "./useShown";
@@ -64,7 +64,7 @@ export function useEditing(
   map: MapDetails | null,
 ): EditorNow {
   const { graph, picker } = loaded;
-  const { scenario, selection, name, edit, select } = store();
+  const { scenario, checked, selection, name, edit, select } = store();
   if (!scenario) throw new Error("the editor is only shown with a scenario");
   const { document, problems } = scenario;
   const [step, setStep] = useState<Step>(() => keptStep() ?? firstStep(document));
@@ -96,7 +96,8 @@ export function useEditing(
   const trial = (hover?.is === "place" && hover.trial) || null;
   const tried = useTrial(name, trial);
   const route = useMemo(() => (trial ? tried.points : legs.flat()), [trial, tried, legs]);
-  const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
+  const wrong = useMemo(() => wrongOnes(problems, checked ?? document), [problems, checked, document]);
+  const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, wrong);
   const sights = useMemo(() => sightsOf(handle, graph, () => lights), [graph, lights]);
   const { roi } = document;
   const changes = useMemo(
@@ -181,10 +182,10 @@ export function useEditing(
       sights.start(found);
     },
     showProblem: (problem) => {
-      const about = ofProblem(problem, document);
+      const about = ofProblem(problem, checked ?? document);
       if (about) select([about.id]);
       goTo(about ? "actors" : (stepOf(problem) ?? step));
-      sights.problem(problem, document);
+      sights.problem(problem, checked ?? document);
     },
   };
 }
