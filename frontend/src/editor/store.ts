@@ -109,7 +109,10 @@ export function createEditorStore(name: string): EditorStore {
         void api.problems(name).then(
           ({ version, problems }) => {
             if (!asked || known !== asked || version !== asked.version) return;
-            known = { ...asked, problems: reused(asked.problems, problems) };
+            const same = reused(asked.problems, problems) === asked.problems;
+            // Places are rows of lists: those of another document are others.
+            if (same && problems.length === 0) return;
+            known = { ...asked, problems };
             show({ checked: asked.document });
           },
           () => undefined, // The next change asks again, and says if there is no server.
@@ -148,7 +151,8 @@ export function createEditorStore(name: string): EditorStore {
           done();
           return null;
         }
-        set({ saving: "saving", refusal: null });
+        const { saving, refusal } = get();
+        if (saving !== "saving" || refusal) set({ saving: "saving", refusal: null });
         try {
           const answer = await call(known.version);
           done();
@@ -176,7 +180,9 @@ export function createEditorStore(name: string): EditorStore {
       const moves = pending.every((one) => one.step !== 0);
       const steps = pending.reduce<number>((sum, one) => sum + one.step, step);
       const there = moves ? timeline.look(steps) : null;
-      return send({ step, foresee: () => there }, call);
+      // What may be added to a region is asked of the server, which has to know the region by then.
+      const foresee: Pending["foresee"] = ({ roi }) => (there?.roi === roi ? there : null);
+      return send({ step, foresee }, call);
     };
     const ask: Ask<ScenarioState> = (call) => send({ ...UNKNOWN }, call);
     const take = async (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState> => {

@@ -1,4 +1,4 @@
-import { type RefObject, useEffect, useMemo, useRef, useState } from "react";
+import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { Assets, MapDetails, Problem, ScenarioDocument, ScenarioState } from "../api/types";
 import type { LoadedGraph } from "../map/loaded";
@@ -54,6 +54,17 @@ export interface EditorNow extends Editing {
   handle: RefObject<MapHandle | null>;
 }
 
+const POINTED: ReadonlySet<keyof EditorNow> = new Set(["hover", "route", "unreachable", "handler"]);
+
+/**
+ * Whether two states differ at most in what lies under the pointer. Functions are left out: what
+ * they know is compared.
+ */
+export const sameButPointer = (one: EditorNow, other: EditorNow): boolean =>
+  (Object.keys(one) as (keyof EditorNow)[]).every(
+    (key) => POINTED.has(key) || typeof one[key] === "function" || one[key] === other[key],
+  );
+
 /** Pixels of the right of the map that the program of a light covers. */
 const PROGRAM = 430;
 
@@ -78,7 +89,12 @@ export function useEditing(
   }, []);
   useEffect(() => keep({ step, chosen: selection }), [step, selection]);
   const [tool, setTool] = useState<Tool | null>(null);
-  const [hover, setHover] = useState<Hover | null>(null);
+  const [hover, setPointed] = useState<Hover | null>(null);
+  // The same place is another object with every move of the pointer.
+  const setHover = useCallback(
+    (next: Hover | null) => setPointed((old) => (JSON.stringify(old) === JSON.stringify(next) ? old : next)),
+    [],
+  );
   const handle = useRef<MapHandle | null>(null);
   const lights = useMemo(() => map && new Heads(map.lights), [map]);
   const [drafted, setDrafted] = useState<Draft | null>(null);
