@@ -5851,13 +5851,13 @@ export interface components {
             };
         };
         /**
-         * ScenarioChange
+         * ScenarioPatch
          * @description What has become of a scenario since the version that was asked to change.
          *
          *     ``changes`` make the document of ``version`` from that of ``before``, in their order; problems
          *     are asked for apart.
          */
-        ScenarioChange: {
+        ScenarioPatch: {
             /** Name */
             name: string;
             /** Before */
@@ -12887,7 +12887,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioChange"];
+                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
             /** @description The request cannot be read. */
@@ -13006,7 +13006,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioChange"];
+                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
             /** @description The request cannot be read. */
@@ -13125,7 +13125,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioChange"];
+                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
             /** @description The request cannot be read. */

@@ -41,7 +41,7 @@ export type SignalControl = Schemas["Signals"]["control"];
 export type Problem = Schemas["ProblemInfo"];
 export type ScenarioState = Schemas["ScenarioState"];
 /** What has changed of a scenario, in place of all of it. */
-export type ScenarioChange = Schemas["ScenarioChange"];
+export type ScenarioPatch = Schemas["ScenarioPatch"];
 export type DocumentChange = Schemas["DocumentChange"];
 export type ScenarioEntry = Schemas["ScenarioRow"];
 export type Job = Schemas["JobInfo"];

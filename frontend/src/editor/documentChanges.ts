@@ -1,7 +1,7 @@
 import type { DocumentChange, ScenarioDocument } from "../api/types";
 
 /**
- * A document after changes that the server has told (JSON Patch, RFC 6902). What no change is about
+ * A document after changes that the server reports (JSON Patch, RFC 6902). What no change is about
  * stays the same object, so that nothing is computed or drawn anew for it.
  */
 export const patched = (document: ScenarioDocument, changes: readonly DocumentChange[]): ScenarioDocument =>

@@ -22,7 +22,7 @@ function afterOne(document: ScenarioDocument, edit: Edit): ScenarioDocument | nu
     case "change_actor": {
       const { actor } = edit;
       const fields = Object.entries(edit).filter(([name]) => name !== "kind" && name !== "actor");
-      // Whoever is named otherwise is named so elsewhere, too, and another kind may need another model.
+      // A new id is in other places, too, and another category may need another model.
       if ("id" in edit || "category" in edit) return null;
       return withActor(document, actor, Object.fromEntries(fields) as Partial<Actor>);
     }

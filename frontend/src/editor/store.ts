@@ -1,7 +1,7 @@
 import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
-import type { Edit, ScenarioChange, ScenarioDocument, ScenarioState } from "../api/types";
+import type { Edit, ScenarioPatch, ScenarioDocument, ScenarioState } from "../api/types";
 import { reasonOf } from "../ui/reason";
 import { patched, reused } from "./documentChanges";
 import { foreseen } from "./foreseen";
@@ -10,7 +10,7 @@ import { Timeline } from "./timeline";
 
 export type Saving = "saved" | "saving" | "failed";
 /** A scenario as it is now, or what has changed of it. */
-type Answer = ScenarioState | ScenarioChange;
+type Answer = ScenarioState | ScenarioPatch;
 type Ask<A> = (call: (version: number) => Promise<A>) => Promise<ScenarioState | null>;
 
 export interface EditorState {

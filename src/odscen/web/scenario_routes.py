@@ -52,7 +52,7 @@ from odscen.web.messages import (
 from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.services import Services, Shared, region_of
 from odscen.web.wire.document_changes import (
-    ScenarioChange,
+    ScenarioPatch,
     ScenarioProblems,
     changes_between,
 )
@@ -172,7 +172,7 @@ def problems(name: str, shared: Shared) -> ScenarioProblems:
 @router.post("/{name}/edits")
 def edit(
     name: str, request: EditRequest, shared: Shared, changes: OnlyChanges = False
-) -> ScenarioState | ScenarioChange:
+) -> ScenarioState | ScenarioPatch:
     """Make edits, all or none; each kind is a function of ``odscen.scenario.edits``."""
 
     def change(scenario: Scenario) -> Scenario:
@@ -188,7 +188,7 @@ def edit(
 @router.post("/{name}/undo")
 def undo(
     name: str, request: OfVersion, shared: Shared, changes: OnlyChanges = False
-) -> ScenarioState | ScenarioChange:
+) -> ScenarioState | ScenarioPatch:
     """Take the last edit back."""
     return _changed(shared, shared.drafts.undo(name, request.version), changes=changes)
 
@@ -196,7 +196,7 @@ def undo(
 @router.post("/{name}/redo")
 def redo(
     name: str, request: OfVersion, shared: Shared, changes: OnlyChanges = False
-) -> ScenarioState | ScenarioChange:
+) -> ScenarioState | ScenarioPatch:
     """Make the edit again that was taken back last."""
     return _changed(shared, shared.drafts.redo(name, request.version), changes=changes)
 
@@ -318,12 +318,12 @@ def state_of(shared: Services, draft: Draft) -> ScenarioState:
     )
 
 
-def _changed(shared: Services, draft: Draft, *, changes: bool) -> ScenarioState | ScenarioChange:
+def _changed(shared: Services, draft: Draft, *, changes: bool) -> ScenarioState | ScenarioPatch:
     """Answer with a scenario that was just changed, or with what has changed."""
     if not changes or draft.before is None:
         return state_of(shared, draft)
     history = draft.history
-    return ScenarioChange(
+    return ScenarioPatch(
         name=draft.name,
         before=history.version - 1,
         version=history.version,

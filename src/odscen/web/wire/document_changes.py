@@ -34,7 +34,7 @@ class DocumentChange(Answer):
     value: JsonPart = None
 
 
-class ScenarioChange(Answer):
+class ScenarioPatch(Answer):
     """What has become of a scenario since the version that was asked to change.
 
     ``changes`` make the document of ``version`` from that of ``before``, in their order; problems
