@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -23,6 +24,7 @@ from tests.browser.test_signals import drag
 from tests.signal_case import JUNCTION
 
 __all__ = ["crossing"]
+VERDICT = re.compile(r"(Met|Not met): .*, is \d+")
 STEP = 2.0
 """Metres from a node to the next."""
 
@@ -62,6 +64,7 @@ def close_a_lane(user: OdscenPage, hand: Hand, lane: str) -> None:
         with user.changing():
             hand.write("or type its name", lane)
         return
+    hand.press(user.page.get_by_role("button", name="Show the whole map"))
     what = user.page.get_by_role("radiogroup", name="What it is about")
     what.get_by_text("Lane", exact=True).click()
     hand.press(user.page.get_by_role("button", name="Choose it on the map"))
@@ -108,6 +111,7 @@ def test_after_the_first_run_all_is_changed_run_again_and_compared(
     opened(user, hand, "Road users")
     for number in (1, 0):
         move(user, hand, number)
+    hand.press(page.get_by_role("button", name="Show the whole map"))
     hand.press(page.get_by_role("button", name="Add a waypoint"))
     passed = node_near(user, 100.0, EGO_LANE[1])
     with user.changing():
@@ -130,12 +134,13 @@ def test_after_the_first_run_all_is_changed_run_again_and_compared(
         hand.press(page.get_by_role("button", name="Add the criterion"))
 
     document = user.document()
-    assert [next(iter(one["then"][0])) for one in document["rules"]] == ["cut_in"]
+    assert [one["then"][0]["cut_in"]["to"] for one in document["rules"]] == ["car-1"]
     assert [(one["kind"], one["places"]) for one in document["measures"]] == [("closure", [lane])]
     assert [one["junction"] for one in document["signals"]["junctions"]] == [JUNCTION]
     assert document["criteria"] == ["collided == 0"]
     run(user, hand)
     expect(user.result).to_contain_text("The scenario was changed in between")
+    expect(page.get_by_role("region", name="Criteria")).to_contain_text(VERDICT)
     expect(page.get_by_role("table", name="Compared with the last run")).to_be_visible()
     if isinstance(hand, Keyboard):
         assert user.actions()["pointer"] == 0
