@@ -161,10 +161,14 @@ def test_a_move_is_shown_before_it_is_saved_and_goes_back_where_there_is_no_serv
     page = cars.page
     address = "**/api/scenarios/*/edits?*"
     held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
     start = cars.table.get_by_role("row").nth(2).get_by_role("cell").nth(3)
     before = cars.document()
     old = start.inner_text()
-    page.route(address, held.append)
+    page.route(address, hold)
     page.keyboard.press(".")
     expect(start).not_to_have_text(old)
     expect(page.get_by_text("Saving …")).to_be_visible()
