@@ -21,6 +21,7 @@ from odscen.workspace.store import Workspace
 ROOT = Path(__file__).parents[1]
 TYPES = ROOT / "frontend/src/api/schema.ts"
 GENERATOR = ROOT / "frontend/node_modules/.bin/openapi-typescript"
+REFERENCE = "#/components/schemas/"
 
 
 def schema_json() -> str:
@@ -34,7 +35,8 @@ def schema_types() -> str:
     with tempfile.TemporaryDirectory(prefix="odscen-api-") as folder:
         source, target = Path(folder, "openapi.json"), Path(folder, "schema.ts")
         schema = json.loads(schema_json())
-        names = {f"#/components/schemas/{key}": one for key, one in _components(schema).items()}
+        names = {f"{REFERENCE}{key}": one for key, one in _components(schema).items()}
+        schema["components"]["schemas"] |= _unknown(schema)
         source.write_text(json.dumps(_spelled_out(schema, names)), encoding="utf-8")
         # Node lies beside the interpreter. What has a default may be left out of what is sent.
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
@@ -54,6 +56,15 @@ def schema_types() -> str:
 def _components(schema: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = schema["components"]["schemas"]
     return found
+
+
+def _unknown(schema: dict[str, Any]) -> dict[str, Any]:
+    """Unions that hold themselves, as what may be anything: TypeScript takes no such property."""
+    return {
+        name: {"description": one.get("description", "")}
+        for name, one in _components(schema).items()
+        if "anyOf" in one and json.dumps(REFERENCE + name) in json.dumps(one)
+    }
 
 
 def _spelled_out(value: Any, components: dict[str, Any]) -> Any:

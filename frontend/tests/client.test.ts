@@ -34,7 +34,7 @@ test("a body goes out as JSON, a form as a form, and no body as none", async () 
   const list = asked(200, {});
   await api.undo("s", 3);
   expect(list[0]).toEqual([
-    "/api/scenarios/s/undo",
+    "/api/scenarios/s/undo?changes=true",
     {
       method: "POST",
       headers: { "Content-Type": "application/json" },

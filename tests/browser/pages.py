@@ -274,7 +274,7 @@ class OdscenPage:
     @contextmanager
     def changing(self) -> Iterator[None]:
         """Waits until what is done within has been answered by the server and is saved."""
-        asked = re.compile(r"/api/scenarios/[^/]+/(edits|undo|redo)$")
+        asked = re.compile(r"/api/scenarios/[^/]+/(edits|undo|redo)\?")
         with self.page.expect_response(lambda answer: bool(asked.search(answer.url))):
             yield
         expect(self.page.get_by_text("All changes saved")).to_be_visible()

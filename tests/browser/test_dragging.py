@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage
@@ -125,7 +125,7 @@ def test_a_goal_that_cannot_be_reached_is_said_before_the_click_and_not_set(
         cars.page.get_by_role("button", name="Zoom in").click()
     cars.map.hover(cars.graph.place(behind))
     expect(cars.page.get_by_text("No route leads from the start to this point")).to_be_visible()
-    with cars.page.expect_response(lambda answer: answer.url.endswith("/edits")):
+    with cars.page.expect_response(lambda answer: "/edits?" in answer.url):
         cars.map.click(cars.graph.place(behind))
     expect(cars.refusal).to_contain_text("That is not possible")
     assert cars.document()["actors"][1]["goal"] is None
@@ -153,6 +153,34 @@ def test_starts_and_goals_are_moved_by_keys_alone(cars: OdscenPage) -> None:
     with cars.changing():
         keyboard.press("Enter")
     assert cars.document()["actors"][1]["goal"] == goals[-1]
+
+
+def test_a_move_is_shown_before_it_is_saved_and_goes_back_where_there_is_no_server(
+    cars: OdscenPage,
+) -> None:
+    page = cars.page
+    address = "**/api/scenarios/*/edits?*"
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    start = cars.table.get_by_role("row").nth(2).get_by_role("cell").nth(3)
+    before = cars.document()
+    old = start.inner_text()
+    page.route(address, hold)
+    page.keyboard.press(".")
+    expect(start).not_to_have_text(old)
+    expect(page.get_by_text("Saving …")).to_be_visible()
+    assert cars.document() == before
+    held[0].abort()
+    expect(cars.refusal).to_contain_text("Your last change is not saved")
+    expect(start).to_have_text(old)
+    page.unroute(address)
+    with cars.changing():
+        page.get_by_role("button", name="Apply my change again").click()
+    expect(start).not_to_have_text(old)
+    assert cars.document() != before
 
 
 def test_three_cars_a_pedestrian_and_an_ego_with_a_goal_run_within_eighteen_clicks(

@@ -109,7 +109,7 @@ def test_a_change_that_takes_long_is_said_on_the_map(region: OdscenPage) -> None
     def hold(asked: Route) -> None:
         held.append(asked)
 
-    region.page.route("**/api/scenarios/*/edits", hold)
+    region.page.route("**/api/scenarios/*/edits?*", hold)
     region.map.click(region.graph.starts(region.document()["roi"], 1)[0])
     working = region.page.get_by_text("Applying the change")
     expect(working).to_be_visible()

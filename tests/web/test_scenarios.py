@@ -26,9 +26,11 @@ from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region, name_of, place_of
 from odscen.scenario.placing.spawn_room import late_for_changes
 from odscen.web.application import create_app
+from odscen.web.wire.document_changes import changes_between
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING
+from tests.web.json_patch import patched
 
 RULE = {
     "id": "halt",
@@ -198,7 +200,10 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
             arguments = {name: part.validate_python(arguments[name])}
         function = getattr(edits, kind)
         wanted = inspect.signature(function).parameters
+        before = ours
         ours = function(ours, **{k: v for k, v in known.items() if k in wanted}, **arguments)
+        told = [one.model_dump(mode="json") for one in changes_between(before, ours)]
+        assert patched(state["document"], told) == answer.json()["document"], kind
         assert answer.json()["version"] == state["version"] + 1
         state = answer.json()
         file = workspace.scenarios / "mine.scenario.json"

@@ -141,20 +141,30 @@ export const api = {
   newScenario: (map: string, name?: string) =>
     call("post", "/api/scenarios", { body: name ? { map, name } : { map } }),
   scenario: (name: string) => call("get", "/api/scenarios/{name}", { path: { name } }),
+  problems: (name: string) => call("get", "/api/scenarios/{name}/problems", { path: { name } }),
   rename: (name: string, to: string) =>
     call("put", "/api/scenarios/{name}/name", { path: { name }, body: { name: to } }),
   copyScenario: (name: string, to: string) =>
     call("post", "/api/scenarios/{name}/copy", { path: { name }, body: { name: to } }),
-  /** All of them or none, and one step for undo. */
+  /** All of them or none, and one step for undo; the answer is what has changed. */
   edit: (name: string, version: number, edits: readonly Edit[], label?: string) =>
     call("post", "/api/scenarios/{name}/edits", {
       path: { name },
+      query: { changes: true },
       body: label ? { version, edits: [...edits], label } : { version, edits: [...edits] },
     }),
   undo: (name: string, version: number) =>
-    call("post", "/api/scenarios/{name}/undo", { path: { name }, body: { version } }),
+    call("post", "/api/scenarios/{name}/undo", {
+      path: { name },
+      query: { changes: true },
+      body: { version },
+    }),
   redo: (name: string, version: number) =>
-    call("post", "/api/scenarios/{name}/redo", { path: { name }, body: { version } }),
+    call("post", "/api/scenarios/{name}/redo", {
+      path: { name },
+      query: { changes: true },
+      body: { version },
+    }),
   goals: (name: string, spawn: string) =>
     call("get", "/api/scenarios/{name}/goals", { path: { name }, query: { spawn } }),
   path: (name: string, spawn: string, goal: string) =>

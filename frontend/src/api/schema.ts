@@ -324,6 +324,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/scenarios/{name}/problems": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Problems
+         * @description What is wrong with a scenario as it is now.
+         */
+        get: operations["problems_api_scenarios__name__problems_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/scenarios/{name}/edits": {
         parameters: {
             query?: never;
@@ -2941,6 +2961,20 @@ export interface components {
             free: boolean;
         };
         /**
+         * DocumentChange
+         * @description One operation of JSON Patch; ``path`` is a JSON pointer, ``value`` is null for ``remove``.
+         */
+        DocumentChange: {
+            /**
+             * Op
+             * @enum {string}
+             */
+            op: "add" | "remove" | "replace";
+            /** Path */
+            path: string;
+            value: components["schemas"]["JsonPart"];
+        };
+        /**
          * DrawingColumns
          * @description What is drawn of a map, see ``docs/drawings.md``.
          *
@@ -3816,6 +3850,7 @@ export interface components {
             /** Job */
             job: string;
         };
+        JsonPart: unknown;
         /**
          * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.
@@ -5824,6 +5859,39 @@ export interface components {
             formulas: {
                 [key: string]: string;
             };
+        };
+        /**
+         * ScenarioPatch
+         * @description What has become of a scenario since the version that was asked to change.
+         *
+         *     ``changes`` make the document of ``version`` from that of ``before``, in their order; problems
+         *     are asked for apart.
+         */
+        ScenarioPatch: {
+            /** Name */
+            name: string;
+            /** Before */
+            before: number;
+            /** Version */
+            version: number;
+            /** Changes */
+            changes: components["schemas"]["DocumentChange"][];
+            /** Label */
+            label: string;
+            /** Undo */
+            undo: string | null;
+            /** Redo */
+            redo: string | null;
+        };
+        /**
+         * ScenarioProblems
+         * @description What is wrong with a scenario at a version.
+         */
+        ScenarioProblems: {
+            /** Version */
+            version: number;
+            /** Problems */
+            problems: components["schemas"]["ProblemInfo"][];
         };
         /**
          * ScenarioRow
@@ -12698,9 +12766,124 @@ export interface operations {
             };
         };
     };
-    edit_api_scenarios__name__edits_post: {
+    problems_api_scenarios__name__problems_get: {
         parameters: {
             query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScenarioProblems"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    edit_api_scenarios__name__edits_post: {
+        parameters: {
+            query?: {
+                /** @description Answer with what has changed, in place of all, and without problems. */
+                changes?: boolean;
+            };
             header?: never;
             path: {
                 name: string;
@@ -12719,7 +12902,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ScenarioState"];
+                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
             /** @description The request cannot be read. */
@@ -12816,7 +12999,10 @@ export interface operations {
     };
     undo_api_scenarios__name__undo_post: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Answer with what has changed, in place of all, and without problems. */
+                changes?: boolean;
+            };
             header?: never;
             path: {
                 name: string;
@@ -12835,7 +13021,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ScenarioState"];
+                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
             /** @description The request cannot be read. */
@@ -12932,7 +13118,10 @@ export interface operations {
     };
     redo_api_scenarios__name__redo_post: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Answer with what has changed, in place of all, and without problems. */
+                changes?: boolean;
+            };
             header?: never;
             path: {
                 name: string;
@@ -12951,7 +13140,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["ScenarioState"];
+                    "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
             /** @description The request cannot be read. */

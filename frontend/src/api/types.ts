@@ -40,6 +40,9 @@ export type DrivingStyle = Schemas["DriverSet-Output"]["style"];
 export type SignalControl = Schemas["Signals"]["control"];
 export type Problem = Schemas["ProblemInfo"];
 export type ScenarioState = Schemas["ScenarioState"];
+/** What has changed of a scenario, in place of all of it. */
+export type ScenarioPatch = Schemas["ScenarioPatch"];
+export type DocumentChange = Schemas["DocumentChange"];
 export type ScenarioEntry = Schemas["ScenarioRow"];
 export type Job = Schemas["JobInfo"];
 /** Which segments are inside, and which may be added or taken out now. */

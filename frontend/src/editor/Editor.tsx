@@ -45,9 +45,11 @@ export function Editor({
   const { undo, redo, saving } = store();
   const { scenario } = now;
   // Anew with each version of the scenario: any edit may have changed the program.
+  const { name, version } = scenario;
   const loadProgram = useCallback(
-    (junction: string) => signals.ofScenario(scenario.name, junction),
-    [scenario],
+    (junction: string) => signals.ofScenario(name, junction),
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+    [name, version],
   );
   const { light } = now;
   const lightEditing = useMemo(() => {
@@ -59,6 +61,11 @@ export function Editor({
   const [help, setHelp] = useState(false);
   const [finding, setFinding] = useState(false);
   const [tour, setTour] = useState(firstVisit);
+  const openHelp = useCallback(() => setHelp(true), []);
+  const openFinding = useCallback(() => setFinding(true), []);
+  const openTour = useCallback(() => setTour(true), []);
+  const { handle } = now;
+  const picture = useCallback(() => handle.current?.picture() ?? null, [handle]);
   const closeTour = (): void => {
     tourSeen();
     setTour(false);
@@ -71,8 +78,8 @@ export function Editor({
   useKeys({
     undo: () => void undo(),
     redo: () => void redo(),
-    sheet: () => setHelp(true),
-    find: () => setFinding(true),
+    sheet: openHelp,
+    find: openFinding,
     remove: () => now.changes.remove(selection),
     escape: () => {
       if (now.pick.now) now.pick.stop();
@@ -118,13 +125,7 @@ export function Editor({
   });
   return (
     <div className="editor">
-      <HeadTools
-        store={store}
-        onFind={() => setFinding(true)}
-        onHelp={() => setHelp(true)}
-        onTour={() => setTour(true)}
-        onPicture={() => now.handle.current?.picture() ?? null}
-      />
+      <HeadTools store={store} onFind={openFinding} onHelp={openHelp} onTour={openTour} onPicture={picture} />
       <div className="side">
         <EditorSteps store={store} now={now} drawing={drawing} assets={assets} />
         <Problems problems={now.problems} graph={now.graph} onShow={now.showProblem} />

@@ -1,5 +1,5 @@
 import { Button, Loader, Text } from "@mantine/core";
-import { useMemo, useState } from "react";
+import { memo, useMemo, useState } from "react";
 
 import type { Assets, Edit } from "../api/types";
 import { inBounds, inCircle } from "../map/areas";
@@ -28,20 +28,26 @@ import { StudyStep } from "./StudyStep";
 import { TrafficStep } from "./TrafficStep";
 import { transitNote } from "./transit";
 import { TransitStep } from "./TransitStep";
-import type { EditorNow } from "./useEditing";
+import { type EditorNow, sameButPointer } from "./useEditing";
 
-/** The steps, each with its forms. */
-export function EditorSteps({
-  store,
-  now,
-  drawing,
-  assets,
-}: {
+interface Props {
   store: EditorStore;
   now: EditorNow;
   drawing: PackedDrawing;
   assets: Assets | null;
-}) {
+}
+
+/** The steps, each with its forms; they are not made anew as the pointer moves. */
+export const EditorSteps = memo(
+  AllSteps,
+  ({ now: old, ...before }: Props, { now, ...after }: Props) =>
+    before.store === after.store &&
+    before.drawing === after.drawing &&
+    before.assets === after.assets &&
+    sameButPointer(old, now),
+);
+
+function AllSteps({ store, now, drawing, assets }: Props) {
   const {
     scenario: { name, version },
     document,

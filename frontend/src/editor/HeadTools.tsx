@@ -1,5 +1,5 @@
 import { ActionIcon, Button, Menu, Tooltip } from "@mantine/core";
-import { useEffect, useRef, useState } from "react";
+import { memo, useEffect, useRef, useState } from "react";
 import { createPortal } from "react-dom";
 
 import { api } from "../api/client";
@@ -18,7 +18,7 @@ const named = (label: unknown): string => (typeof label === "string" && label ? 
 type Dialog = "rename" | "copy" | "open" | null;
 
 /** Undo, redo, autosave and files, in the head of the page. */
-export function HeadTools({
+export const HeadTools = memo(function HeadTools({
   store,
   onFind,
   onHelp,
@@ -173,4 +173,4 @@ export function HeadTools({
     </>,
     slot,
   );
-}
+});

@@ -15,7 +15,7 @@ const MANY = 8;
 const COLUMNS = ["Name", "Kind", "Model", "Start", "Goal", "Speed", "Departs", "Driving style", "Ego"];
 
 /** All road users and flows of the scenario, only the rows in sight drawn; choosing a row is choosing on the map. */
-export function RoadUserTable({
+export const RoadUserTable = memo(function RoadUserTable({
   ones,
   graph,
   selection,
@@ -172,7 +172,7 @@ export function RoadUserTable({
       </div>
     </div>
   );
-}
+});
 
 interface RowActions {
   select: (id: string, more: boolean) => void;

@@ -1,5 +1,5 @@
 import { Loader, SegmentedControl } from "@mantine/core";
-import { type ReactNode, useMemo, useState } from "react";
+import { type ReactNode, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { PackedDrawing } from "../map/drawing";
 import { MapCanvas } from "../map/MapCanvas";
@@ -34,7 +34,7 @@ export function Stage({
   drawing: PackedDrawing;
   children: ReactNode;
 }) {
-  const { graph, picker, document, step, handler, hover, setHover, ones, selection, changes, sights } = now;
+  const { graph, picker, document, step, handler, hover, setHover, ones, selection } = now;
   const [carried, setCarried] = useState<Carrier | null>(null);
   const [dock, setDock] = useState<Dock>("table");
   const [open, setOpen] = useState(true);
@@ -42,21 +42,41 @@ export function Stage({
   const starts = useScene(now);
   const scene = useMemo(() => (view.shown ? withoutStarts(starts) : starts), [starts, view.shown]);
   const hint = view.shown ? view.hint : now.unreachable ? NO_ROUTE : (carried?.hint ?? handler.hint(hover));
-  const head = (
-    <SegmentedControl
-      size="xs"
-      aria-label="Below the map"
-      data={[
-        { value: "table", label: "Road users" },
-        { value: "time", label: "Time" },
-      ]}
-      value={dock}
-      onChange={(next) => {
-        setDock(next as Dock);
-        setOpen(true);
-      }}
-    />
+  const head = useMemo(
+    () => (
+      <SegmentedControl
+        size="xs"
+        aria-label="Below the map"
+        data={[
+          { value: "table", label: "Road users" },
+          { value: "time", label: "Time" },
+        ]}
+        value={dock}
+        onChange={(next) => {
+          setDock(next as Dock);
+          setOpen(true);
+        }}
+      />
+    ),
+    [dock],
   );
+  // The table is not made anew as the pointer moves on the map.
+  const latest = useRef(now);
+  useEffect(() => {
+    latest.current = now;
+  });
+  const remove = useCallback((ids: readonly string[]) => latest.current.changes.remove(ids), []);
+  const selectAll = useCallback((ids: string[]) => {
+    latest.current.openActors();
+    latest.current.select(ids);
+  }, []);
+  const select = useCallback((id: string, more: boolean) => {
+    const { openActors, ones: all, sights } = latest.current;
+    openActors();
+    choose(latest.current, id, more);
+    const one = all.find((each) => each.id === id);
+    if (one) sights.start(one);
+  }, []);
   const slow = useSlow(saving);
   return (
     <div className="stage">
@@ -125,17 +145,9 @@ export function Stage({
           ones={ones}
           graph={graph}
           selection={selection}
-          onRemove={changes.remove}
-          onSelectAll={(ids) => {
-            now.openActors();
-            now.select(ids);
-          }}
-          onSelect={(id, more) => {
-            now.openActors();
-            choose(now, id, more);
-            const one = ones.find((each) => each.id === id);
-            if (one) sights.start(one);
-          }}
+          onRemove={remove}
+          onSelectAll={selectAll}
+          onSelect={select}
         />
       )}
     </div>

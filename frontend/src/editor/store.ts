@@ -1,15 +1,24 @@
 import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
-import type { Edit, ScenarioDocument, ScenarioState } from "../api/types";
+import type { Edit, ScenarioPatch, ScenarioDocument, ScenarioState } from "../api/types";
 import { reasonOf } from "../ui/reason";
+import { patched, reused } from "./documentChanges";
+import { foreseen } from "./foreseen";
 import { everyone } from "./placing";
+import { Timeline } from "./timeline";
 
 export type Saving = "saved" | "saving" | "failed";
+/** A scenario as it is now, or what has changed of it. */
+type Answer = ScenarioState | ScenarioPatch;
+type Ask<A> = (call: (version: number) => Promise<A>) => Promise<ScenarioState | null>;
 
 export interface EditorState {
   name: string;
+  /** As the server knows it, with what is on its way there and can be foreseen. */
   scenario: ScenarioState | null;
+  /** The document that the problems of `scenario` are about: the newest, or one before it. */
+  checked: ScenarioDocument | null;
   saving: Saving;
   /** What went wrong last, in the server's words. */
   refusal: Refusal | null;
@@ -24,7 +33,7 @@ export interface EditorState {
   /** Asks for a change that is no edit; a refusal is thrown, for the caller to show. */
   take: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState>;
   /** Asks for a change that is no edit; the answer is null if it was refused, which is shown. */
-  ask: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState | null>;
+  ask: Ask<ScenarioState>;
   undo: () => Promise<ScenarioState | null>;
   redo: () => Promise<ScenarioState | null>;
   select: (ids: readonly string[]) => void;
@@ -40,12 +49,25 @@ export interface Refusal {
 
 export type EditorStore = UseBoundStore<StoreApi<EditorState>>;
 
+/** A change that the server has not answered yet. */
+interface Pending {
+  /** Steps of undo (-1) or redo (+1); an edit is none. */
+  step: -1 | 0 | 1;
+  /** What it will make of a document; null if only the server knows. */
+  foresee: (document: ScenarioDocument) => ScenarioDocument | null;
+}
+
+const UNKNOWN: Pending = { step: 0, foresee: () => null };
+/** Milliseconds without a change after which problems are asked for: checking holds up the next one. */
+const CHECK_AFTER = 100;
+
 /** Who is selected after a change: the new ones, else those that are still there. */
 export function selectionAfter(
   selection: readonly string[],
   before: ScenarioDocument,
   after: ScenarioDocument,
 ): readonly string[] {
+  if (before === after) return selection;
   const old = new Set(everyone(before).map((one) => one.id));
   const now = everyone(after).map((one) => one.id);
   const fresh = now.filter((id) => !old.has(id));
@@ -54,55 +76,124 @@ export function selectionAfter(
   return selection.every((id) => there.has(id)) ? selection : selection.filter((id) => there.has(id));
 }
 
-/** Holds one scenario as the server knows it; changes go out one at a time, in order. */
+/**
+ * Holds one scenario as the server knows it; changes go out one at a time, in order. What they will
+ * do is shown before the answer where it can be foreseen, and taken back if it is refused.
+ */
 export function createEditorStore(name: string): EditorStore {
   let queue: Promise<unknown> = Promise.resolve();
+  /** As the server has answered last. */
+  let known: ScenarioState | null = null;
+  let pending: readonly Pending[] = [];
+  let check: ReturnType<typeof setTimeout> | undefined;
+  const timeline = new Timeline();
   return create<EditorState>((set, get) => {
-    const accept = (next: ScenarioState): void => {
+    /** Shows what is known, with what is on its way. */
+    const show = (more: Partial<EditorState> = {}): void => {
+      if (!known) return;
       const { scenario, selection } = get();
+      const shown = scenario?.document ?? known.document;
+      const made = pending.reduce((one, { foresee }) => foresee(one) ?? one, known.document);
+      const document = reused(shown, made);
       set({
-        scenario: next,
-        saving: "saved",
-        selection: selectionAfter(selection, scenario?.document ?? next.document, next.document),
+        scenario: document === known.document ? known : { ...known, document },
+        selection: selectionAfter(selection, shown, document),
+        ...more,
       });
     };
-    const ask = (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState | null> => {
-      const turn = queue.then(async () => {
-        const { scenario } = get();
-        if (!scenario) return null;
-        set({ saving: "saving", refusal: null });
-        try {
-          const next = await call(scenario.version);
-          accept(next);
-          return next;
-        } catch (error) {
-          await refused(error, () => ask(call));
+    /** The problems as they are now, unless something changes meanwhile, after which it is asked again. */
+    const checkSoon = (): void => {
+      clearTimeout(check);
+      check = setTimeout(() => {
+        const asked = known;
+        void api.problems(name).then(
+          ({ version, problems }) => {
+            if (!asked || known !== asked || version !== asked.version) return;
+            const same = reused(asked.problems, problems) === asked.problems;
+            // Places are rows of lists: those of another document are others.
+            if (same && problems.length === 0) return;
+            known = { ...asked, problems };
+            show({ checked: asked.document });
+          },
+          () => undefined, // The next change asks again, and says if there is no server.
+        );
+      }, CHECK_AFTER);
+    };
+    /** What the server has answered; null if it does not follow on what is known. */
+    const accept = (answer: Answer, step: Pending["step"]): ScenarioState | null => {
+      const whole = "document" in answer;
+      if (!known || (!whole && known.version !== answer.before)) return null;
+      const made = whole ? answer.document : patched(known.document, answer.changes);
+      const document = reused(get().scenario?.document ?? made, made);
+      const { version, label, undo, redo } = answer;
+      if (step !== 0) timeline.move(step, document);
+      else if (version !== known.version) timeline.grow(document);
+      const problems = whole ? answer.problems : known.problems;
+      known = { ...known, name: answer.name, document, problems, version, label, undo, redo };
+      show({ saving: "saved", ...(whole && { checked: document }) });
+      if (!whole) checkSoon();
+      return known;
+    };
+    /** One change: shown if it can be foreseen, and sent when those before it are answered. */
+    const turn = <T>(
+      one: Pending,
+      call: (version: number) => Promise<Answer>,
+      failed: (error: unknown) => Promise<T>,
+    ): Promise<ScenarioState | T | null> => {
+      pending = [...pending, one];
+      clearTimeout(check);
+      show({ saving: "saving", refusal: null });
+      const done = (): void => {
+        pending = pending.filter((other) => other !== one);
+      };
+      const made = queue.then(async () => {
+        if (!known) {
+          done();
           return null;
         }
-      });
-      queue = turn;
-      return turn;
-    };
-    const take = (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState> => {
-      const turn = queue.then(async () => {
-        const { scenario } = get();
-        if (!scenario) throw new Error("The scenario is not loaded yet.");
-        set({ saving: "saving", refusal: null });
+        const { saving, refusal } = get();
+        if (saving !== "saving" || refusal) set({ saving: "saving", refusal: null });
         try {
-          const next = await call(scenario.version);
-          accept(next);
-          return next;
+          const answer = await call(known.version);
+          done();
+          const next = accept(answer, one.step);
+          if (!next) await get().load();
+          return next ?? known;
         } catch (error) {
-          set({ saving: "saved" });
-          if (!(error instanceof ApiError) || error.status !== 409) throw error;
-          await get().load();
-          throw new Error(
-            "The scenario was changed in another tab. You now see its newest state; try again.",
-          );
+          done();
+          show();
+          return await failed(error);
         }
       });
-      queue = turn.catch(() => undefined);
-      return turn;
+      queue = made.catch(() => undefined);
+      return made;
+    };
+    const send = (one: Pending, call: (version: number) => Promise<Answer>): Promise<ScenarioState | null> =>
+      turn<null>(one, call, async (error) => {
+        await refused(error, () => send({ ...one }, call));
+        return null;
+      });
+    const move = (
+      step: -1 | 1,
+      call: (version: number) => Promise<Answer>,
+    ): Promise<ScenarioState | null> => {
+      const moves = pending.every((one) => one.step !== 0);
+      const steps = pending.reduce<number>((sum, one) => sum + one.step, step);
+      const there = moves ? timeline.look(steps) : null;
+      // What may be added to a region is asked of the server, which has to know the region by then.
+      const foresee: Pending["foresee"] = ({ roi }) => (there?.roi === roi ? there : null);
+      return send({ step, foresee }, call);
+    };
+    const ask: Ask<ScenarioState> = (call) => send({ ...UNKNOWN }, call);
+    const take = async (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState> => {
+      const found = await turn<never>({ ...UNKNOWN }, call, async (error) => {
+        set({ saving: "saved" });
+        if (!(error instanceof ApiError) || error.status !== 409) throw error;
+        await get().load();
+        throw new Error("The scenario was changed in another tab. You now see its newest state; try again.");
+      });
+      if (!found) throw new Error("The scenario is not loaded yet.");
+      return found;
     };
     const refused = async (error: unknown, again: Refusal["again"]): Promise<void> => {
       const status = error instanceof ApiError ? error.status : -1;
@@ -140,18 +231,24 @@ export function createEditorStore(name: string): EditorStore {
     return {
       name,
       scenario: null,
+      checked: null,
       saving: "saved",
       refusal: null,
       selection: [],
-      load: async () => accept(await api.scenario(name)),
+      load: async () => {
+        known = await api.scenario(name);
+        timeline.begin(known.document);
+        show({ saving: "saved", checked: known.document });
+      },
       edit: (edit, label) => {
         const edits = Array.isArray(edit) ? (edit as readonly Edit[]) : [edit as Edit];
-        return ask((version) => api.edit(name, version, edits, label));
+        const foresee: Pending["foresee"] = (document) => foreseen(document, edits);
+        return send({ step: 0, foresee }, (version) => api.edit(name, version, edits, label));
       },
       take,
       ask,
-      undo: () => ask((version) => api.undo(name, version)),
-      redo: () => ask((version) => api.redo(name, version)),
+      undo: () => move(-1, (version) => api.undo(name, version)),
+      redo: () => move(1, (version) => api.redo(name, version)),
       select: (ids) => set({ selection: ids }),
       clearRefusal: () => set({ refusal: null }),
     };

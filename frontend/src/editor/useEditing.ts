@@ -1,4 +1,4 @@
-import { type RefObject, useEffect, useMemo, useRef, useState } from "react";
+import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { Assets, MapDetails, Problem, ScenarioDocument, ScenarioState } from "../api/types";
 import type { LoadedGraph } from "../map/loaded";
@@ -14,7 +14,7 @@ import type { Editing, Handler, Hover, Tool } from "./handlers/handler";
 import { usePick } from "./pick";
 import type { Draft } from "./rules/draft";
 import { everyone } from "./placing";
-import { firstStep, ofProblem, type Step, STEPS } from "./scene";
+import { firstStep, ofProblem, type Step, STEPS, wrongOnes } from "./scene";
 import { type Sights, sightsOf } from "./sights";
 import type { EditorStore } from "./store";
 import { useShown } from "./useShown";
@@ -54,6 +54,17 @@ export interface EditorNow extends Editing {
   handle: RefObject<MapHandle | null>;
 }
 
+const POINTED: ReadonlySet<keyof EditorNow> = new Set(["hover", "route", "unreachable", "handler"]);
+
+/**
+ * Whether two states differ at most in what lies under the pointer. Functions are left out: what
+ * they know is compared.
+ */
+export const sameButPointer = (one: EditorNow, other: EditorNow): boolean =>
+  (Object.keys(one) as (keyof EditorNow)[]).every(
+    (key) => POINTED.has(key) || typeof one[key] === "function" || one[key] === other[key],
+  );
+
 /** Pixels of the right of the map that the program of a light covers. */
 const PROGRAM = 430;
 
@@ -64,7 +75,7 @@ export function useEditing(
   map: MapDetails | null,
 ): EditorNow {
   const { graph, picker } = loaded;
-  const { scenario, selection, name, edit, select } = store();
+  const { scenario, checked, selection, name, edit, select } = store();
   if (!scenario) throw new Error("the editor is only shown with a scenario");
   const { document, problems } = scenario;
   const [step, setStep] = useState<Step>(() => keptStep() ?? firstStep(document));
@@ -78,7 +89,12 @@ export function useEditing(
   }, []);
   useEffect(() => keep({ step, chosen: selection }), [step, selection]);
   const [tool, setTool] = useState<Tool | null>(null);
-  const [hover, setHover] = useState<Hover | null>(null);
+  const [hover, setPointed] = useState<Hover | null>(null);
+  // The same place is another object with every move of the pointer.
+  const setHover = useCallback(
+    (next: Hover | null) => setPointed((old) => (JSON.stringify(old) === JSON.stringify(next) ? old : next)),
+    [],
+  );
   const handle = useRef<MapHandle | null>(null);
   const lights = useMemo(() => map && new Heads(map.lights), [map]);
   const [drafted, setDrafted] = useState<Draft | null>(null);
@@ -96,7 +112,8 @@ export function useEditing(
   const trial = (hover?.is === "place" && hover.trial) || null;
   const tried = useTrial(name, trial);
   const route = useMemo(() => (trial ? tried.points : legs.flat()), [trial, tried, legs]);
-  const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
+  const wrong = useMemo(() => wrongOnes(problems, checked ?? document), [problems, checked, document]);
+  const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, wrong);
   const sights = useMemo(() => sightsOf(handle, graph, () => lights), [graph, lights]);
   const { roi } = document;
   const changes = useMemo(
@@ -181,10 +198,10 @@ export function useEditing(
       sights.start(found);
     },
     showProblem: (problem) => {
-      const about = ofProblem(problem, document);
+      const about = ofProblem(problem, checked ?? document);
       if (about) select([about.id]);
       goTo(about ? "actors" : (stepOf(problem) ?? step));
-      sights.problem(problem, document);
+      sights.problem(problem, checked ?? document);
     },
   };
 }

@@ -1,10 +1,10 @@
 import { useMemo } from "react";
 
-import type { Assets, Problem, ScenarioDocument } from "../api/types";
+import type { Assets, ScenarioDocument } from "../api/types";
 import type { LoadedGraph } from "../map/loaded";
 import type { SceneActor, SceneFlow } from "../map/scene";
 import { Starts } from "./placing";
-import { insideRows, sceneActors, sceneFlows, wrongOnes } from "./scene";
+import { insideRows, sceneActors, sceneFlows } from "./scene";
 
 export interface Shown {
   inside: ReadonlySet<number>;
@@ -19,14 +19,13 @@ export function useShown(
   document: ScenarioDocument,
   assets: Assets | null,
   selection: readonly string[],
-  problems: readonly Problem[],
+  wrong: ReadonlySet<string>,
 ): Shown {
   const inside = useMemo(() => insideRows(graph, document.roi), [graph, document.roi]);
   const starts = useMemo(
     () => new Starts(graph, picker, inside, document),
     [graph, picker, inside, document],
   );
-  const wrong = useMemo(() => wrongOnes(problems, document), [problems, document]);
   const chosen = useMemo(() => new Set(selection), [selection]);
   const actors = useMemo(
     () => sceneActors(graph, document, assets, chosen, wrong),

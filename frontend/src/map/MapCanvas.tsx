@@ -1,6 +1,7 @@
 import { ActionIcon, Tooltip, useComputedColorScheme } from "@mantine/core";
 import {
   type KeyboardEvent,
+  memo,
   type PointerEvent,
   type ReactNode,
   type RefObject,
@@ -221,10 +222,14 @@ export function MapCanvas({
     const box = host.current?.getBoundingClientRect();
     return [event.clientX - (box?.left ?? 0), event.clientY - (box?.top ?? 0)];
   };
-  const zoom = (factor: number): void => {
-    const { width, height } = size.current;
-    apply(zoomAt(view.current, size.current, factor, width / 2, height / 2, least.current));
-  };
+  const zoom = useCallback(
+    (factor: number) => {
+      const { width, height } = size.current;
+      apply(zoomAt(view.current, size.current, factor, width / 2, height / 2, least.current));
+    },
+    [apply],
+  );
+  const goTo = useCallback((x: number, y: number) => apply({ ...view.current, x, y }), [apply]);
 
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.target !== event.currentTarget || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -329,20 +334,10 @@ export function MapCanvas({
             view={shown}
             size={size.current}
             dark={dark}
-            onMove={(x, y) => apply({ ...view.current, x, y })}
+            onMove={goTo}
           />
         )}
-        <div className="map-buttons">
-          <MapButton label="Zoom in" onClick={() => zoom(1.5)}>
-            <IconPlus />
-          </MapButton>
-          <MapButton label="Zoom out" onClick={() => zoom(1 / 1.5)}>
-            <IconMinus />
-          </MapButton>
-          <MapButton label="Show the whole map" onClick={showAll}>
-            <IconFit />
-          </MapButton>
-        </div>
+        <MapButtons onZoom={zoom} onAll={showAll} />
       </div>
       <div className="map-scale" aria-hidden="true" style={{ width: bar * shown.scale }}>
         {bar >= 1000 ? `${bar / 1000} km` : `${bar} m`}
@@ -367,6 +362,28 @@ const corners = ([x0, y0, x1, y1]: Bounds): [number, number][] => [
   [x1, y1],
   [x0, y1],
 ];
+
+const MapButtons = memo(function MapButtons({
+  onZoom,
+  onAll,
+}: {
+  onZoom: (factor: number) => void;
+  onAll: () => void;
+}) {
+  return (
+    <div className="map-buttons">
+      <MapButton label="Zoom in" onClick={() => onZoom(1.5)}>
+        <IconPlus />
+      </MapButton>
+      <MapButton label="Zoom out" onClick={() => onZoom(1 / 1.5)}>
+        <IconMinus />
+      </MapButton>
+      <MapButton label="Show the whole map" onClick={onAll}>
+        <IconFit />
+      </MapButton>
+    </div>
+  );
+});
 
 function MapButton({
   label,

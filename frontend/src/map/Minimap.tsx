@@ -1,4 +1,4 @@
-import { useEffect, useMemo, useRef } from "react";
+import { memo, useEffect, useMemo, useRef } from "react";
 
 import type { Bounds } from "../api/types";
 import type { MapRenderer } from "./renderer";
@@ -16,7 +16,7 @@ interface Props {
 const LONG = 150;
 
 /** The whole map, small, with a frame around what is seen; press or drag to go there. */
-export function Minimap({ renderer, bounds, view, size, dark, onMove }: Props) {
+export const Minimap = memo(function Minimap({ renderer, bounds, view, size, dark, onMove }: Props) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const held = useRef(false);
   const box = useMemo<Size>(() => {
@@ -70,4 +70,4 @@ export function Minimap({ renderer, bounds, view, size, dark, onMove }: Props) {
       />
     </div>
   );
-}
+});

@@ -47,11 +47,12 @@ _FileState = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A scenario as it is now."""
+    """A scenario as it is now; ``before`` is what the last change of this process has changed."""
 
     name: str
     scenario: Scenario
     history: History
+    before: Scenario | None = None
 
 
 class Drafts:
@@ -153,7 +154,7 @@ class Drafts:
             if scenario.formulas:  # one whose number was set to another is no formula any more
                 scenario = loads(text)
             new = history.grown(old.history, text, self._history(name), label=label)
-            return self._save(Draft(name, scenario, new), text)
+            return self._save(Draft(name, scenario, new, old.scenario), text)
 
     def undo(self, name: str, version: int) -> Draft:
         """Take the last edit back; :class:`ConflictError` if there is none."""
@@ -223,7 +224,7 @@ class Drafts:
                 raise ConflictError(msg, current=version)
             new, text = history.moved(old.history, step, self._history(name))
             scenario = history.document(text, file=f"{name}{SUFFIX}")
-            return self._save(Draft(name, scenario, new), text)
+            return self._save(Draft(name, scenario, new, old.scenario), text)
 
     def _save(self, draft: Draft, text: str) -> Draft:
         write_text(self._path(draft.name), text)

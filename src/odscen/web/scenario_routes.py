@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import orjson
-from fastapi import APIRouter, File, Form, UploadFile
+from fastapi import APIRouter, File, Form, Query, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -51,6 +51,11 @@ from odscen.web.messages import (
 )
 from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.services import Services, Shared, region_of
+from odscen.web.wire.document_changes import (
+    ScenarioPatch,
+    ScenarioProblems,
+    changes_between,
+)
 from odscen.web.wire.media_types import Responses
 from odscen.web.wire.plan_messages import PlannedColumns
 from odscen.workspace.store import check_name, name_from_file
@@ -72,6 +77,9 @@ _FILE: Responses = {
     }
 }
 """A scenario's file leaves out what has its default, which the answers of other routes do not."""
+OnlyChanges = Annotated[
+    bool, Query(description="Answer with what has changed, in place of all, and without problems.")
+]
 
 
 @router.get("")
@@ -153,8 +161,18 @@ def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
     return state_of(shared, shared.drafts.rename(name, new.name))
 
 
+@router.get("/{name}/problems")
+def problems(name: str, shared: Shared) -> ScenarioProblems:
+    """What is wrong with a scenario as it is now."""
+    draft = shared.drafts.get(name)
+    found = _problems(shared, draft.scenario)
+    return ScenarioProblems(version=draft.history.version, problems=found)
+
+
 @router.post("/{name}/edits")
-def edit(name: str, request: EditRequest, shared: Shared) -> ScenarioState:
+def edit(
+    name: str, request: EditRequest, shared: Shared, changes: OnlyChanges = False
+) -> ScenarioState | ScenarioPatch:
     """Make edits, all or none; each kind is a function of ``odscen.scenario.edits``."""
 
     def change(scenario: Scenario) -> Scenario:
@@ -163,19 +181,24 @@ def edit(name: str, request: EditRequest, shared: Shared) -> ScenarioState:
             scenario = apply_edit(one, scenario, loaded)
         return scenario
 
-    return state_of(shared, shared.drafts.change(name, request.version, request.words, change))
+    changed = shared.drafts.change(name, request.version, request.words, change)
+    return _changed(shared, changed, changes=changes)
 
 
 @router.post("/{name}/undo")
-def undo(name: str, request: OfVersion, shared: Shared) -> ScenarioState:
+def undo(
+    name: str, request: OfVersion, shared: Shared, changes: OnlyChanges = False
+) -> ScenarioState | ScenarioPatch:
     """Take the last edit back."""
-    return state_of(shared, shared.drafts.undo(name, request.version))
+    return _changed(shared, shared.drafts.undo(name, request.version), changes=changes)
 
 
 @router.post("/{name}/redo")
-def redo(name: str, request: OfVersion, shared: Shared) -> ScenarioState:
+def redo(
+    name: str, request: OfVersion, shared: Shared, changes: OnlyChanges = False
+) -> ScenarioState | ScenarioPatch:
     """Make the edit again that was taken back last."""
-    return state_of(shared, shared.drafts.redo(name, request.version))
+    return _changed(shared, shared.drafts.redo(name, request.version), changes=changes)
 
 
 @router.post("/{name}/copy", status_code=201)
@@ -288,21 +311,41 @@ def state_of(shared: Services, draft: Draft) -> ScenarioState:
         name=draft.name,
         version=history.version,
         document=draft.scenario,
-        problems=[ProblemInfo(**asdict(one)) for one in _problems(shared, draft.scenario)],
+        problems=_problems(shared, draft.scenario),
         label=history.label,
         undo=history.undo,
         redo=history.redo,
     )
 
 
-def _problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
+def _changed(shared: Services, draft: Draft, *, changes: bool) -> ScenarioState | ScenarioPatch:
+    """Answer with a scenario that was just changed, or with what has changed."""
+    if not changes or draft.before is None:
+        return state_of(shared, draft)
+    history = draft.history
+    return ScenarioPatch(
+        name=draft.name,
+        before=history.version - 1,
+        version=history.version,
+        changes=changes_between(draft.before, draft.scenario),
+        label=history.label,
+        undo=history.undo,
+        redo=history.redo,
+    )
+
+
+def _problems(shared: Services, scenario: Scenario) -> list[ProblemInfo]:
+    return [ProblemInfo(**asdict(one)) for one in _found(shared, scenario)]
+
+
+def _found(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
     try:
         loaded = shared.map_of(scenario)
     except InputError as error:  # a scenario whose map was removed can still be looked at
         return (Problem("error", "map_missing", "map", str(error)),)
     with shared.search:
         region = region_of(loaded, scenario.roi)
-        problems = check(
+        found = check(
             scenario,
             loaded.sumo.graph,
             shared.workspace.assets(),
@@ -310,7 +353,7 @@ def _problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
             parking=loaded.sumo.parking,
             region=region,
         )
-    return (*problems, *criteria_problems(scenario), *place_fit(scenario, loaded.sumo))
+    return (*found, *criteria_problems(scenario), *place_fit(scenario, loaded.sumo))
 
 
 def _region(shared: Services, scenario: Scenario) -> Region:

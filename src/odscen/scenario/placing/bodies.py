@@ -70,7 +70,8 @@ def box_at(
 def overlap(a: Box, b: Box) -> bool:
     """Whether two boxes share ground: separating axes, the two directions of either box."""
     dx, dy = b.x - a.x, b.y - a.y
-    reach = a.radius + b.radius
+    # No corner is farther from its centre than this, and of a crowd most boxes are.
+    reach = a.half_length + a.half_width + b.half_length + b.half_width
     if dx * dx + dy * dy > reach * reach or abs(a.z - b.z) > LEVEL_HEIGHT:
         return False
     along = abs(a.ux * b.ux + a.uy * b.uy)

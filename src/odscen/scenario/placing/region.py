@@ -76,7 +76,12 @@ class Region:
 
     def place(self, node: str) -> NodePlace | None:
         """Where a node id leads on the map, inside the region or not; ``None`` if nowhere."""
-        return place_of(self.graph, node)
+        known = self._places
+        if node not in known:
+            if len(known) > _MOST:
+                known.clear()
+            known[node] = place_of(self.graph, node)
+        return known[node]
 
     def holds(self, place: NodePlace) -> bool:
         """Whether a place is inside the region."""
@@ -136,6 +141,10 @@ class Region:
                 nodes = np.array([(spawn.node, goal.node) for spawn, goal in asked])
                 found = router.leads(nodes[:, 0], nodes[:, 1]).tolist()
                 self._leads.update(zip(asked, found, strict=True))
+
+    @cached_property
+    def _places(self) -> dict[str, NodePlace | None]:
+        return {}
 
     @cached_property
     def _leads(self) -> dict[tuple[NodePlace, NodePlace], bool]:

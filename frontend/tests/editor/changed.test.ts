@@ -1,0 +1,251 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+
+import type { DocumentChange, Edit, ScenarioState } from "../../src/api/types";
+import { patched, reused } from "../../src/editor/documentChanges";
+import { foreseen } from "../../src/editor/foreseen";
+import { createEditorStore } from "../../src/editor/store";
+import { Timeline } from "../../src/editor/timeline";
+import { actor, flow, scenario } from "../example";
+
+const document = scenario([actor("a"), actor("b"), actor("c")], ["r1"], [flow("f", "1.0.-1.1")]);
+const change = (op: DocumentChange["op"], path: string, value: unknown = null): DocumentChange => ({
+  op,
+  path,
+  value,
+});
+
+test("changes make the new document, and leave what they are not about as the same objects", () => {
+  const made = patched(document, [
+    change("remove", "/actors/1"),
+    change("replace", "/actors/1/depart", 4),
+    change("add", "/actors/2", actor("d")),
+    change("replace", "/roi", ["r1", "r2"]),
+  ]);
+  expect(made.actors.map(({ id, depart }) => [id, depart])).toEqual([
+    ["a", 0],
+    ["c", 4],
+    ["d", 0],
+  ]);
+  expect(made.roi).toEqual(["r1", "r2"]);
+  expect(made.actors[0]).toBe(document.actors[0]);
+  expect(made.flows).toBe(document.flows);
+  expect(document.actors).toHaveLength(3);
+});
+
+test("names with slashes and tildes are read as the standard writes them", () => {
+  const made = patched(document, [change("add", "/environment/parameters/a~1b~0c", 1)]);
+  expect(made.environment.parameters).toEqual({ "a/b~c": 1 });
+  const back = patched(made, [change("remove", "/environment/parameters/a~1b~0c")]);
+  expect(back.environment.parameters).toEqual({});
+});
+
+test.each(["/actors/3", "/actors/0/goal/deep", "/actors/x"])("nothing is made up at %s", (path) => {
+  expect(() => patched(document, [change("replace", path, 1)])).toThrow(path);
+});
+
+test("what says the same is the same object", () => {
+  expect(reused(document, structuredClone(document))).toBe(document);
+  const other = structuredClone(patched(document, [change("replace", "/actors/2/goal", "n")]));
+  const made = reused(document, other);
+  expect(made).toEqual(other);
+  expect(made.actors[0]).toBe(document.actors[0]);
+  expect(made.actors[2]).not.toBe(document.actors[2]);
+  expect(reused({ a: 1, b: undefined }, { a: 1 } as object)).toEqual({ a: 1 });
+  expect(reused([1, 2, 3], [1, 2])).toEqual([1, 2]);
+});
+
+test("moves, goals, fields, the ego and removals are foreseen; what the server names is not", () => {
+  const made = foreseen(document, [
+    { kind: "move_actor", actor: "a", spawn: "n1" },
+    { kind: "set_goal", actor: "a", goal: "n2" },
+    { kind: "change_actor", actor: "b", speed: 9 },
+    { kind: "set_ego", actor: "b" },
+    { kind: "remove_actors", actors: ["c"] },
+    { kind: "remove_flow", flow: "f" },
+  ]);
+  expect(made?.actors).toEqual([
+    { ...actor("a"), spawn: "n1", goal: "n2" },
+    { ...actor("b"), speed: 9, ego: true },
+  ]);
+  expect(made?.flows).toEqual([]);
+  const unknown: Edit[] = [
+    { kind: "add_actor", category: "car", spawn: "n" },
+    { kind: "change_actor", actor: "a", category: "van" },
+    { kind: "change_actor", actor: "a", id: "z" },
+    { kind: "move_actor", actor: "nobody", spawn: "n" },
+    { kind: "set_ego", actor: "nobody" },
+  ];
+  for (const edit of unknown) expect(foreseen(document, [edit])).toBeNull();
+});
+
+test("the documents before and after are known until something else is done", () => {
+  const [one, two, three] = [1, 2, 3].map((seed) => ({ ...document, seed }));
+  if (!one || !two || !three) throw new Error();
+  const line = new Timeline();
+  line.begin(one);
+  expect(line.look(-1)).toBeNull();
+  line.grow(two);
+  line.grow(three);
+  expect([line.look(-1), line.look(-2)]).toEqual([two, one]);
+  line.move(-1, two);
+  expect([line.look(-1), line.look(1)]).toEqual([one, three]);
+  line.grow(one);
+  expect(line.look(1)).toBeNull();
+  line.move(1, three); // made elsewhere
+  expect([line.look(0), line.look(-1)]).toEqual([three, null]);
+});
+
+/** A server that answers when it is told to, each kind of request on its own. */
+class Server {
+  readonly asked: { url: string; body: { version: number } | null }[] = [];
+  private readonly waiting: ((answer: Response) => void)[] = [];
+  problems: object = { version: 0, problems: [] };
+
+  constructor(private readonly begin: ScenarioState) {
+    vi.stubGlobal("fetch", (url: string, init?: RequestInit) => {
+      const body = typeof init?.body === "string" ? (JSON.parse(init.body) as { version: number }) : null;
+      this.asked.push({ url, body });
+      if (url.endsWith("/problems")) return Promise.resolve(Response.json(this.problems));
+      if (!body) return Promise.resolve(Response.json(this.begin));
+      return new Promise<Response>((resolve) => this.waiting.push(resolve));
+    });
+  }
+
+  async answer(body: object, status = 200): Promise<void> {
+    await vi.waitFor(() => expect(this.waiting).not.toHaveLength(0));
+    this.waiting.shift()?.(Response.json(body, { status }));
+  }
+}
+
+const begin: ScenarioState = {
+  name: "s",
+  version: 1,
+  document,
+  problems: [],
+  label: "",
+  undo: null,
+  redo: null,
+};
+const told = (before: number, ...changes: DocumentChange[]): object => ({
+  name: "s",
+  before,
+  version: before + 1,
+  changes,
+  label: "l",
+  undo: "l",
+  redo: null,
+});
+
+async function opened(): Promise<[Server, ReturnType<typeof createEditorStore>]> {
+  const server = new Server(begin);
+  const store = createEditorStore("s");
+  await store.getState().load();
+  return [server, store];
+}
+beforeEach(() => vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] }));
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test("a move is shown before the server answers, and then as the server says it is", async () => {
+  const [server, store] = await opened();
+  const done = store.getState().edit({ kind: "move_actor", actor: "a", spawn: "n" });
+  expect(store.getState()).toMatchObject({ saving: "saving", scenario: { version: 1 } });
+  const shown = store.getState().scenario?.document;
+  expect(shown?.actors[0]?.spawn).toBe("n");
+  await server.answer(told(1, change("replace", "/actors/0/spawn", "n")));
+  expect((await done)?.version).toBe(2);
+  expect(store.getState()).toMatchObject({ saving: "saved", scenario: { version: 2, undo: "l" } });
+  // As foreseen: nothing is drawn anew.
+  expect(store.getState().scenario?.document).toBe(shown);
+});
+
+test("what is refused is taken back, and what was asked for after it stays", async () => {
+  const [server, store] = await opened();
+  const { edit } = store.getState();
+  const first = edit({ kind: "move_actor", actor: "a", spawn: "taken" });
+  const second = edit({ kind: "change_actor", actor: "b", depart: 8 });
+  const actors = () => store.getState().scenario?.document.actors.map(({ spawn, depart }) => [spawn, depart]);
+  const start = document.actors[0]?.spawn;
+  expect(actors()?.slice(0, 2)).toEqual([
+    ["taken", 0],
+    [start, 8],
+  ]);
+  await server.answer({ error: { kind: "ScenarioError", message: "the node is taken" } }, 422);
+  expect(await first).toBeNull();
+  expect(actors()?.slice(0, 2)).toEqual([
+    [start, 0],
+    [start, 8],
+  ]);
+  await server.answer(told(1, change("replace", "/actors/1/depart", 8)));
+  await second;
+  expect(actors()?.[1]).toEqual([start, 8]);
+  expect(server.asked.filter(({ body }) => body).map(({ body }) => body?.version)).toEqual([1, 1]);
+});
+
+test("an edit without a server is taken back, said, and can be made again", async () => {
+  const [server, store] = await opened();
+  const done = store.getState().edit({ kind: "remove_actors", actors: ["a"] });
+  expect(store.getState().scenario?.document.actors).toHaveLength(2);
+  await server.answer({}, 503);
+  await done;
+  expect(store.getState()).toMatchObject({ saving: "failed", scenario: { document } });
+  const again = store.getState().refusal?.again?.();
+  expect(store.getState().scenario?.document.actors).toHaveLength(2);
+  await server.answer(told(1, change("remove", "/actors/0")));
+  await again;
+  expect(store.getState()).toMatchObject({ saving: "saved", refusal: null, scenario: { version: 2 } });
+});
+
+test("undo and redo show at once what this page has seen, and the versions go on growing", async () => {
+  const [server, store] = await opened();
+  const { edit, undo, redo } = store.getState();
+  const done = edit({ kind: "set_seed", seed: 7 });
+  const seed = () => store.getState().scenario?.document.seed;
+  expect(seed()).toBe(0); // only the server knows that
+  await server.answer(told(1, change("replace", "/seed", 7)));
+  await done;
+  expect(seed()).toBe(7);
+  const steps = [undo(), redo(), undo()];
+  expect(seed()).toBe(0);
+  for (const [before, made] of [
+    [2, 0],
+    [3, 7],
+    [4, 0],
+  ] as const)
+    await server.answer(told(before, change("replace", "/seed", made)));
+  await Promise.all(steps);
+  expect(store.getState()).toMatchObject({ saving: "saved", scenario: { version: 5, document } });
+});
+
+test("changes that do not follow on what the page has are not made: the whole is loaded", async () => {
+  const [server, store] = await opened();
+  const done = store.getState().edit({ kind: "set_seed", seed: 7 });
+  await server.answer(told(4, change("replace", "/seed", 7)));
+  await done;
+  expect(server.asked.at(-1)).toEqual({ url: "/api/scenarios/s", body: null });
+  expect(store.getState().scenario?.document).toEqual(document);
+});
+
+test("problems follow when nothing more is changed, and are about the document they were found in", async () => {
+  const [server, store] = await opened();
+  const { edit } = store.getState();
+  const found = [{ severity: "error", code: "c", where: "actors[1]", message: "m", nodes: [], segments: [] }];
+  server.problems = { version: 3, problems: found };
+  const both = [
+    edit({ kind: "change_actor", actor: "a", depart: 1 }),
+    edit({ kind: "change_actor", actor: "a", depart: 2 }),
+  ];
+  await server.answer(told(1, change("replace", "/actors/0/depart", 1)));
+  await server.answer(told(2, change("replace", "/actors/0/depart", 2)));
+  await Promise.all(both);
+  await vi.advanceTimersByTimeAsync(100);
+  await vi.waitFor(() => expect(store.getState().scenario?.problems).toEqual(found));
+  expect(server.asked.filter(({ url }) => url.endsWith("/problems"))).toHaveLength(1);
+  const removed = edit({ kind: "remove_actors", actors: ["a"] });
+  const { checked, scenario: now } = store.getState();
+  expect([checked?.actors[1]?.id, now?.document.actors[1]?.id]).toEqual(["b", "c"]);
+  await server.answer(told(3, change("remove", "/actors/0")));
+  await removed;
+});
