@@ -246,6 +246,9 @@ class _Sharing:
         turning = [n for n in (i, j) if abs(movements[n].turn) > TURN]
         if {movements[n].source for n in (i, j) if self._across(n)} & self._protected:
             return False
+        if not self._lines[i].intersects(self._lines[j]) and self._across(i) and self._across(j):
+            # SUMO sees no vehicle inside on a path that only passes beside: both would go.
+            return one.target == other.target
         return bool(turning)
 
     def _at_far_end(self, link: int, crossing: int) -> bool:
