@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import subprocess
 from pathlib import Path
@@ -17,8 +16,8 @@ from odscen.base.arrays import FloatArray
 from odscen.convert.building.waiting_places import inner_junctions
 from odscen.convert.model.net import NetLane, Request
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
-from odscen.convert.model.right_of_way import Movement, Sign
 from tests.convert.maps import Converted, converted, each_map, named
+from tests.convert.turns import turn_left
 
 SUMO = Path(sumo.SUMO_HOME) / "bin" / "sumo"
 
@@ -88,13 +87,6 @@ def test_who_waits_inside_lets_all_go_who_have_the_right_of_way(path: Path) -> N
                 assert min(along) > 0.55, "nobody from the sides"
 
 
-def turn_left(source: str, target: str, xy: list[tuple[float, float]]) -> Movement:
-    shape = np.array([(x, y, 0.0) for x, y in xy])
-    into, out = (math.atan2(*(shape[n + 1] - shape[n])[1::-1]) for n in (0, -2))
-    lanes = (source, 0), (target, 0)
-    return Movement(*lanes, shape, 3.5, into, out, 13.9, Sign.NONE, False, frozenset())
-
-
 def test_of_turns_that_pass_beside_each_other_one_sees_the_other_until_it_is_out() -> None:
     """SUMO sees vehicles on the internal lane of another path only where centre lines cross."""
     north = turn_left("s", "w", [(1.8, -12.0), (1.8, -6.0), (-1.0, 0.6), (-12.0, 1.8)])
@@ -113,26 +105,34 @@ def test_of_turns_that_pass_beside_each_other_one_sees_the_other_until_it_is_out
     assert seen == [(":j_1_0", "s_0", ":j_2_0"), (":j_1_0", "s_0")]
 
 
-def test_two_who_turn_past_each_other_never_touch(tmp_path: Path) -> None:
-    """80 pairs that arrive from 4 s before to 4 s after each other; 13 of them touched."""
-    net, routes, out = (tmp_path / name for name in ("net.xml", "routes.xml", "out.xml"))
+CAR = '<vType id="car" length="4.6" width="1.8" sigma="0"/>'
+BUS = '<vType id="bus" vClass="bus" length="12" width="2.5" sigma="0" accel="1.2" decel="4"/>'
+
+
+def pairs_on_town07(
+    folder: Path, first: tuple[str, str], second: tuple[str, str], *delays: float, lit: bool
+) -> dict[str, dict[str, str]]:
+    """Run pairs of vehicles, each (type, edges), the second so many seconds after the first.
+
+    Returns
+    -------
+    SUMO's statistics.
+    """
+    net, routes, out = (folder / name for name in ("net.xml", "routes.xml", "out.xml"))
     net.write_bytes(converted(named("carla-2020/Town07")).network.net_xml)
     departs = [
-        (60.0 * n + late, f"{n}{name}", edges)
-        for n in range(80)
-        for name, edges, late in (
-            ("a", "45.0.b 0.0.f", 10.0),
-            ("b", "44.0.f 55.0.f", 6.0 + 0.1 * n),
-        )
+        (60.0 * n + late, f"{n}{name}", vtype, edges)
+        for n, delay in enumerate(delays)
+        for name, (vtype, edges), late in (("a", first, 10.0), ("b", second, 10.0 + delay))
     ]
-    cars = "".join(
-        f'<vehicle id="{name}" type="car" depart="{depart:.1f}" departSpeed="5">'
+    vehicles = "".join(
+        f'<vehicle id="{name}" type="{vtype}" depart="{depart:.1f}" departSpeed="5">'
         f'<route edges="{edges}"/></vehicle>'
-        for depart, name, edges in sorted(departs)
+        for depart, name, vtype, edges in sorted(departs)
     )
-    vtype = '<vType id="car" length="4.6" width="1.8" sigma="0"/>'
-    routes.write_text(f"<routes>{vtype}{cars}</routes>")
-    options = ["--step-length", "0.5", "--tls.all-off", "--collision.check-junctions"]
+    routes.write_text(f"<routes>{CAR}{BUS}{vehicles}</routes>")
+    options = ["--step-length", "0.5", "--collision.check-junctions"]
+    options += ["--collision.mingap-factor", "0", *([] if lit else ["--tls.all-off"])]
     subprocess.run(
         [SUMO, "-n", net, "-r", routes, "--statistic-output", out, *options],
         check=True,
@@ -140,9 +140,23 @@ def test_two_who_turn_past_each_other_never_touch(tmp_path: Path) -> None:
         env={**os.environ, "SUMO_HOME": sumo.SUMO_HOME},
     )
     counts = {one.tag: one.attrib for one in ET.parse(out).getroot()}
-    assert counts["vehicles"]["inserted"] == "160"
-    assert counts["safety"]["collisions"] == "0"
+    assert counts["vehicles"]["inserted"] == str(2 * len(delays))
     assert counts["teleports"]["total"] == "0"
+    return counts
+
+
+def test_two_who_turn_past_each_other_never_touch(tmp_path: Path) -> None:
+    """80 pairs that arrive from 4 s before to 4 s after each other; 13 of them touched."""
+    delays = [-4.0 + 0.1 * n for n in range(80)]
+    turns = ("car", "45.0.b 0.0.f"), ("car", "44.0.f 55.0.f")
+    assert pairs_on_town07(tmp_path, *turns, *delays, lit=False)["safety"]["collisions"] == "0"
+
+
+def test_nobody_enters_a_junction_so_far_that_the_flank_of_a_bus_touches_it(tmp_path: Path) -> None:
+    """A bus turns left, and a car enters where it came to: 26 of these 80 pairs touched."""
+    delays = [-6.0 + 0.15 * n for n in range(80)]
+    paths = ("bus", "47.0.f 42.0.b"), ("car", "42.0.f 43.0.f")
+    assert pairs_on_town07(tmp_path, *paths, *delays, lit=True)["safety"]["collisions"] == "0"
 
 
 @each_map()

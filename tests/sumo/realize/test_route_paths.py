@@ -114,6 +114,35 @@ def test_places_where_it_is_too_late_for_a_lane_change() -> None:
     ]
 
 
+def test_trips_start_with_the_whole_vehicle_outside_junctions() -> None:
+    """SUMO lets them appear inside across others, who drive beside their lane."""
+    lanes = [
+        ToyLane(key("1", -1), 0, 0, 0, 40, "r1", next=(key("5", -1),)),
+        ToyLane(key("5", -1), 40, 0, 0, 20, "j5", junction="5", next=(key("2", -1),)),
+        ToyLane(key("2", -1), 60, 0, 0, 40, "r2", next=(key("6", -1),)),
+        ToyLane(key("6", -1), 100, 0, 0, 20, "j6", junction="6", next=(key("3", -1),)),
+        ToyLane(key("3", -1), 120, 0, 0, 4, "r3", next=(key("7", -1),)),
+        ToyLane(key("7", -1), 124, 0, 0, 20, "j7", junction="7"),
+    ]
+    graph = map_graph(lanes, adjacency=[("r1", "r2"), ("r2", "r3")])
+    region = Region.of(graph, ["r1", "r2", "r3"])
+    names = [node_id(graph, node) for node in range(len(graph.lanes.x))]
+
+    def places(usable: Usable, *roads: str) -> list[float]:
+        starts = TripEnds(region, usable).starts(Category.CAR, roads)
+        return [float(graph.lanes.x[node]) for node in starts]
+
+    half = Usable().bodies[Category.CAR].length / 2.0
+    on_road = places(Usable(), "r2")
+    assert min(on_road) - half >= 60.0
+    assert max(on_road) + half <= 100.0
+    # The simulator's junction begins earlier than the map's: at a crosswalk 10 m before.
+    inside = (graph.lanes.x > 90.0) & np.array([name.startswith("2.") for name in names])
+    assert max(places(Usable(in_junction=inside), "r2")) + half <= 91.0
+    # Where a road is too short for that, they start all the same.
+    assert places(Usable(), "r3")
+
+
 def test_trips_do_not_start_there_if_their_segment_has_other_places() -> None:
     graph = approach(ring=True)
     ground = TripEnds(Region.of(graph, ["r1", "R", "L"]), Usable())

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 BUS_LENGTH = 12.0
 """Metres of the longest body that turns are made for."""
 
-MOST_SWEPT = 2.5
+MOST_SWEPT = 4.0
 """Metres that are added to the width of an internal lane, at most."""
 
 
@@ -203,11 +203,11 @@ def _swept(passage: Passage) -> float:
     """Metres that a bus takes up beside its lane in a turn: SUMO keeps others off a lane's width.
 
     SUMO draws a body as the chord of its path, so that the middle lies inside of it by the sagitta
-    of a circle.
+    of a circle. Half of what a lane is wider lies on that side: hence twice the sagitta.
     """
     turn = abs(passage.movement.turn)
     radius = passage.length / max(turn, 1e-3)
-    return min(BUS_LENGTH**2 / (8.0 * radius), MOST_SWEPT)
+    return min(2.0 * BUS_LENGTH**2 / (8.0 * radius), MOST_SWEPT)
 
 
 class _Inside:

@@ -5,6 +5,8 @@ only as drivers expect it (RiLSA 2015, section 2.3; HCM 7th edition, chapter 19)
 
 - a turn across oncoming traffic, unless that has three lanes or more that go on, or is faster than
   70 km/h, or two lanes or more make the turn: then the turn is protected;
+- opposing turns whose paths cross, so that SUMO sees who is inside; not if they only pass beside
+  each other, nearer than a vehicle is wide;
 - a turn over a crossing at its far end, with those who walk in parallel;
 - a turn over the path of others from the same approach, as of bicycles beside it.
 
@@ -245,6 +247,9 @@ class _Sharing:
             return False
         turning = [n for n in (i, j) if abs(movements[n].turn) > TURN]
         if {movements[n].source for n in (i, j) if self._across(n)} & self._protected:
+            return False
+        if not self._lines[i].intersects(self._lines[j]) and self._across(i) and self._across(j):
+            # SUMO sees no vehicle inside on a path that only passes beside: both would go.
             return False
         return bool(turning)
 

@@ -88,8 +88,9 @@ class TripEnds:
     """Where road users of a region can start and end, on lanes and on walks.
 
     Vehicles start on lanes outside junctions with room for their body, where a segment has such
-    places not just before the end of where lanes may be changed, and end at the last place of a
-    lane in its segment; pedestrians start and end anywhere on walks.
+    places with all of the body outside junctions and not just before the end of where lanes may be
+    changed, and end at the last place of a lane in its segment; pedestrians start and end anywhere
+    on walks.
 
     Parameters
     ----------
@@ -181,10 +182,21 @@ class TripEnds:
         lanes = self.region.graph.lanes
         body = self._usable.bodies[category]
         room = self._on_roads & standing_room(lanes, body, allowed=self._spawnable)
-        better = room & ~late_for_changes(lanes, body)
-        elsewhere = np.zeros(len(self.region.graph.segments.ids), dtype=np.bool_)
-        elsewhere[lanes.segment[better]] = True
-        return better | (room & ~elsewhere[lanes.segment])
+        # Inside a junction SUMO lets vehicles appear across others that drive beside their lane.
+        clear = room & standing_room(lanes, body, allowed=self._outside)
+        timely = ~late_for_changes(lanes, body)
+        starts = np.zeros(len(room), dtype=np.bool_)
+        settled = np.zeros(len(self.region.graph.segments.ids), dtype=np.bool_)
+        for places in (clear & timely, clear, room & timely, room):
+            starts |= places & ~settled[lanes.segment]
+            settled[lanes.segment[places]] = True
+        return starts
+
+    @cached_property
+    def _outside(self) -> BoolArray:
+        """Nodes outside junctions, of the map and of the simulator."""
+        inside = self._usable.in_junction
+        return self._on_roads if inside is None else self._on_roads & ~inside
 
     @cached_property
     def _spawnable(self) -> BoolArray:

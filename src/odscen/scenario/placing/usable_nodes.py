@@ -26,6 +26,9 @@ class Usable:
         Shape ``(N,)``: lane-graph nodes that a path can lead over.
     walkable
         Shape ``(P,)``: pedestrian nodes on which a walker can be placed, and arrive.
+    in_junction
+        Shape ``(N,)``: lane-graph nodes inside the simulator's junctions, on the way to a crosswalk
+        before them for example. ``None``: those of the map's junctions.
     bodies
         Size of each category.
     """
@@ -33,4 +36,5 @@ class Usable:
     spawnable: BoolArray | None = None
     drivable: BoolArray | None = None
     walkable: BoolArray | None = None
+    in_junction: BoolArray | None = None
     bodies: Mapping[Category, Body] = field(default_factory=lambda: DEFAULT_BODY)

@@ -34,7 +34,8 @@ def usable_places(sumo_map: SumoMap) -> Usable:
       every way on or off (SUMO lays the rear of a body on a lane of its own choice);
     - *drivable*: the lane exists in SUMO, somewhere along it at least;
     - *walkable*: the place is on the lane of its edge that pedestrians use, outside junctions,
-      within :data:`DEVIATION`.
+      within :data:`DEVIATION`;
+    - *in_junction*: the SUMO lane is one inside a junction.
     """
     graph = sumo_map.graph
     lanes, walks = graph.lanes, graph.walks
@@ -48,12 +49,16 @@ def usable_places(sumo_map: SumoMap) -> Usable:
         ],
         dtype=np.bool_,
     )
+    inside = np.array(
+        [lane.internal for lane in _lanes(sumo_map, sumo_map.lane_places)], dtype=np.bool_
+    )
     on_foot = _admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
     on_foot &= walked[sumo_map.walk_places.lane] & _near(sumo_map.walk_places)
     return Usable(
         spawnable=_all_around(exact, lanes, reach),
         drivable=sumo_map.drivable,
         walkable=on_foot & ~walks.roadside[walks.lane],
+        in_junction=(sumo_map.lane_places.lane >= 0) & inside[sumo_map.lane_places.lane],
     )
 
 
