@@ -273,11 +273,14 @@ class OdscenPage:
 
     @contextmanager
     def changing(self) -> Iterator[None]:
-        """Waits until what is done within has been answered by the server and is saved."""
+        """Waits until what is done within has been answered by the server, is saved and checked."""
         asked = re.compile(r"/api/scenarios/[^/]+/(edits|undo|redo)\?")
         with self.page.expect_response(lambda answer: bool(asked.search(answer.url))):
             yield
-        expect(self.page.get_by_text("All changes saved")).to_be_visible()
+        saved = self.page.get_by_text("All changes saved")
+        expect(saved).to_be_visible()
+        # Problems come later, and move what is beside them.
+        expect(saved).to_have_attribute("data-checked", "true")
 
     @property
     def time_bar(self) -> Locator:

@@ -32,7 +32,7 @@ export const HeadTools = memo(function HeadTools({
   /** What the map shows now. */
   onPicture: () => HTMLCanvasElement | null;
 }) {
-  const { scenario, saving, undo, redo, name, edit } = store();
+  const { scenario, checked, saving, undo, redo, name, edit } = store();
   const [slot, setSlot] = useState<HTMLElement | null>(null);
   const [dialog, setDialog] = useState<Dialog>(null);
   const [imported, setImported] = useState(false);
@@ -64,7 +64,7 @@ export const HeadTools = memo(function HeadTools({
   };
   return createPortal(
     <>
-      <span className="saving" role="status">
+      <span className="saving" role="status" data-checked={checked === scenario?.document}>
         {SAVED[saving]}
       </span>
       {tools.map(({ word, keys, label, act, icon }) => (

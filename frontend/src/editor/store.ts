@@ -94,7 +94,7 @@ export function createEditorStore(name: string): EditorStore {
       const { scenario, selection } = get();
       const shown = scenario?.document ?? known.document;
       const made = pending.reduce((one, { foresee }) => foresee(one) ?? one, known.document);
-      const document = reused(shown, made);
+      const document = pending.length > 0 ? reused(shown, made) : made;
       set({
         scenario: document === known.document ? known : { ...known, document },
         selection: selectionAfter(selection, shown, document),
@@ -111,8 +111,7 @@ export function createEditorStore(name: string): EditorStore {
             if (!asked || known !== asked || version !== asked.version) return;
             const same = reused(asked.problems, problems) === asked.problems;
             // Places are rows of lists: those of another document are others.
-            if (same && problems.length === 0) return;
-            known = { ...asked, problems };
+            if (!same || problems.length > 0) known = { ...asked, problems };
             show({ checked: asked.document });
           },
           () => undefined, // The next change asks again, and says if there is no server.
@@ -236,7 +235,9 @@ export function createEditorStore(name: string): EditorStore {
       refusal: null,
       selection: [],
       load: async () => {
-        known = await api.scenario(name);
+        const answer = await api.scenario(name);
+        const shown = get().scenario?.document ?? answer.document;
+        known = { ...answer, document: reused(shown, answer.document) };
         timeline.begin(known.document);
         show({ saving: "saved", checked: known.document });
       },

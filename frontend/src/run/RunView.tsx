@@ -328,7 +328,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
         </aside>
       </div>
       <RunBar
-        end={Math.max(player.replay?.end ?? 0, info.progress?.until ?? 0) || 60}
+        end={(ended ? Math.max(player.replay?.end ?? 0, now.time) : info.progress?.until) || 60}
         reached={player.replay?.end ?? now.time}
         time={mode === "replay" ? player.time : now.time}
         incidents={incidents}

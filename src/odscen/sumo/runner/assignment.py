@@ -58,6 +58,8 @@ if TYPE_CHECKING:
 
 _SETTLED = 0.05
 """Share of trips that may want another route when, with a spread, routes are found."""
+_FEWEST = 7
+"""Iterations, with a spread: means of fewer runs still have their chance in them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +175,7 @@ def assign_routes(
             best = search.paths()
         if on_step is not None:
             on_step(steps[-1])
-        settled = not choice.spread or wanting <= _SETTLED
+        settled = not choice.spread or (wanting <= _SETTLED and iteration >= _FEWEST)
         if (search.gap <= choice.gap and settled) or not wanting:
             break
         changed = search.change(share=1.0 / (iteration + 1.0))
