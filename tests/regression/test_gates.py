@@ -153,7 +153,7 @@ def test_a_run_that_is_not_usable_fails_as_its_own_cause_unless_the_suite_says_o
 
 
 def test_a_run_that_dies_is_an_error_not_a_difference(store, suite):
-    suite.write_text("time_limit = 0.01\n" + suite.read_text())
+    suite.write_text("time_limit = 0.001\n" + suite.read_text())
     result = run(store, suite)
     assert result.exit_code == 3
     assert {case.status for case in result.cases} == {"error"}
@@ -403,7 +403,7 @@ def test_a_large_suite_with_everything_in_it_is_reported_whole(store, tiny, coun
     edit_scenario(suite, broken, actors=[{"id": "a", "category": "car", "spawn": "9.9.9.9"}])
     (folder / f"{deleted}.scenario.json").unlink()
     (folder / "baselines" / f"{new}.json").unlink()
-    limit = f'[[scenario]]\nfile = "{slow}.scenario.json"\ntime_limit = 0.01\n'
+    limit = f'[[scenario]]\nfile = "{slow}.scenario.json"\ntime_limit = 0.001\n'
     suite.write_text(suite.read_text() + limit)
     result = run(store, suite)
     expected = dict.fromkeys(names, "passed") | {

@@ -129,7 +129,7 @@ def test_too_few_seeds_are_used_as_they_are_and_said_to_catch_less(store, tmp_pa
 
 
 def test_a_run_that_dies_in_the_pilot_is_an_error_and_writes_nothing(store, tmp_path):
-    text = 'time_limit = 0.01\ndetect = { change = "5 %", seeds_max = 8 }'
+    text = 'time_limit = 0.001\ndetect = { change = "5 %", seeds_max = 8 }'
     file = detecting(write_tiny(tmp_path, "one"), text, "seeds = [1]")
     result = run_suite(store, read_suite(file), update=Update(True))
     assert result.exit_code == 3

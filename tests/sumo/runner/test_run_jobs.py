@@ -141,10 +141,10 @@ def test_a_network_that_sumo_cannot_read_or_crashes_on_is_a_failed_run(
 def test_a_run_over_its_time_limit_is_stopped_and_has_failed(
     prepare: Prepare, tmp_path: Path
 ) -> None:
-    hurried = replace(prepare(), settings=RunSettings(time_limit=0.01))
+    hurried = replace(prepare(), settings=RunSettings(time_limit=0.001))
     result = run_prepared(hurried, tmp_path / "run")
     assert result.status == "failed"
-    assert "time limit of 0.01 s" in result.summary["error"]
+    assert "time limit of 0.001 s" in result.summary["error"]
     assert "trajectories" not in result.summary["files"]
 
 
