@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 MAP = Path(__file__).parents[1] / "maps" / "town_5x5.xodr"
 ACTORS, ROUNDS = 20, 5
 UNTIL = 80.0
-PER_KM = 27.5
+PER_KM = 36.0
 """Vehicles per kilometre of lane, which are about 300 on the map."""
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _ALWAYS, NEVER_IN_STEP = Flips(was=True), Flips(was=False)
 _CLOSE = 1e-6
-"""Of a margin: as good as on the bound, so that what was said before stays."""
+"""Of a margin: as good as on the bound, where it counts as met unless it is leaving it."""
 
 
 class LeafMemory(NamedTuple):
@@ -172,13 +172,13 @@ class _Leaf:
     def _turns(
         self, margin: float, rate: float | None, before: LeafMemory | None, time: float
     ) -> Flips:
-        was = holds = margin >= 0.0
-        if before is not None:
-            last, was, _ = before
-            if abs(margin) <= _CLOSE:
-                holds = was
-            if rate is None and last is not None:
-                rate = (margin - last) / self._step
+        last = None if before is None else before.margin
+        if rate is None and last is not None:
+            rate = (margin - last) / self._step
+        holds = margin >= 0.0
+        if abs(margin) <= _CLOSE:
+            holds = rate is None or rate * self._step >= -_CLOSE
+        was = holds if before is None else before.holds
         at = () if holds == was else (time,)
         if rate and (rate > 0.0) != holds and abs(margin) < math.inf:
             turn = max(time - margin / rate, time)
