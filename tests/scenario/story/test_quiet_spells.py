@@ -111,9 +111,7 @@ def test_the_same_happens_at_the_same_instants(**story: Any) -> None:
 
 
 @pytest.mark.slow
-# The same stories each time: in one of some 9,000 others a distance touches its bound exactly, and
-# whether that is seen depends on the instants that are looked at.
-@settings(max_examples=1500, deadline=None, derandomize=True)
+@settings(max_examples=1500, deadline=None)
 @stories
 def test_the_same_happens_in_many_stories(**story: Any) -> None:
     _same(**story)
@@ -126,6 +124,18 @@ def test_who_changes_two_lanes_while_no_one_looks_is_met_there(step: float) -> N
     bodies, left = (car, replace(car, id="other", y=11.0)), (("car", 1.03, 7.0),)
     found, _ = _story(when, patient=True, step=step, bodies=bodies, changes=left, until=3.0)
     assert started(found, "r0") == [pytest.approx(1.03, abs=step)]
+
+
+def test_who_stays_on_a_bound_is_met_there_whatever_was_before() -> None:
+    when = [{"all": [{"distance": {"to": "other", "below": 1.0}}, {"speed": {"above": 2.0}}]}]
+    car = replace(CAR, speed=0.0, acceleration=0.5, gain=0.5)
+    bodies = (car, replace(car, id="other", y=10.0))
+    touches_then_a_metre_away = (("other", 1.03, -9.0), ("other", 2.0, 2.0))
+    for patient in (True, False):
+        found, _ = _story(
+            when, patient=patient, step=0.05, bodies=bodies, changes=touches_then_a_metre_away
+        )
+        assert started(found, "r0") == [pytest.approx(4.0)]
 
 
 def test_a_person_who_runs_at_once_is_met_in_time() -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from odscen.scenario.story.road_view import RoadView
 
 _ALWAYS, NEVER_IN_STEP = Flips(was=True), Flips(was=False)
-_CLOSE = 1e-6
+CLOSE = 1e-6
 """Of a margin: as good as on the bound, where it counts as met unless it is leaving it."""
 
 
@@ -176,8 +176,8 @@ class _Leaf:
         if rate is None and last is not None:
             rate = (margin - last) / self._step
         holds = margin >= 0.0
-        if abs(margin) <= _CLOSE:
-            holds = rate is None or rate * self._step >= -_CLOSE
+        if abs(margin) <= CLOSE:
+            holds = rate is None or rate * self._step >= -CLOSE
         was = holds if before is None else before.holds
         at = () if holds == was else (time,)
         if rate and (rate > 0.0) != holds and abs(margin) < math.inf:

@@ -12,6 +12,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.document.rules_document import actors_of, rule_parts
+from odscen.scenario.story.condition_tree import CLOSE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -155,7 +156,7 @@ def _about(rule: StoryRule) -> frozenset[str]:
 
 def _covers(metres: float, speed: float, gain: float) -> float:
     """Seconds in which so many metres are covered at the earliest."""
-    if metres <= 0.0:
+    if metres <= CLOSE:
         return 0.0
     if gain <= 0.0:
         return metres / speed if speed > 0.0 else math.inf
@@ -173,6 +174,8 @@ def _speed(part: OwnBounded, actor: str, view: RoadView) -> float:
     if one is None:
         return _absent(view, part.of or actor)
     if one.person:
+        return 0.0
+    if part.above - one.speed <= CLOSE:
         return 0.0
     return (part.above - one.speed) / one.gain if one.gain > 0.0 else LONGEST
 
