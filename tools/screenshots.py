@@ -16,6 +16,9 @@ from playwright.sync_api import Browser, expect
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, generate, write_scenario
+from odscen.app.studies.executors import LocalExecutor
+from odscen.app.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
+from odscen.app.studies.study_runs import begin_study_of, carry_out_study
 from odscen.app.template_scenarios import template_scenario
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import transitions
@@ -39,7 +42,7 @@ MAP = "town_5x5"
 SMALL = "signal_crossing"
 WEAVE = "motorway_weave"
 COUNTED, LONG, LIT, RULED, TIMED = "morning", "night", "signals", "mid-block", "timed"
-SWEPT = "cut-in"
+SWEPT, STUDY = "cut-in", "rain"
 SIZE = {"width": 1280, "height": 800}
 LARGEST = 400_000
 PATIENCE = 60_000
@@ -78,6 +81,7 @@ def main() -> None:
         scenario = made.name.removesuffix(SUFFIX)
         _counted(workspace)
         _long(workspace)
+        study(workspace)
         _lit(workspace)
         _ruled(workspace)
         _timed(workspace)
@@ -92,6 +96,7 @@ def main() -> None:
                 _time_views(browser, server.url, scheme, folder)
                 _exchange_views(browser, server.url, scheme, folder)
                 _sweep_views(browser, server.url, scheme, folder)
+                _study_views(browser, server.url, scheme, folder)
 
 
 def _counted(workspace: Workspace) -> None:
@@ -366,6 +371,32 @@ def _sweep_views(browser: Browser, url: str, scheme: str, folder: Path) -> None:
         cases = user.page.get_by_role("heading", name="Cases")
         expect(cases).to_be_visible(timeout=600_000)
         camera.take("sweep")
+
+
+def study(workspace: Workspace) -> None:
+    """Carry out a study of one scenario in three kinds of weather."""
+    settings = GenerationSettings(map_name=SMALL, seed=5, fill=0.3)
+    scenario = generate(workspace, settings=settings)[0].name
+    weather = ("WetNoon", "HardRainNoon")
+    edited = [({"kind": "set_environment", "preset": one},) for one in weather]
+    plan = StudyPlan(
+        name=STUDY,
+        scenarios=(scenario,),
+        seeds=tuple(range(1, 11)),
+        variant=tuple(StudyVariant(name=n, edits=e) for n, e in zip(weather, edited, strict=True)),
+        run=StudyRuns(until=60.0),
+    )
+    out = workspace.studies / STUDY
+    begin_study_of(workspace, plan, out, beside=workspace.scenarios)
+    carry_out_study(out, LocalExecutor(workspace, 2))
+
+
+def _study_views(browser: Browser, url: str, scheme: str, folder: Path) -> None:
+    with browser.new_context(base_url=url, viewport=SIZE, color_scheme=scheme) as context:
+        user = OdscenPage(context.new_page())
+        user.page.goto(f"/#/study/{STUDY}")
+        expect(user.page.get_by_role("table", name="Differences")).to_be_visible()
+        Camera(user, scheme, folder).take("study")
 
 
 def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path) -> None:

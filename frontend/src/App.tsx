@@ -22,6 +22,8 @@ const ImportView = lazy(async () => ({ default: (await import("./exchange/Import
 const RunView = lazy(async () => ({ default: (await import("./run/RunView")).RunView }));
 const SweepsView = lazy(async () => ({ default: (await import("./sweeps/SweepsView")).SweepsView }));
 const SweepView = lazy(async () => ({ default: (await import("./sweeps/SweepView")).SweepView }));
+const StudiesView = lazy(async () => ({ default: (await import("./studies/StudiesView")).StudiesView }));
+const StudyView = lazy(async () => ({ default: (await import("./studies/StudyView")).StudyView }));
 const RunsView = lazy(async () => ({ default: (await import("./run/RunsView")).RunsView }));
 
 /** One window: catalogue, editor and run. */
@@ -52,7 +54,7 @@ export function App() {
           <Anchor href="#/" aria-current={address.view === "catalogue" ? "page" : undefined}>
             Maps and scenarios
           </Anchor>
-          {address.view !== "catalogue" && (
+          {"scenario" in address && (
             <>
               <span aria-hidden="true">›</span>
               <Anchor
@@ -92,6 +94,23 @@ export function App() {
               </Anchor>
             </>
           )}
+          {(address.view === "studies" || address.view === "study") && (
+            <>
+              <span aria-hidden="true">›</span>
+              <Anchor
+                href={hashOf({ view: "studies" })}
+                aria-current={address.view === "studies" ? "page" : undefined}
+              >
+                Studies
+              </Anchor>
+            </>
+          )}
+          {address.view === "study" && (
+            <>
+              <span aria-hidden="true">›</span>
+              <span aria-current="page">{address.study}</span>
+            </>
+          )}
           {address.view === "sweep" && (
             <>
               <span aria-hidden="true">›</span>
@@ -124,6 +143,8 @@ export function App() {
           {address.view === "sweep" && (
             <SweepView key={address.sweep} scenario={address.scenario} sweep={address.sweep} />
           )}
+          {address.view === "studies" && <StudiesView />}
+          {address.view === "study" && <StudyView key={address.study} study={address.study} />}
           {address.view === "runs" && <RunsView key={address.scenario} scenario={address.scenario} />}
         </Suspense>
       </main>

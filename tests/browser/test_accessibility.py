@@ -14,7 +14,10 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from odscen.app import runs
-from odscen.app.scenarios import generate
+from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.studies.executors import LocalExecutor
+from odscen.app.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
+from odscen.app.studies.study_runs import begin_study_of, carry_out_study
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page
 from odscen.scenario.sampling.generation_settings import GenerationSettings
@@ -109,6 +112,29 @@ def test_the_catalogue(visit: Callable[..., Any], served: tool.Served, sampled: 
     user.remove(CROSSING).click()
     expect(user.page.get_by_role("dialog")).to_be_visible()
     inspector.look("catalogue-remove")
+
+
+@pytest.mark.slow
+def test_studies(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    workspace = Workspace.open(served.workspace)
+    edits = ({"kind": "set_environment", "preset": "HardRainNoon"},)
+    plan = StudyPlan(
+        name="rain",
+        scenarios=(f"{sampled}{SUFFIX}",),
+        seeds=(1, 2),
+        variant=(StudyVariant(name="rain", edits=edits),),
+        run=StudyRuns(until=20.0),
+    )
+    out = workspace.studies / "rain"
+    begin_study_of(workspace, plan, out, beside=workspace.scenarios)
+    carry_out_study(out, LocalExecutor(workspace, 2))
+    user, inspector = visit(served.url)
+    user.page.goto("/#/studies")
+    expect(user.page.get_by_role("button", name="Start the study")).to_be_visible()
+    inspector.look("studies")
+    user.page.get_by_role("link", name="rain", exact=True).click()
+    expect(user.page.get_by_role("table", name="Differences")).to_be_visible()
+    inspector.look("study")
 
 
 @pytest.mark.slow

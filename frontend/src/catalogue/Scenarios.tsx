@@ -50,6 +50,9 @@ export function Scenarios({
           Your scenarios
         </Title>
         <Group gap="sm">
+          <Button component="a" variant="default" size="sm" href={hashOf({ view: "studies" })}>
+            Studies
+          </Button>
           <FileButton multiple accept={XOSC_FILES} onChange={importing.begin}>
             {(props) => (
               <Button variant="default" size="sm" disabled={importing.state?.refusal === null} {...props}>

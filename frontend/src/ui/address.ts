@@ -10,7 +10,9 @@ export type Address =
   | { view: "run"; scenario: string; run: string }
   | { view: "runs"; scenario: string }
   | { view: "sweeps"; scenario: string }
-  | { view: "sweep"; scenario: string; sweep: string };
+  | { view: "sweep"; scenario: string; sweep: string }
+  | { view: "studies" }
+  | { view: "study"; study: string };
 
 export function parseAddress(hash: string): Address {
   const [view, scenario, run] = pathOf(hash).replace(/^#\/?/, "").split("/").map(decode);
@@ -20,6 +22,8 @@ export function parseAddress(hash: string): Address {
   if (view === "runs" && scenario) return { view: "runs", scenario };
   if (view === "sweeps" && scenario) return { view: "sweeps", scenario };
   if (view === "sweep" && scenario && run) return { view: "sweep", scenario, sweep: run };
+  if (view === "studies") return { view };
+  if (view === "study" && scenario) return { view, study: scenario };
   return { view: "catalogue" };
 }
 
@@ -32,6 +36,8 @@ export function hashOf(address: Address): string {
   if (address.view === "runs") return `#/runs/${enc(address.scenario)}`;
   if (address.view === "sweeps") return `#/sweeps/${enc(address.scenario)}`;
   if (address.view === "sweep") return `#/sweep/${enc(address.scenario)}/${enc(address.sweep)}`;
+  if (address.view === "studies") return "#/studies";
+  if (address.view === "study") return `#/study/${enc(address.study)}`;
   return "#/";
 }
 

@@ -34,6 +34,7 @@ from odscen.web.large.large_documents import LARGE
 from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
 from odscen.web.services import Services, Shared
+from odscen.web.studies import study_routes
 from odscen.web.sweeps import sweep_routes
 from odscen.web.wire.live_messages import LiveMessage
 from odscen.workspace.child_process import keep_ready
@@ -129,6 +130,7 @@ def create_app(
         scenario_routes,
         demand_routes,
         run_routes,
+        study_routes,
         sweep_routes,
         signal_routes,
         result_routes,

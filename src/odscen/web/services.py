@@ -22,6 +22,7 @@ from odscen.web.carla_status import CarlaServer
 from odscen.web.drafts import Drafts
 from odscen.web.jobs import Jobs
 from odscen.web.large.large_documents import LARGE, LargeDocuments
+from odscen.web.studies.active_studies import Studies
 from odscen.web.sweeps.active_sweeps import Sweeps
 from odscen.workspace.guarded_build import read_scenario_in_child
 from odscen.workspace.store import Workspace
@@ -51,6 +52,7 @@ class Services:
     jobs: Jobs
     runs: Runs
     sweeps: Sweeps
+    studies: Studies
     carla: CarlaServer
     large: LargeDocuments | None
     search: threading.Lock = field(default_factory=threading.Lock)
@@ -66,8 +68,8 @@ class Services:
         """
         children = None if large is None else LargeDocuments(workspace, large=large)
         drafts, runs = Drafts(workspace, children), Runs(workspace, carla)
-        sweeps = Sweeps(workspace)
-        return cls(workspace, drafts, Jobs(), runs, sweeps, CarlaServer(carla), children)
+        many = Sweeps(workspace), Studies(workspace)
+        return cls(workspace, drafts, Jobs(), runs, *many, CarlaServer(carla), children)
 
     def map_of(self, scenario: Scenario) -> LoadedMap:
         """Map that a scenario was made on, loaded."""
@@ -102,6 +104,7 @@ class Services:
         """End everything that goes on."""
         self.jobs.close()
         self.sweeps.close()
+        self.studies.close()
         self.runs.close()
 
 

@@ -77,7 +77,7 @@ def plain_name(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
-    """A folder with ``maps/``, ``scenarios/`` and ``runs/``, perhaps ``sweeps/`` and ``assets/``.
+    """A folder with ``maps/``, ``scenarios/`` and ``runs/``, and more as needed.
 
     Attributes
     ----------
@@ -140,6 +140,11 @@ class Workspace:
     def sweeps(self) -> Path:
         """Folder of sweeps that were started in the page."""
         return self.root / "sweeps"
+
+    @property
+    def studies(self) -> Path:
+        """Folder of studies that were started in the page."""
+        return self.root / "studies"
 
     def map_names(self) -> list[str]:
         """Names of all maps, sorted; some may be broken, see :meth:`catalogue`."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 from odscen.app.studies.study_work import GivenUpError, carry_out_order
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from concurrent.futures import Future
 
     from odscen.app.studies.study_work import Outcome, WorkOrder
@@ -48,10 +48,13 @@ class LocalExecutor:
         Has the maps.
     processes
         How many run at a time.
+    check
+        Called now and then while runs are waited for; what it raises ends them.
     """
 
     workspace: Workspace
     processes: int = 1
+    check: Callable[[], None] | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
 
     def outcomes(self, orders: Orders) -> Iterator[list[Outcome]]:
@@ -65,6 +68,8 @@ class LocalExecutor:
                     if not running:
                         return
                     ended, running = wait(running, timeout=_LISTEN, return_when=FIRST_COMPLETED)
+                    if self.check is not None:
+                        self.check()
                     for future in ended:
                         yield future.result()
             finally:

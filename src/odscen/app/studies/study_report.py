@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.app.confident_runs import confidence_of
+from odscen.app.studies.study_rows import FIGURE_COLUMNS
 from odscen.app.studies.study_runs import study_results
 from odscen.base.errors import InputError
 from odscen.base.markup import Markup, element, join
@@ -44,12 +45,15 @@ class StudyGroup:
     ----------
     figures
         Confidence intervals by figure.
+    values
+        By figure, of the runs that have it, in the order of the study.
     """
 
     scenario: str
     variant: str
     runs: int
     figures: Mapping[str, Confidence]
+    values: Mapping[str, Sequence[float]]
 
     def words(self, name: str) -> str:
         """``12.40 +- 0.31``, or a dash."""
@@ -84,6 +88,19 @@ def study_groups(out: Path, figures: Sequence[str]) -> tuple[list[StudyGroup], l
     return _groups(own, figures), paired_differences(own, figures)
 
 
+def figures_had(out: Path) -> list[str]:
+    """Figures that any run of a study has, in their usual order; those of all studies without any.
+
+    Raises
+    ------
+    InputError
+        If there is no study.
+    """
+    table = _completed(study_results(out).table)
+    had = [name for name in FIGURE_COLUMNS if table[name].null_count() < table.height]
+    return had or list(SHOWN_FIGURES)
+
+
 def _refuse_unknown(figures: Iterable[str]) -> None:
     for name in figures:
         if run_figure(name) is None:
@@ -107,6 +124,7 @@ def _groups(table: pl.DataFrame, figures: Sequence[str]) -> list[StudyGroup]:
                 name: confidence_of(part[name].to_list(), share=_SHARE, figure=name)
                 for name in figures
             },
+            {name: part[name].drop_nulls().to_list() for name in figures},
         )
         for (scenario, variant), part in table.group_by("scenario", "variant", maintain_order=True)
     ]

@@ -6,11 +6,7 @@ import itertools
 import os
 import re
 import shutil
-import threading
-import time
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.sweeps.sweep_cases import opened_case
@@ -26,9 +22,10 @@ from odscen.app.sweeps.sweep_folder import (
 from odscen.app.sweeps.sweep_runs import refuse_unknown, sweep
 from odscen.app.sweeps.sweep_table import PAGE_FILE, TABLE_FILE, limits_of, read_table
 from odscen.base.atomic_folders import discard
-from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
+from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
 from odscen.sumo.folder import layout
+from odscen.web.studies.under_way import OneAtATime, UnderWay
 from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
 from odscen.workspace.store import check_name
 
@@ -46,43 +43,6 @@ _FILES = re.compile(
     rf"|runs/case-\d+/{re.escape(layout.REPORT_FILE)}"
 )
 """What of a sweep can be downloaded."""
-_END = 10.0
-"""Wall seconds that a sweep has for its end when the server ends."""
-
-
-class _StoppedSweep(Exception):  # noqa: N818 - no error, and never seen outside
-    pass
-
-
-@dataclass(slots=True)
-class GoingSweep:
-    """A sweep of this server.
-
-    Attributes
-    ----------
-    ended, before
-        Cases that have ended, and how many had when it was started or resumed.
-    over
-        Whether it has ended; ``error`` is why, if it was not to its end.
-    """
-
-    began: float
-    before: int = 0
-    ended: int = 0
-    over: bool = False
-    error: str | None = None
-    stop: threading.Event = field(default_factory=threading.Event)
-
-    def check(self) -> None:
-        """Raise if it is to stop."""
-        if self.stop.is_set():
-            raise _StoppedSweep
-
-    def seconds_left(self, cases: int) -> float | None:
-        """Wall seconds of what is missing, from what the cases so far have taken."""
-        new = self.ended - self.before
-        spent = time.monotonic() - self.began
-        return None if new < 1 else spent / new * (cases - self.ended)
 
 
 class Sweeps:
@@ -91,9 +51,7 @@ class Sweeps:
     def __init__(self, workspace: Workspace) -> None:
         self._workspace = workspace
         self._folder = workspace.sweeps
-        self._lock = threading.Lock()
-        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="sweep")
-        self._known: dict[str, GoingSweep] = {}
+        self._work = OneAtATime("sweep")
 
     def plan(self, scenario: Scenario, wish: SweepWish) -> PlannedSweep:
         """Say what a sweep will take; runs one case of it.
@@ -133,8 +91,8 @@ class Sweeps:
         refuse_unknown(plan.names, scenario)
         limits_of(settings)
         plan.cases()
-        with self._lock:
-            self._refuse_more()
+        with self._work.lock:
+            self._work.refuse_more()
             folder = self._free_folder(name)
             begin_sweep(folder, scenario, plan, settings)
             self._submit(folder.name, scenario, plan, settings, wish.processes)
@@ -152,8 +110,8 @@ class Sweeps:
         """
         folder = self._of(name)
         scenario, plan, said = read_sweep(folder)
-        with self._lock:
-            self._refuse_more()
+        with self._work.lock:
+            self._work.refuse_more()
             if _is_whole(folder):
                 msg = f"sweep {name!r} has all of its cases; there is nothing to resume"
                 raise ConflictError(msg)
@@ -168,11 +126,7 @@ class Sweeps:
             If there is none of that name, or it is not under way.
         """
         self._of(name)
-        going = self._known.get(name)
-        if going is None or going.over:
-            msg = f"sweep {name!r} is not under way"
-            raise ConflictError(msg)
-        going.stop.set()
+        self._work.stop(name)
 
     def remove(self, name: str) -> None:
         """Delete a sweep with its runs.
@@ -183,12 +137,8 @@ class Sweeps:
             If there is none of that name, or it is under way.
         """
         folder = self._of(name)
-        with self._lock:
-            going = self._known.get(name)
-            if going is not None and not going.over:
-                msg = f"sweep {name!r} is under way; stop it first"
-                raise ConflictError(msg)
-            self._known.pop(name, None)
+        with self._work.lock:
+            self._work.forget(name)
             discard(folder)
 
     def info(self, name: str) -> SweepInfo:
@@ -196,8 +146,7 @@ class Sweeps:
         folder = self._of(name)
         plan, _ = read_plan(folder)
         cases, state = len(plan.cases()), self._state(name, folder)
-        going = self._known.get(name)
-        live = going if going is not None and not going.over else None
+        known, live = self._work.known(name), self._work.live(name)
         ended = _ended(folder) if live is None else max(live.ended, live.before)
         safe, unsafe = _verdicts(folder) if state == "done" else (None, None)
         return SweepInfo(
@@ -211,7 +160,7 @@ class Sweeps:
             seconds_left=None if live is None else live.seconds_left(cases),
             safe=safe,
             unsafe=unsafe,
-            error=None if going is None else going.error,
+            error=None if known is None else known.error,
             changed=folder.stat().st_mtime,
         )
 
@@ -258,12 +207,7 @@ class Sweeps:
 
     def close(self) -> None:
         """Stop what is under way; it can be resumed."""
-        for going in self._known.values():
-            going.stop.set()
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        end = time.monotonic() + _END
-        while time.monotonic() < end and not all(one.over for one in self._known.values()):
-            time.sleep(0.02)
+        self._work.close()
 
     def _submit(
         self,
@@ -273,53 +217,34 @@ class Sweeps:
         settings: SweepSettings,
         processes: int,
     ) -> None:
-        before = _ended(self._folder / name)
-        going = GoingSweep(time.monotonic(), before, before)
-        self._known[name] = going
-        self._pool.submit(self._work, name, going, scenario, plan, settings, _at_most(processes))
+        folder, processes = self._folder / name, _at_most(processes)
 
-    def _work(
-        self,
-        name: str,
-        going: GoingSweep,
-        scenario: Scenario,
-        plan: SweepPlan,
-        settings: SweepSettings,
-        processes: int,
-    ) -> None:
-        def done(ended: int, _count: int) -> None:
-            going.ended = ended
-            going.check()
+        def work(known: UnderWay) -> None:
+            def done(ended: int, _count: int) -> None:
+                known.ended = ended
+                known.check()
 
-        try:
             sweep(
                 self._workspace,
                 scenario,
                 plan,
-                self._folder / name,
+                folder,
                 settings=settings,
                 processes=processes,
-                tell=lambda _words: going.check(),
-                progress=lambda _job, _message: going.check(),
+                tell=lambda _words: known.check(),
+                progress=lambda _job, _message: known.check(),
                 done=done,
             )
-        except _StoppedSweep:
-            pass
-        except OdscenError as error:
-            going.error = str(error)
-        except BaseException as error:
-            going.error = f"{type(error).__name__}: {error}"
-            raise
-        finally:
-            going.over = True
+
+        self._work.start(name, _ended(folder), work)
 
     def _state(self, name: str, folder: Path) -> SweepState:
-        going = self._known.get(name)
-        if going is not None and not going.over:
+        if self._work.live(name) is not None:
             return "running"
         if _is_whole(folder):
             return "done"
-        return "stopped" if going is None or going.error is None else "failed"
+        known = self._work.known(name)
+        return "stopped" if known is None or known.error is None else "failed"
 
     def _of(self, name: str) -> Path:
         folder = self._folder / check_name(name, what="sweep")
@@ -327,12 +252,6 @@ class Sweeps:
             what = "sweep"
             raise NotFoundError(what, name, [one.sweep for one in self.rows()])
         return folder
-
-    def _refuse_more(self) -> None:
-        for name, going in self._known.items():
-            if not going.over:
-                msg = f"sweep {name!r} is under way; stop it, or wait for its end"
-                raise ConflictError(msg)
 
     def _free_folder(self, scenario: str) -> Path:
         numbers = itertools.count(1)

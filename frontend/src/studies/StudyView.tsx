@@ -1,0 +1,206 @@
+import {
+  Alert,
+  Anchor,
+  Button,
+  Group,
+  Loader,
+  Modal,
+  Progress,
+  Select,
+  Table,
+  Text,
+  Title,
+} from "@mantine/core";
+import { useState } from "react";
+
+import { type FigureGroup, type StudyInfo, type StudyResults, studies } from "../api/studies";
+import { lasting } from "../sweeps/plan";
+import { go, hashOf } from "../ui/address";
+import { tellError } from "../ui/notices";
+import { count } from "../ui/words";
+import { FigurePlot } from "./FigurePlot";
+import { matters, meanWord, outcomeWord, variantWord } from "./groups";
+import { useStudy } from "./useStudy";
+import "../sweeps/sweeps.css";
+import "./studies.css";
+
+/** One study: how far it is, why runs failed, and its figures. */
+export function StudyView({ study }: { study: string }) {
+  const { info, results, error, choose, reload } = useStudy(study);
+  return (
+    <div className="sweeps-view">
+      <Title order={1} size="h2" mb="xs">
+        Study {study}
+      </Title>
+      {error && (
+        <Alert color="red" title="The study cannot be shown">
+          {error}
+        </Alert>
+      )}
+      {!info && !error && <Loader aria-label="Loading the study" />}
+      {info && <Head info={info} onChanged={reload} />}
+      {info && info.problems.length > 0 && <Problems info={info} onChanged={reload} />}
+      {results && <Figures results={results} onChoose={choose} />}
+    </div>
+  );
+}
+
+/** Outcome or progress, and what can be done. */
+function Head({ info, onChanged }: { info: StudyInfo; onChanged: () => void }) {
+  const [asking, setAsking] = useState(false);
+  const { study, state, runs, ended, seconds_left: left, error } = info;
+  const ask = (call: Promise<unknown>): void => {
+    call.then(onChanged, tellError);
+  };
+  const remove = (): void => {
+    studies.remove(study).then(() => go({ view: "studies" }), tellError);
+  };
+  return (
+    <>
+      <Text role="status">
+        {count(info.scenarios.length, "scenario")} × {count(info.variants.length, "variant")} ×{" "}
+        {count(info.seeds, "seed")}: {outcomeWord(info)}
+        {state === "running" && left !== null && `, about ${lasting(left)} left`}
+        {state === "stopped" && ". It was stopped; what is missing can be run at any time"}
+        {info.elsewhere && ". Another process works on it"}.
+      </Text>
+      {state === "running" && (
+        <Progress my="xs" size="lg" animated value={(100 * ended) / runs} aria-label="Runs that have ended" />
+      )}
+      {state === "failed" && (
+        <Alert color="red" title="The study has failed" my="xs">
+          {error}
+        </Alert>
+      )}
+      <Group my="sm">
+        {state === "running" && !info.elsewhere && (
+          <Button variant="default" onClick={() => ask(studies.stop(study))}>
+            Stop
+          </Button>
+        )}
+        {(state === "stopped" || state === "failed") && (
+          <Button onClick={() => ask(studies.resume(study, 2))}>Resume</Button>
+        )}
+        {ended > 0 && (
+          <Anchor href={studies.fileUrl(study, "study.html")} target="_blank" rel="noreferrer">
+            Whole page, to keep
+          </Anchor>
+        )}
+        {state === "done" && (
+          <Anchor href={studies.fileUrl(study, "results.parquet")}>Table as Parquet</Anchor>
+        )}
+        {state !== "running" && (
+          <Button variant="subtle" color="gray" onClick={() => setAsking(true)}>
+            Delete the study
+          </Button>
+        )}
+        <Anchor href={hashOf({ view: "studies" })}>All studies</Anchor>
+      </Group>
+      <Modal opened={asking} onClose={() => setAsking(false)} title={`Delete ${study}?`}>
+        <Text size="sm" mb="md">
+          The figures of its {count(ended, "run")} are deleted for good. The scenarios stay.
+        </Text>
+        <Group justify="flex-end">
+          <Button variant="default" onClick={() => setAsking(false)}>
+            Keep it
+          </Button>
+          <Button color="red" onClick={remove}>
+            Delete
+          </Button>
+        </Group>
+      </Modal>
+    </>
+  );
+}
+
+/** Why runs failed, the most frequent reason first. */
+function Problems({ info, onChanged }: { info: StudyInfo; onChanged: () => void }) {
+  const again = (): void => {
+    studies.resume(info.study, 2, true).then(onChanged, tellError);
+  };
+  return (
+    <Alert color="red" title={`${count(info.ended - info.completed, "run")} failed`} my="sm">
+      <ul className="study-problems" aria-label="Why runs failed">
+        {info.problems.map(({ words, runs }) => (
+          <li key={words}>
+            {count(runs, "run")}: {words}
+          </li>
+        ))}
+      </ul>
+      {info.state === "done" && (
+        <Button mt="xs" size="compact-sm" variant="white" onClick={again}>
+          Run those again
+        </Button>
+      )}
+    </Alert>
+  );
+}
+
+/** The figure that is chosen: as a picture, as means, and as differences between variants. */
+function Figures({ results, onChoose }: { results: StudyResults; onChoose: (figure: string) => void }) {
+  return (
+    <>
+      <Select
+        label="Figure"
+        maw={360}
+        mt="md"
+        searchable
+        allowDeselect={false}
+        data={results.figures.map(({ name, label, unit }) => ({
+          value: name,
+          label: unit ? `${label}, ${unit}` : label,
+        }))}
+        value={results.figure}
+        onChange={(next) => {
+          if (next !== null) onChoose(next);
+        }}
+      />
+      <FigurePlot results={results} />
+      <Title order={2} size="h4" mt="lg" mb="xs">
+        Means
+      </Title>
+      <GroupTable groups={results.groups} label="Means" />
+      {results.differences.length > 0 && (
+        <>
+          <Title order={2} size="h4" mt="lg" mb="xs">
+            Differences from the first variant
+          </Title>
+          <Text size="sm" mb="xs">
+            Between runs of the same scenario and seed, so that what they share does not count. Where the
+            interval does not reach 0, the variant makes a difference.
+          </Text>
+          <GroupTable groups={results.differences} label="Differences" judged />
+        </>
+      )}
+    </>
+  );
+}
+
+function GroupTable({ groups, label, judged }: { groups: FigureGroup[]; label: string; judged?: boolean }) {
+  return (
+    <Table.ScrollContainer minWidth={520}>
+      <Table verticalSpacing={4} fz={14} aria-label={label}>
+        <Table.Thead>
+          <Table.Tr>
+            <Table.Th>Scenario</Table.Th>
+            <Table.Th>Variant</Table.Th>
+            <Table.Th>Runs</Table.Th>
+            <Table.Th>Mean, 95 % interval</Table.Th>
+            {judged && <Table.Th>More than chance</Table.Th>}
+          </Table.Tr>
+        </Table.Thead>
+        <Table.Tbody>
+          {groups.map((one) => (
+            <Table.Tr key={`${one.scenario}/${one.variant}`}>
+              <Table.Td>{one.scenario}</Table.Td>
+              <Table.Td>{variantWord(one.variant)}</Table.Td>
+              <Table.Td>{one.runs.toLocaleString("en")}</Table.Td>
+              <Table.Td>{meanWord(one)}</Table.Td>
+              {judged && <Table.Td>{matters(one) ? "yes" : "no"}</Table.Td>}
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+    </Table.ScrollContainer>
+  );
+}

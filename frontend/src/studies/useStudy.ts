@@ -1,0 +1,32 @@
+import { useCallback, useEffect, useState } from "react";
+
+import { type StudyInfo, type StudyResults, studies } from "../api/studies";
+import { useLoaded } from "../ui/useLoaded";
+
+/** How often a running study is asked after, milliseconds. */
+export const POLL = 1000;
+
+const NONE = Promise.resolve(null);
+
+/** A study as it is now, and one of its figures once some run has ended. */
+export function useStudy(study: string): {
+  info: StudyInfo | null;
+  results: StudyResults | null;
+  error: string | null;
+  choose: (figure: string) => void;
+  reload: () => void;
+} {
+  const { value: info, error, reload } = useLoaded(useCallback(() => studies.info(study), [study]));
+  const [figure, choose] = useState<string | null>(null);
+  const running = info?.state === "running";
+  useEffect(() => {
+    if (!running) return;
+    const timer = setInterval(reload, POLL);
+    return () => clearInterval(timer);
+  }, [running, reload]);
+  const done = info?.completed ?? 0;
+  const results = useLoaded(
+    useCallback(() => (done > 0 ? studies.results(study, figure) : NONE), [study, figure, done]),
+  );
+  return { info, results: results.value, error: error ?? results.error, choose, reload };
+}

@@ -1,0 +1,1 @@
+"""Studies for the page: begun, carried out in the background, and their figures."""

@@ -1,0 +1,120 @@
+"""Routes for studies: begun, stopped and resumed; their figures, table and page."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from fastapi import APIRouter
+from starlette.responses import FileResponse, Response
+
+from odscen.app.studies.study_report import SHOWN_FIGURES, figures_had, study_groups
+from odscen.results.measures.registry import run_figure
+from odscen.web.services import Shared
+from odscen.web.studies.study_messages import (
+    FigureGroup,
+    ResumeStudy,
+    StudyFigure,
+    StudyInfo,
+    StudyResults,
+    StudyWish,
+)
+from odscen.web.wire.media_types import ANY_FILE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.app.studies.study_report import StudyGroup
+
+router = APIRouter(prefix="/api/studies")
+
+_PAGE = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+"""Content security policy of the page of a study: it holds everything that it needs."""
+
+
+@router.get("")
+def list_studies(shared: Shared) -> list[StudyInfo]:
+    """All studies, the newest last."""
+    return shared.studies.rows()
+
+
+@router.post("", status_code=202)
+def start(wish: StudyWish, shared: Shared) -> StudyInfo:
+    """Begin a study of scenarios as they are now, and carry it out."""
+    return shared.studies.info(shared.studies.start(wish))
+
+
+@router.get("/{study}")
+def show(study: str, shared: Shared) -> StudyInfo:
+    """How far a study is."""
+    return shared.studies.info(study)
+
+
+@router.post("/{study}/stop", status_code=202)
+def stop(study: str, shared: Shared) -> StudyInfo:
+    """Stop a study; what has run is kept, and it can be resumed."""
+    shared.studies.stop(study)
+    return shared.studies.info(study)
+
+
+@router.post("/{study}/resume", status_code=202)
+def resume(study: str, wish: ResumeStudy, shared: Shared) -> StudyInfo:
+    """Run what is missing of a study; it ends as if it had not been stopped."""
+    shared.studies.resume(study, wish)
+    return shared.studies.info(study)
+
+
+@router.delete("/{study}", status_code=204)
+def remove(study: str, shared: Shared) -> None:
+    """Delete a study."""
+    shared.studies.remove(study)
+
+
+@router.get("/{study}/results")
+def results(study: str, shared: Shared, figure: str | None = None) -> StudyResults:
+    """One figure of a study: means with their intervals, differences, and the runs' own values."""
+    folder = shared.studies.folder(study)
+    names = figures_had(folder)
+    shown = figure or next((one for one in SHOWN_FIGURES if one in names), names[0])
+    groups, differences = study_groups(folder, [shown])
+    return StudyResults(
+        figures=[_figure(name) for name in names],
+        figure=shown,
+        groups=_groups(groups, shown),
+        differences=_groups(differences, shown),
+    )
+
+
+@router.get("/{study}/files/{name}", response_class=Response, responses=ANY_FILE)
+def file(study: str, name: str, shared: Shared) -> Response:
+    """A file of a study: its table, or its page as of now."""
+    path = shared.studies.file(study, name)
+    if path.suffix == ".html":
+        headers = {"Content-Security-Policy": _PAGE}
+        return FileResponse(path, media_type="text/html", headers=headers)
+    return FileResponse(path, filename=f"{study}-{path.name}")
+
+
+def _figure(name: str) -> StudyFigure:
+    found = run_figure(name)
+    if found is None:
+        return StudyFigure(name=name, label=name, unit="")
+    return StudyFigure(name=name, label=found.label, unit=found.unit)
+
+
+def _groups(groups: Sequence[StudyGroup], figure: str) -> list[FigureGroup]:
+    return [
+        FigureGroup(
+            scenario=one.scenario,
+            variant=one.variant,
+            runs=one.runs,
+            mean=_number(one.figures[figure].mean),
+            half_width=_number(one.figures[figure].half_width),
+            values=[value for value in one.values[figure] if math.isfinite(value)],
+        )
+        for one in groups
+    ]
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else value
