@@ -27,5 +27,7 @@ export function rounded(value: number, by = value): string {
 export function outcomeWord({ state, runs, ended, completed }: StudyInfo): string {
   const far = `${ended.toLocaleString("en")} of ${runs.toLocaleString("en")} runs`;
   if (state !== "done") return `${state}, ${far}`;
-  return completed === runs ? "all runs completed" : `${(runs - completed).toLocaleString("en")} of ${runs.toLocaleString("en")} runs failed`;
+  return completed === runs
+    ? "all runs completed"
+    : `${(runs - completed).toLocaleString("en")} of ${runs.toLocaleString("en")} runs failed`;
 }

@@ -31,5 +31,7 @@ test("a study says how far it is", () => {
   const info = { state: "running", runs: 2000, ended: 12, completed: 12 } as StudyInfo;
   expect(outcomeWord(info)).toBe("running, 12 of 2,000 runs");
   expect(outcomeWord({ ...info, state: "done", ended: 2000, completed: 2000 })).toBe("all runs completed");
-  expect(outcomeWord({ ...info, state: "done", ended: 2000, completed: 1998 })).toBe("2 of 2,000 runs failed");
+  expect(outcomeWord({ ...info, state: "done", ended: 2000, completed: 1998 })).toBe(
+    "2 of 2,000 runs failed",
+  );
 });
