@@ -84,6 +84,8 @@ class StandIn:
                 "autopilot": actor.autopilot,
                 "lights": actor.lights,
                 "wheels": actor.wheels,
+                "doors": sorted(actor.doors),
+                "left_doors": actor.left_doors,
             }
             for actor in self.world.actors.values()
         ]

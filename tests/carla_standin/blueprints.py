@@ -103,7 +103,13 @@ def _vehicle_attributes(blueprint: Blueprint) -> tuple[Attribute, ...]:
         Attribute("special_type", _STRING, blueprint.special_type),
         Attribute("generation", _INT, str(blueprint.generation or 0)),
         Attribute("has_lights", _BOOL, lit),
+        Attribute("has_dynamic_doors", _BOOL, str(_has_doors(blueprint)).lower()),
     )
+
+
+def _has_doors(blueprint: Blueprint) -> bool:
+    """Whether its doors open: here all of the newer models that have doors, really some of them."""
+    return blueprint.category not in _TWO_WHEELED and blueprint.generation == 2
 
 
 def _walker_attributes(blueprint: Blueprint) -> tuple[Attribute, ...]:

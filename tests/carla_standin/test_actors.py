@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -176,6 +178,33 @@ def test_wheels_are_turned_by_hand_only_without_physics(connected: Connected) ->
     assert turned(5.0) == {}
     car.set_simulate_physics(False)
     assert turned(6.0) == {"0": [6.0, -60.0]}
+
+
+def test_doors_open_where_a_model_has_some_and_an_open_one_does_not_go_with_its_vehicle(
+    connected: Connected,
+) -> None:
+    bus = connected.spawn("vehicle.mitsubishi.fusorosa", transform(0.0, 0.0))
+    old = connected.spawn("vehicle.audi.a2", transform(0.0, 20.0))
+    bus.set_simulate_physics(False)
+    door = carla.VehicleDoor
+
+    def seen(actor: Any) -> tuple[list[int], int]:
+        connected.world.tick()
+        own = next(a for a in connected.server.actors() if a["id"] == actor.id)
+        return own["doors"], own["left_doors"]
+
+    old.open_door(door.All)
+    bus.open_door(door.FR)
+    bus.open_door(door.RR)
+    assert (seen(old), seen(bus)) == (([], 0), ([1, 3], 0))
+    bus.set_transform(transform(1.0, 0.0))
+    assert seen(bus) == ([1, 3], 1)
+    bus.close_door(door.All)
+    bus.set_transform(transform(2.0, 0.0))
+    assert seen(bus) == ([], 1)
+    bus.open_door(door.All)
+    bus.set_simulate_physics(True)
+    assert seen(bus) == ([], 1)
 
 
 def test_something_attached_goes_where_its_parent_goes(connected: Connected) -> None:

@@ -58,6 +58,13 @@ class WheelTurn(NamedTuple):
     pitch: float
 
 
+class DoorMove(NamedTuple):
+    """Open or shut a door: ``FL``, ``FR``, ``RL`` or ``RR`` of CARLA's ``VehicleDoor``."""
+
+    door: str
+    opens: bool
+
+
 class Shine(NamedTuple):
     """Switch a vehicle's lights: bits of CARLA's ``VehicleLightState``."""
 
@@ -105,3 +112,5 @@ class Batch:
     """New state (``Red``, ``Yellow``, ``Green``, ``Off``) of traffic lights, by actor id."""
     wheels: dict[int, WheelTurn] = field(default_factory=dict)
     """Wheels of vehicles without physics, by actor id."""
+    doors: dict[int, tuple[DoorMove, ...]] = field(default_factory=dict)
+    """Doors to open and to shut before anything moves, by actor id."""
