@@ -135,10 +135,11 @@ class Actor:
 
     def footprint(self) -> Box:
         """Rectangle on the ground, in CARLA's frame."""
-        (offset, _, _), (length, width, _) = self.box[:2]
+        (ahead, right, _), (length, width, _) = self.box[:2]
         x, y, z, _, yaw, _ = self.at
         ux, uy = cos(radians(yaw)), sin(radians(yaw))
-        return Box(x + offset * ux, y + offset * uy, z, ux, uy, length, width)
+        middle = x + ahead * ux - right * uy, y + ahead * uy + right * ux
+        return Box(*middle, z, ux, uy, length, width)
 
     def drive(self, control: list[Any]) -> None:
         """Take a VehicleControl: it acts from the next tick on, and is shown to clients."""

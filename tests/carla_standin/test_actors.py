@@ -259,12 +259,21 @@ def test_a_car_is_no_walker(connected: Connected) -> None:
     assert "not a Walker" in answer.error
 
 
-def test_boxes_may_lie_before_the_origin_of_their_vehicles() -> None:
-    with StandIn(MAPS / "signal_crossing.xodr", box_offset=0.25, refuse_grounded=False) as server:
+def test_boxes_may_lie_before_and_beside_the_origin_of_their_vehicles() -> None:
+    xodr, offset = MAPS / "signal_crossing.xodr", (0.25, 0.125)
+    with StandIn(xodr, box_offset=offset, refuse_grounded=False) as server:
         world = synchronize(connect(server))
         blueprint = world.get_blueprint_library().find(CAR)
         car = world.spawn_actor(blueprint, transform(0.0, 0.0))
-        assert car.bounding_box.location.x == 0.25
+        box = car.bounding_box
+        assert (box.location.x, box.location.y) == offset
+        # A car that looks south has its box to the west and south of its origin, one that looks
+        # east to the south and east.
+        world.spawn_actor(blueprint, transform(100.0, 20.0, yaw=90.0))
+        last = 100.0 - offset[1] - offset[0] - box.extent.y - box.extent.x
+        with pytest.raises(RuntimeError, match="collision"):
+            world.spawn_actor(blueprint, transform(last + 0.05, 20.0))
+        world.spawn_actor(blueprint, transform(last - 0.05, 20.0))
 
 
 def test_every_command_of_the_client_is_understood(connected: Connected) -> None:

@@ -31,7 +31,7 @@ ASYNC_DELTA = 0.05
 """Seconds between ticks, on the clock, while no client ticks."""
 
 _SETTINGS = [False, False, [False], True, 0.01, 10, 0.0, True, 3000.0, 2000.0, True]
-_SYNCHRONOUS, _FIXED_DELTA, _ACTIVE_DISTANCE = 0, 2, 9
+_SYNCHRONOUS, _FIXED_DELTA, _STREAM_DISTANCE, _ACTIVE_DISTANCE = 0, 2, 8, 9
 _HEROES = ("hero", "ego_vehicle")
 _SUNK = 1.0
 """Metres by which a body may be below the ground that carries it."""
@@ -49,7 +49,7 @@ class World:
         self.traffic_managers: dict[int, str] = {}
         self.frame = 0
         self.episode = 0
-        self.box_offset = 0.0
+        self.box_offset = (0.0, 0.0)
         self.spectator: Actor
         self._streams = streams
         self._switches = switches
@@ -147,8 +147,8 @@ class World:
         self, definition: Definition, description: list[Any], at: Pose, parent: int | None
     ) -> Actor:
         owner = self.actors[parent] if parent is not None else None
-        offset = self.box_offset if Kind.of(definition.id) is Kind.VEHICLE else 0.0
-        box = [[offset, 0.0, definition.box_height], list(definition.half_size), [0.0, 0.0, 0.0]]
+        moved = self.box_offset if Kind.of(definition.id) is Kind.VEHICLE else (0.0, 0.0)
+        box = [[*moved, definition.box_height], list(definition.half_size), [0.0, 0.0, 0.0]]
         return Actor(
             self._next_id,
             description,
@@ -197,6 +197,8 @@ class World:
 
     def surface(self, x: float, y: float, z: float) -> tuple[float, bool] | None:
         """Height of what is below a place, and whether that is a sidewalk."""
+        if self._switches.large_map and not self._is_loaded(x, y):
+            return None
         return self.map.surface(x, y, z, self._switches.kerb)
 
     def _ground(self, x: float, y: float, z: float) -> float | None:
@@ -242,18 +244,26 @@ class World:
 
     def _let_sleep(self) -> None:
         """Make actors dormant that are too far from all heroes of a large map (LargeMapManager)."""
-        reach = float(self.settings[_ACTIVE_DISTANCE])
+        reach, heroes = float(self.settings[_ACTIVE_DISTANCE]), self._heroes()
+        for actor in self._bodies():
+            actor.dormant = all(
+                hypot(actor.at[0] - one.at[0], actor.at[1] - one.at[1]) > reach for one in heroes
+            )
+
+    def _is_loaded(self, x: float, y: float) -> bool:
+        """Whether the tile of a place is there: those near heroes are (LargeMapManager)."""
+        reach = float(self.settings[_STREAM_DISTANCE])
+        return any(hypot(x - one.at[0], y - one.at[1]) <= reach for one in self._heroes())
+
+    def _heroes(self) -> Sequence[Actor]:
+        """Those around whom a large map is awake: by their roles, or else the spectator."""
         heroes = [
             actor
             for actor in self._bodies()
             if actor.kind is Kind.VEHICLE
             and any(role in actor.attribute("role_name") for role in _HEROES)
         ]
-        for actor in self._bodies():
-            actor.dormant = all(
-                hypot(actor.at[0] - one.at[0], actor.at[1] - one.at[1]) > reach
-                for one in heroes or [self.spectator]
-            )
+        return heroes or [self.spectator]
 
     def _take_pictures(self) -> None:
         cameras = [a for a in self.actors.values() if a.is_camera and self._is_due(a)]
