@@ -9,7 +9,7 @@ from typing import Any
 
 from odscen.scenario.placing.bodies import Box
 from tests.carla_standin import driving, wire
-from tests.carla_standin.blueprints import CAMERA
+from tests.carla_standin.blueprints import CAMERA, LIDAR, RADAR
 from tests.carla_standin.driving import Ground
 from tests.carla_standin.poses import attached, turned
 from tests.carla_standin.wire import ZERO, Pose, Vector
@@ -98,9 +98,9 @@ class Actor:
         return str(self.description[1])
 
     @property
-    def is_camera(self) -> bool:
-        """Whether it takes pictures."""
-        return self.type_id == CAMERA
+    def sees(self) -> bool:
+        """Whether it is a sensor with a stream."""
+        return self.type_id in (CAMERA, LIDAR, RADAR)
 
     def attribute(self, name: str) -> str:
         """Value of an attribute that was given at spawning."""

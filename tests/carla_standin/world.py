@@ -11,9 +11,11 @@ import numpy as np
 
 from odscen.scenario.placing.bodies import overlap
 from odscen.workspace.asset_catalogue import shipped_assets
-from tests.carla_standin import camera, wire
+from tests.carla_standin import camera, scanners, wire
 from tests.carla_standin.actors import Actor, Kind
 from tests.carla_standin.blueprints import (
+    CAMERA,
+    LIDAR,
     SIGN_TAG,
     TRAFFIC_LIGHT_TAG,
     WALKER_CONTROLLER,
@@ -56,6 +58,7 @@ class World:
         self._next_id = 1
         self._next_stream = wire.WORLD_OBSERVER + 1
         self._captured: dict[int, float] = {}
+        self._were: dict[int, wire.Vector] = {}
         self.open(road_map)
 
     # ------------------------------------------------------------------------------- episodes
@@ -124,7 +127,7 @@ class World:
         grounded = self._switches.refuse_grounded and self._is_grounded(actor)
         if definition.has_body and (grounded or self._is_taken(actor)):
             raise wire.RefusedError("Spawn failed because of a collision at spawn position")
-        if actor.is_camera:
+        if actor.sees:
             actor.stream = self._next_stream
             self._next_stream += 1
         return self._enter(actor)
@@ -266,12 +269,28 @@ class World:
         return heroes or [self.spectator]
 
     def _take_pictures(self) -> None:
-        cameras = [a for a in self.actors.values() if a.is_camera and self._is_due(a)]
-        bodies = self._bodies() if cameras else ()
-        for actor in cameras:
+        sensors = [a for a in self.actors.values() if a.sees and self._is_due(a)]
+        bodies = self._bodies() if sensors else ()
+        for actor in sensors:
             self._captured[actor.id] = self.elapsed
-            picture = camera.take(actor, bodies, frame=self.frame, elapsed=self.elapsed)
-            self._streams.send(actor.stream or 0, picture)
+            self._streams.send(actor.stream or 0, self._seen_by(actor, bodies))
+        self._were = {actor.id: wire.vector(actor.at[:3]) for actor in sensors}
+
+    def _seen_by(self, actor: Actor, bodies: Sequence[Actor]) -> bytes:
+        if actor.type_id == CAMERA:
+            return camera.take(actor, bodies, frame=self.frame, elapsed=self.elapsed)
+        if actor.type_id == LIDAR:
+            kind, payload = wire.LIDAR, scanners.lidar(actor, bodies)
+        else:
+            here = actor.at[:3]
+            was = self._were.get(actor.id, here)
+            own = wire.vector((a - b) / self.delta for a, b in zip(here, was, strict=True))
+            still = self._switches.still_speed
+            kind = wire.RADAR
+            payload = scanners.radar(actor, bodies, own, lambda one: one.reported_velocity(still))
+        return wire.scan_message(
+            kind, frame=self.frame, elapsed=self.elapsed, at=actor.at, payload=payload
+        )
 
     def _is_due(self, actor: Actor) -> bool:
         if actor.stream is None or not self._streams.is_watched(actor.stream):
