@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import CarlaError
-from odscen.carla.server.batch import LIFTS
+from odscen.carla.server.batch import ENOUGH_TRIES
 from odscen.sumo.worker.protocol import Outside
 
 if TYPE_CHECKING:
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table.light_heads import Heads
     from odscen.sumo.runner.in_step import Step
     from odscen.sumo.worker.protocol import EgoPose
-
-ENOUGH_TRIES = 2 * len(LIFTS)
-"""Refused spawns of one road user after which a run in which none was ever taken is given up."""
 
 
 class StepShow:

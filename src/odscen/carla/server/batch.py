@@ -16,6 +16,8 @@ A server refuses bodies that touch the ground, and takes them from 0.15 m on (is
 8313 of carla-simulator/carla); they are put on their place before the tick.
 """
 
+ENOUGH_TRIES = 2 * len(LIFTS)
+"""Refused spawns of one road user after which a run in which none was ever taken is given up."""
 WHEEL_CALLS = 6
 """Calls that turn the wheels of one vehicle: four that roll, two that are steered."""
 
