@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from odscen.convert.building.network import build_network
+from odscen.convert.lane_table.table import LaneTable
 from odscen.drawing.map_shapes import map_drawing
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.parking_areas import MapParking, map_parking
@@ -20,10 +21,11 @@ __all__ = ["PLACES", "ParkingTown", "parking_scenario", "parking_town"]
 
 
 class ParkingTown(NamedTuple):
-    """The map as scenarios are run on it, and its network."""
+    """The map as scenarios are run on it, its network, and what leads from one to the other."""
 
     sumo: SumoMap
     net_xml: bytes
+    table: LaneTable
 
     @property
     def parking(self) -> MapParking:
@@ -41,7 +43,9 @@ def parking_town(roads: tuple[int, ...] = ROADS) -> ParkingTown:
     network = build_network(odr, table, graph.walks)
     spaces = map_drawing(odr, table).parking_spaces.each
     parking = map_parking(graph.lanes, spaces=spaces, strips=[])
-    return ParkingTown(SumoMap.of(graph, network.table, parking=parking), network.net_xml)
+    return ParkingTown(
+        SumoMap.of(graph, network.table, parking=parking), network.net_xml, network.table
+    )
 
 
 def parking_scenario(

@@ -116,7 +116,7 @@ class Notes:
             if ours:
                 box = actor.bounding_box
                 self._boxes[self._names[actor.id]] = [
-                    box.location.x, box.location.z, box.extent.x, box.extent.z
+                    box.location.x, box.location.z, box.extent.x, box.extent.z, box.location.y
                 ]  # fmt: skip
 
     def to_json(self) -> str:

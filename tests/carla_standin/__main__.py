@@ -38,7 +38,7 @@ class StandIn:
         first = next(iter(maps))
         road_map = RoadMap.read(maps[first], f"Carla/Maps/{first}")
         self.world = World(road_map, self.streams, self.switches)
-        self.world.box_offset = options["box_offset"]
+        self.world.box_offset = tuple(options["box_offset"])
         self._world_calls = WorldCalls(self.world, self.streams, self.switches, maps=maps)
         actors, lights = ActorCalls(self.world, self.switches), LightCalls(self.world)
         self._batch = BatchCalls(actors, lights, self._world_calls)
@@ -84,6 +84,8 @@ class StandIn:
                 "autopilot": actor.autopilot,
                 "lights": actor.lights,
                 "wheels": actor.wheels,
+                "doors": sorted(actor.doors),
+                "left_doors": actor.left_doors,
             }
             for actor in self.world.actors.values()
         ]

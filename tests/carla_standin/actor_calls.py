@@ -15,11 +15,19 @@ from tests.carla_standin.world import World
 
 _NOTHING = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 0]
 _WHEEL = [3.5, 0.25, WHEEL_ANGLE, 35.0, 1500.0, 3000.0, 2.0, 17.0, 1000.0, [0.0, 0.0, 0.0]]
+_DOORS, _ALL_DOORS = 4, 6
 _PHYSICS = [
     [[0.0, 400.0], [5000.0, 400.0]], 5000.0, 1.0, 0.15, 2.0, 0.35, True, 0.0, 10.0, 4.0,
     [[4.0, 0.5, 0.65]], MASS, 0.3, [0.0, 0.0, 0.0], [list(point) for point in STEERING_CURVE],
     [_WHEEL] * 4, False,
 ]  # fmt: skip
+
+
+def _doors(vehicle: Actor, door: int) -> set[int]:
+    """Which doors a number means: FL, FR, RL, RR or all; none where a model has none."""
+    if vehicle.attribute("has_dynamic_doors") != "true":
+        return set()
+    return set(range(_DOORS)) if door == _ALL_DOORS else {door} & set(range(_DOORS))
 
 
 class ActorCalls:
@@ -117,7 +125,10 @@ class ActorCalls:
 
     @rpc("set_actor_simulate_physics", Returns.VOID)
     def simulate_physics(self, actor: int, on: bool) -> None:
-        self._world[actor].physics = on
+        found = self._world[actor]
+        if found.physics != on:
+            found.doors.clear()  # ResetConstraints opens and shuts all
+        found.physics = on
 
     # ------------------------------------------------------------------------------- vehicles
     @rpc("apply_control_to_vehicle", Returns.VOID)
@@ -176,6 +187,16 @@ class ActorCalls:
         vehicle = self._world.of_kind(actor, Kind.VEHICLE)
         if not vehicle.physics:
             vehicle.wheels.setdefault(wheel, [0.0, 0.0])[kind] = angle
+
+    @rpc("open_vehicle_door", Returns.VOID)
+    def open_door(self, actor: int, door: int) -> None:
+        vehicle = self._world.of_kind(actor, Kind.VEHICLE)
+        vehicle.doors |= _doors(vehicle, door)
+
+    @rpc("close_vehicle_door", Returns.VOID)
+    def close_door(self, actor: int, door: int) -> None:
+        vehicle = self._world.of_kind(actor, Kind.VEHICLE)
+        vehicle.doors -= _doors(vehicle, door)
 
     # ------------------------------------------------------------------------------- walkers
     @rpc("apply_control_to_walker", Returns.VOID)

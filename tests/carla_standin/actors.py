@@ -9,7 +9,7 @@ from typing import Any
 
 from odscen.scenario.placing.bodies import Box
 from tests.carla_standin import driving, wire
-from tests.carla_standin.blueprints import CAMERA
+from tests.carla_standin.blueprints import CAMERA, LIDAR, RADAR
 from tests.carla_standin.driving import Ground
 from tests.carla_standin.poses import attached, turned
 from tests.carla_standin.wire import ZERO, Pose, Vector
@@ -17,6 +17,8 @@ from tests.carla_standin.wire import ZERO, Pose, Vector
 _NO_CONTROL = [0.0, 0.0, 0.0, False, False, False, 0]
 _NO_WALK = [[1.0, 0.0, 0.0], 0.0, False]
 _SPEED_LIMIT = 30.0
+_LEFT = 0.001
+"""Metres that a vehicle is put away from an open door."""
 _GREEN = 2
 MASS = 1500.0
 """Of every actor, kg: impulses and forces act, but not true to the model."""
@@ -41,7 +43,10 @@ class Kind(Enum):
 class Actor:
     """One actor. Angular velocities are deg/s; ``box`` is local, as a BoundingBox on the wire.
 
-    ``wheels`` are those turned by hand: steering and pitch, degrees, by number.
+    ``wheels`` are those turned by hand: steering and pitch, degrees, by number. ``doors`` are those
+    that are open, and ``left_doors`` counts how often it was put elsewhere while some were: an open
+    door is a body of its own, on a joint, and does not go with its vehicle (``OpenDoorPhys`` of
+    CarlaWheeledVehicle.cpp).
 
     Without ``physics`` an actor stays where it was put and reports velocity 0, whatever it was
     given, as on a real server (issues 7143, 3683 and 4774 of carla-simulator/carla). With it a
@@ -71,6 +76,8 @@ class Actor:
     dormant: bool = False
     lights: int = 0
     wheels: dict[int, list[float]] = field(default_factory=dict)
+    doors: set[int] = field(default_factory=set)
+    left_doors: int = 0
     control: list[Any] = field(default_factory=lambda: list(_NO_CONTROL))
     walk: list[Any] = field(default_factory=lambda: list(_NO_WALK))
     kind: Kind = field(init=False)
@@ -91,9 +98,9 @@ class Actor:
         return str(self.description[1])
 
     @property
-    def is_camera(self) -> bool:
-        """Whether it takes pictures."""
-        return self.type_id == CAMERA
+    def sees(self) -> bool:
+        """Whether it is a sensor with a stream."""
+        return self.type_id in (CAMERA, LIDAR, RADAR)
 
     def attribute(self, name: str) -> str:
         """Value of an attribute that was given at spawning."""
@@ -128,10 +135,11 @@ class Actor:
 
     def footprint(self) -> Box:
         """Rectangle on the ground, in CARLA's frame."""
-        (offset, _, _), (length, width, _) = self.box[:2]
+        (ahead, right, _), (length, width, _) = self.box[:2]
         x, y, z, _, yaw, _ = self.at
         ux, uy = cos(radians(yaw)), sin(radians(yaw))
-        return Box(x + offset * ux, y + offset * uy, z, ux, uy, length, width)
+        middle = x + ahead * ux - right * uy, y + ahead * uy + right * ux
+        return Box(*middle, z, ux, uy, length, width)
 
     def drive(self, control: list[Any]) -> None:
         """Take a VehicleControl: it acts from the next tick on, and is shown to clients."""
@@ -150,6 +158,8 @@ class Actor:
     def put(self, at: Pose) -> None:
         """Teleport; the pose of an attached actor is relative to its parent, as in CARLA."""
         if self.parent is None:
+            away = max(abs(new - old) for new, old in zip(at[:3], self.at[:3], strict=True))
+            self.left_doors += bool(self.doors) and away > _LEFT
             self.at = at
         else:
             self.relative = at

@@ -8,7 +8,7 @@ from typing import Any
 from odscen.base.categories import Category
 from odscen.workspace.asset_catalogue import Blueprint, shipped_assets
 
-CAMERA = "sensor.camera.rgb"
+CAMERA, LIDAR, RADAR = "sensor.camera.rgb", "sensor.lidar.ray_cast", "sensor.other.radar"
 WALKER_CONTROLLER = "controller.ai.walker"
 
 _BOOL, _INT, _FLOAT, _STRING, _COLOR = 1, 2, 3, 4, 5
@@ -73,6 +73,14 @@ def definitions() -> dict[str, Definition]:
     known.append(Definition(len(known) + 1, WALKER_CONTROLLER, (_role("default"),)))
     known.append(Definition(len(known) + 1, "sensor.other.lane_invasion", (_role("front"),)))
     known.append(Definition(len(known) + 1, CAMERA, _camera_attributes()))
+    known.append(Definition(len(known) + 1, LIDAR, _scanner_attributes()))
+    known.append(
+        Definition(
+            len(known) + 1,
+            RADAR,
+            (*_scanner_attributes(), Attribute("horizontal_fov", _FLOAT, "30.0", modifiable=True)),
+        )
+    )
     return {definition.id: definition for definition in known}
 
 
@@ -103,7 +111,13 @@ def _vehicle_attributes(blueprint: Blueprint) -> tuple[Attribute, ...]:
         Attribute("special_type", _STRING, blueprint.special_type),
         Attribute("generation", _INT, str(blueprint.generation or 0)),
         Attribute("has_lights", _BOOL, lit),
+        Attribute("has_dynamic_doors", _BOOL, str(_has_doors(blueprint)).lower()),
     )
+
+
+def _has_doors(blueprint: Blueprint) -> bool:
+    """Whether its doors open: here all of the newer models that have doors, really some of them."""
+    return blueprint.category not in _TWO_WHEELED and blueprint.generation == 2
 
 
 def _walker_attributes(blueprint: Blueprint) -> tuple[Attribute, ...]:
@@ -122,6 +136,14 @@ def _camera_attributes() -> tuple[Attribute, ...]:
         Attribute("image_size_x", _INT, "800", modifiable=True),
         Attribute("image_size_y", _INT, "600", modifiable=True),
         Attribute("fov", _FLOAT, "90.0", modifiable=True),
+        Attribute("sensor_tick", _FLOAT, "0.0", modifiable=True),
+    )
+
+
+def _scanner_attributes() -> tuple[Attribute, ...]:
+    return (
+        _role("front"),
+        Attribute("range", _FLOAT, "100.0", modifiable=True),
         Attribute("sensor_tick", _FLOAT, "0.0", modifiable=True),
     )
 

@@ -28,7 +28,8 @@ class StandIn:
     other_maps
         More maps that can be loaded, by name.
     box_offset
-        Metres by which the boxes of vehicles lie before their origin; some models have that.
+        Metres by which the boxes of vehicles lie before their origin, and to the right of it; some
+        models have that.
     switches
         Of :class:`tests.carla_standin.switches.Switches`.
     """
@@ -42,7 +43,7 @@ class StandIn:
         *,
         map_name: str | None = None,
         other_maps: dict[str, Path] | None = None,
-        box_offset: float = 0.0,
+        box_offset: tuple[float, float] = (0.0, 0.0),
         **switches: Any,
     ) -> None:
         maps = {map_name or xodr.stem: xodr, **(other_maps or {})}

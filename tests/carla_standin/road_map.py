@@ -28,6 +28,8 @@ _GROUND_EVERY = 1.0
 """Metres between points of a lane whose heights are known."""
 _GROUND_NEAR = 2.5
 """Metres from such a point at which its height is still that of the ground."""
+_WALL = 0.2
+"""Metres of a wall's thickness, at the edge of the ground."""
 _SIGNS = {"stop": "traffic.stop", "yield": "traffic.yield"}
 
 
@@ -57,6 +59,10 @@ class RoadMap:
     """Points of all lanes, shape ``(N, 3)``."""
     walks: np.ndarray
     """Which of them are on sidewalks, shape ``(N,)``."""
+    wall_height: float = 0.0
+    additional_width: float = 0.0
+    """Of a generated world: metres of the walls that stand along its edges, and by which its roads
+    are wider than the file's (pull request 8975 of carla-simulator/carla)."""
 
     @cached_property
     def _tree(self) -> cKDTree | None:
@@ -66,8 +72,12 @@ class RoadMap:
         """Points that are near a place, in the order of the lanes."""
         if self._tree is None:
             return []
-        found: list[int] = self._tree.query_ball_point((x, y), _GROUND_NEAR, return_sorted=True)
+        found: list[int] = self._tree.query_ball_point((x, y), self._reach, return_sorted=True)
         return found
+
+    @property
+    def _reach(self) -> float:
+        return _GROUND_NEAR + self.additional_width / 2.0
 
     def ground_at(self, x: float, y: float) -> np.ndarray:
         """Heights of the ground below and above a place; several where roads cross, or none."""
@@ -82,9 +92,12 @@ class RoadMap:
         near = near[self.ground[near, 2] <= z]
         if not len(near):
             return None
-        best = int(near[np.argmin(np.hypot(*(self.ground[near, :2] - (x, y)).T))])
+        away = np.hypot(*(self.ground[near, :2] - (x, y)).T)
+        best = int(near[np.argmin(away)])
         walk = bool(self.walks[best])
-        return self._height(best, x, y) + (kerb if walk else 0.0), walk
+        on_wall = float(away.min()) > self._reach - _WALL
+        higher = (kerb if walk else 0.0) + (self.wall_height if on_wall else 0.0)
+        return self._height(best, x, y) + higher, walk
 
     @cached_property
     def _walk_tree(self) -> cKDTree:
@@ -112,14 +125,17 @@ class RoadMap:
         return cls.of(file.read_text(encoding="utf-8"), name)
 
     @classmethod
-    def of(cls, text: str, name: str) -> RoadMap:
-        """Map of an OpenDRIVE text."""
+    def of(
+        cls, text: str, name: str, *, wall_height: float = 0.0, additional_width: float = 0.0
+    ) -> RoadMap:
+        """Map of an OpenDRIVE text; of a generated world with how it was made."""
         odr = parse(text.encode(), file=name)
         table = RoadTable.of(odr)
         signs = tuple(_signs(odr, table))
         lights = {sign.id for sign in signs if sign.type_id == "traffic.traffic_light"}
         points = tuple(_spawn_points(odr, table))
-        return cls(name, text, points, signs, _groups(odr, lights), *_ground(table))
+        groups, (ground, walks) = _groups(odr, lights), _ground(table)
+        return cls(name, text, points, signs, groups, ground, walks, wall_height, additional_width)
 
 
 def _ground(table: RoadTable) -> tuple[np.ndarray, np.ndarray]:

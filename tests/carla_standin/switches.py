@@ -67,7 +67,8 @@ class Switches:
     large_map
         Whether actors that are further than ``actor_active_distance`` from all of a role with
         ``hero`` or ``ego_vehicle`` in it, or else from the spectator, become dormant with the next
-        tick: the process ends when a dormant walker is put somewhere (CarlaActor.cpp).
+        tick: the process ends when a dormant walker is put somewhere (CarlaActor.cpp). Further away
+        from them than ``tile_stream_distance`` no ground is found, for its tile is not loaded.
     """
 
     version: str = wire.CLIENT_VERSION

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -178,6 +180,33 @@ def test_wheels_are_turned_by_hand_only_without_physics(connected: Connected) ->
     assert turned(6.0) == {"0": [6.0, -60.0]}
 
 
+def test_doors_open_where_a_model_has_some_and_an_open_one_does_not_go_with_its_vehicle(
+    connected: Connected,
+) -> None:
+    bus = connected.spawn("vehicle.mitsubishi.fusorosa", transform(0.0, 0.0))
+    old = connected.spawn("vehicle.audi.a2", transform(0.0, 20.0))
+    bus.set_simulate_physics(False)
+    door = carla.VehicleDoor
+
+    def seen(actor: Any) -> tuple[list[int], int]:
+        connected.world.tick()
+        own = next(a for a in connected.server.actors() if a["id"] == actor.id)
+        return own["doors"], own["left_doors"]
+
+    old.open_door(door.All)
+    bus.open_door(door.FR)
+    bus.open_door(door.RR)
+    assert (seen(old), seen(bus)) == (([], 0), ([1, 3], 0))
+    bus.set_transform(transform(1.0, 0.0))
+    assert seen(bus) == ([1, 3], 1)
+    bus.close_door(door.All)
+    bus.set_transform(transform(2.0, 0.0))
+    assert seen(bus) == ([], 1)
+    bus.open_door(door.All)
+    bus.set_simulate_physics(True)
+    assert seen(bus) == ([], 1)
+
+
 def test_something_attached_goes_where_its_parent_goes(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0, yaw=90.0))
     camera = connected.spawn("sensor.camera.rgb", transform(2.0, 1.0, 1.5), attach_to=car)
@@ -230,12 +259,21 @@ def test_a_car_is_no_walker(connected: Connected) -> None:
     assert "not a Walker" in answer.error
 
 
-def test_boxes_may_lie_before_the_origin_of_their_vehicles() -> None:
-    with StandIn(MAPS / "signal_crossing.xodr", box_offset=0.25, refuse_grounded=False) as server:
+def test_boxes_may_lie_before_and_beside_the_origin_of_their_vehicles() -> None:
+    xodr, offset = MAPS / "signal_crossing.xodr", (0.25, 0.125)
+    with StandIn(xodr, box_offset=offset, refuse_grounded=False) as server:
         world = synchronize(connect(server))
         blueprint = world.get_blueprint_library().find(CAR)
         car = world.spawn_actor(blueprint, transform(0.0, 0.0))
-        assert car.bounding_box.location.x == 0.25
+        box = car.bounding_box
+        assert (box.location.x, box.location.y) == offset
+        # A car that looks south has its box to the west and south of its origin, one that looks
+        # east to the south and east.
+        world.spawn_actor(blueprint, transform(100.0, 20.0, yaw=90.0))
+        last = 100.0 - offset[1] - offset[0] - box.extent.y - box.extent.x
+        with pytest.raises(RuntimeError, match="collision"):
+            world.spawn_actor(blueprint, transform(last + 0.05, 20.0))
+        world.spawn_actor(blueprint, transform(last - 0.05, 20.0))
 
 
 def test_every_command_of_the_client_is_understood(connected: Connected) -> None:

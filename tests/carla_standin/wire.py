@@ -23,6 +23,8 @@ _HEADER = struct.Struct("<QQd6f")
 _EPISODE = struct.Struct("<Qdf3iI")
 _ACTOR = struct.Struct("<IB15f")
 _IMAGE = struct.Struct("<IIf")
+RADAR, LIDAR = 9, 11
+"""Types of sensors, as in the header of their messages."""
 _SENSOR_RGB_CAMERA, _SENSOR_WORLD_OBSERVER = 13, 17
 _ACTIVE, _DORMANT = 1, 2
 
@@ -121,6 +123,11 @@ def state_message(
             *records,
         )
     )
+
+
+def scan_message(kind: int, *, frame: int, elapsed: float, at: Pose, payload: bytes) -> bytes:
+    """Message of a lidar or radar, by its type of sensor."""
+    return _HEADER.pack(kind, frame, elapsed, *at) + payload
 
 
 def image_message(

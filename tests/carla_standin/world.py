@@ -11,9 +11,11 @@ import numpy as np
 
 from odscen.scenario.placing.bodies import overlap
 from odscen.workspace.asset_catalogue import shipped_assets
-from tests.carla_standin import camera, wire
+from tests.carla_standin import camera, scanners, wire
 from tests.carla_standin.actors import Actor, Kind
 from tests.carla_standin.blueprints import (
+    CAMERA,
+    LIDAR,
     SIGN_TAG,
     TRAFFIC_LIGHT_TAG,
     WALKER_CONTROLLER,
@@ -31,7 +33,7 @@ ASYNC_DELTA = 0.05
 """Seconds between ticks, on the clock, while no client ticks."""
 
 _SETTINGS = [False, False, [False], True, 0.01, 10, 0.0, True, 3000.0, 2000.0, True]
-_SYNCHRONOUS, _FIXED_DELTA, _ACTIVE_DISTANCE = 0, 2, 9
+_SYNCHRONOUS, _FIXED_DELTA, _STREAM_DISTANCE, _ACTIVE_DISTANCE = 0, 2, 8, 9
 _HEROES = ("hero", "ego_vehicle")
 _SUNK = 1.0
 """Metres by which a body may be below the ground that carries it."""
@@ -49,13 +51,14 @@ class World:
         self.traffic_managers: dict[int, str] = {}
         self.frame = 0
         self.episode = 0
-        self.box_offset = 0.0
+        self.box_offset = (0.0, 0.0)
         self.spectator: Actor
         self._streams = streams
         self._switches = switches
         self._next_id = 1
         self._next_stream = wire.WORLD_OBSERVER + 1
         self._captured: dict[int, float] = {}
+        self._were: dict[int, wire.Vector] = {}
         self.open(road_map)
 
     # ------------------------------------------------------------------------------- episodes
@@ -124,7 +127,7 @@ class World:
         grounded = self._switches.refuse_grounded and self._is_grounded(actor)
         if definition.has_body and (grounded or self._is_taken(actor)):
             raise wire.RefusedError("Spawn failed because of a collision at spawn position")
-        if actor.is_camera:
+        if actor.sees:
             actor.stream = self._next_stream
             self._next_stream += 1
         return self._enter(actor)
@@ -147,8 +150,8 @@ class World:
         self, definition: Definition, description: list[Any], at: Pose, parent: int | None
     ) -> Actor:
         owner = self.actors[parent] if parent is not None else None
-        offset = self.box_offset if Kind.of(definition.id) is Kind.VEHICLE else 0.0
-        box = [[offset, 0.0, definition.box_height], list(definition.half_size), [0.0, 0.0, 0.0]]
+        moved = self.box_offset if Kind.of(definition.id) is Kind.VEHICLE else (0.0, 0.0)
+        box = [[*moved, definition.box_height], list(definition.half_size), [0.0, 0.0, 0.0]]
         return Actor(
             self._next_id,
             description,
@@ -197,6 +200,8 @@ class World:
 
     def surface(self, x: float, y: float, z: float) -> tuple[float, bool] | None:
         """Height of what is below a place, and whether that is a sidewalk."""
+        if self._switches.large_map and not self._is_loaded(x, y):
+            return None
         return self.map.surface(x, y, z, self._switches.kerb)
 
     def _ground(self, x: float, y: float, z: float) -> float | None:
@@ -242,26 +247,50 @@ class World:
 
     def _let_sleep(self) -> None:
         """Make actors dormant that are too far from all heroes of a large map (LargeMapManager)."""
-        reach = float(self.settings[_ACTIVE_DISTANCE])
+        reach, heroes = float(self.settings[_ACTIVE_DISTANCE]), self._heroes()
+        for actor in self._bodies():
+            actor.dormant = all(
+                hypot(actor.at[0] - one.at[0], actor.at[1] - one.at[1]) > reach for one in heroes
+            )
+
+    def _is_loaded(self, x: float, y: float) -> bool:
+        """Whether the tile of a place is there: those near heroes are (LargeMapManager)."""
+        reach = float(self.settings[_STREAM_DISTANCE])
+        return any(hypot(x - one.at[0], y - one.at[1]) <= reach for one in self._heroes())
+
+    def _heroes(self) -> Sequence[Actor]:
+        """Those around whom a large map is awake: by their roles, or else the spectator."""
         heroes = [
             actor
             for actor in self._bodies()
             if actor.kind is Kind.VEHICLE
             and any(role in actor.attribute("role_name") for role in _HEROES)
         ]
-        for actor in self._bodies():
-            actor.dormant = all(
-                hypot(actor.at[0] - one.at[0], actor.at[1] - one.at[1]) > reach
-                for one in heroes or [self.spectator]
-            )
+        return heroes or [self.spectator]
 
     def _take_pictures(self) -> None:
-        cameras = [a for a in self.actors.values() if a.is_camera and self._is_due(a)]
-        bodies = self._bodies() if cameras else ()
-        for actor in cameras:
+        sensors = [a for a in self.actors.values() if a.sees and self._is_due(a)]
+        bodies = self._bodies() if sensors else ()
+        for actor in sensors:
             self._captured[actor.id] = self.elapsed
-            picture = camera.take(actor, bodies, frame=self.frame, elapsed=self.elapsed)
-            self._streams.send(actor.stream or 0, picture)
+            self._streams.send(actor.stream or 0, self._seen_by(actor, bodies))
+        self._were = {actor.id: wire.vector(actor.at[:3]) for actor in sensors}
+
+    def _seen_by(self, actor: Actor, bodies: Sequence[Actor]) -> bytes:
+        if actor.type_id == CAMERA:
+            return camera.take(actor, bodies, frame=self.frame, elapsed=self.elapsed)
+        if actor.type_id == LIDAR:
+            kind, payload = wire.LIDAR, scanners.lidar(actor, bodies)
+        else:
+            here = actor.at[:3]
+            was = self._were.get(actor.id, here)
+            own = wire.vector((a - b) / self.delta for a, b in zip(here, was, strict=True))
+            still = self._switches.still_speed
+            kind = wire.RADAR
+            payload = scanners.radar(actor, bodies, own, lambda one: one.reported_velocity(still))
+        return wire.scan_message(
+            kind, frame=self.frame, elapsed=self.elapsed, at=actor.at, payload=payload
+        )
 
     def _is_due(self, actor: Actor) -> bool:
         if actor.stream is None or not self._streams.is_watched(actor.stream):

@@ -70,7 +70,13 @@ class WorldCalls:
         if not name:
             road_map = world.map
         elif short == _OPENDRIVE_MAP and self._copied:
-            road_map = RoadMap.of(self._copied, f"{_FOLDER}/{_OPENDRIVE_MAP}")
+            wall_height, additional_width = self.generation[2:4]
+            road_map = RoadMap.of(
+                self._copied,
+                f"{_FOLDER}/{_OPENDRIVE_MAP}",
+                wall_height=wall_height,
+                additional_width=additional_width,
+            )
         elif short in self._maps:
             road_map = RoadMap.read(self._maps[short], f"{_FOLDER}/{short}")
         else:

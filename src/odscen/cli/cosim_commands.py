@@ -152,7 +152,9 @@ def cosim(
     wheel_calls: Annotated[
         int,
         typer.Option(
-            min=0, help="Calls in a tick, at most, that turn wheels near the ego; 0 for none."
+            min=0,
+            help="Calls in a tick, at most, that turn wheels and move doors near the ego; "
+            "0 for none.",
         ),
     ] = 24,
     weather: Annotated[

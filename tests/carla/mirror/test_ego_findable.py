@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 
 from odscen.base.errors import InputError
@@ -145,6 +146,51 @@ def test_a_sensor_on_the_ego_is_recorded_into_the_runs_folder(
     assert np.diff(table[:, 2]) == pytest.approx(0.2, abs=1e-4)
     assert np.diff(table[:, 3])[3:].min() > 0.4, "it drives with the ego"
     assert [path.name for path in (tmp_path / "runs").iterdir() if "sensors" in path.name] == []
+
+
+@pytest.mark.parametrize("sensed_speed", [False, True])
+def test_lidar_and_radar_on_the_ego_are_recorded_and_radar_sees_speeds_with_physics_only(
+    workspace: Workspace, tmp_path: Path, sensed_speed: bool
+) -> None:
+    ego = {**ACTORS[0], "speed": 8.0, "initial_speed": 8.0}
+    ahead = {
+        "id": "ahead", "category": "car", "spawn": "2.1.-1.60", "goal": "4.1.-1.200",
+        "speed": 14.0, "initial_speed": 14.0,
+    }  # fmt: skip
+    scan = {"place": {"x": 0.0, "z": 1.0}}
+    sensors = {
+        "sensors": [
+            {"name": "top", "type": "sensor.lidar.ray_cast", **scan},
+            {"name": "bow", "type": "sensor.other.radar", **scan},
+        ]
+    }
+    wishes = parse_sensors(json.dumps(sensors), file="sensors.json")
+    result, report, _ = run(
+        workspace, tmp_path, actors=[ego, ahead], sensors=wishes, parity=False,
+        sensed_speed=sensed_speed,
+    )  # fmt: skip
+    assert (result.status, report.error) == ("completed", None)
+    assert set(report.sensors) == {"top", "bow"}
+    assert min(report.sensors.values()) >= 40
+    table = result.trajectories()
+    last = table.filter(pl.col("time") == pl.col("time").max()).sort("id")
+    gap = float(last["x"][0] - last["x"][1])
+    points = last_of(result, "top")
+    other = points[np.argmax(points[:, 0])]
+    assert other[0] == pytest.approx(gap, abs=0.6), "ahead of the ego, which is its origin"
+    assert abs(other[1]) < 0.3
+    [found] = last_of(result, "bow")
+    assert found[3] == pytest.approx(gap, abs=0.6)
+    driven = last["speed"].to_numpy()
+    wanted = driven[0] - driven[1] if sensed_speed else -driven[1]
+    assert found[0] == pytest.approx(wanted, abs=0.3)
+
+
+def last_of(result: Run, name: str) -> np.ndarray:
+    """What a sensor has seen in the last tick."""
+    array = np.load(max((result.folder / "sensors" / name).glob("*.npy")))
+    assert array.dtype == np.float32
+    return np.asarray(array)
 
 
 @pytest.mark.parametrize(

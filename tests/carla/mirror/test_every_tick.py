@@ -88,7 +88,7 @@ class Judge:
 
     def look(self, name: str, seen: list[float], state: State) -> None:
         x, y, z, pitch, yaw, vx, vy, vz = seen
-        ahead, up, _, half_height = self.boxes[name]
+        ahead, up, _, half_height, _ = self.boxes[name]
         back = ahead * math.cos(math.radians(pitch))
         mx = x + back * math.cos(math.radians(yaw))
         my = y + back * math.sin(math.radians(yaw))
@@ -147,13 +147,14 @@ def compare(judge: Judge, steps: list[dict[str, Any]], number: int, frame: Frame
         judge.look(name, frame.users[name], state)
 
 
-def assert_exact(off: dict[str, list[float]], frames: int) -> None:
+def assert_exact(off: dict[str, list[float]], frames: int, *, level: bool = True) -> None:
     assert frames > 0.9 * SECONDS / STEP * TICKS
     for kind, limit in LIMITS.items():
         assert len(off[kind]) > 100, kind
-        # Of the ground, which the server knows at places only, all but the last hundredth.
-        worst = np.percentile(off[kind], 99) if kind == "feet" else max(off[kind])
-        assert worst <= limit, kind
+        # On slopes and over kerbs feet go straight on between two steps, and the server is asked
+        # for the ground at places only: there all but the last hundredth.
+        most = 100 if level or kind != "feet" else 99
+        assert np.percentile(off[kind], most) <= limit, kind
     assert max(off["feet"]) <= 0.07
 
 
@@ -171,4 +172,4 @@ def test_towns_with_slopes_and_bridges_are_shown_exactly_in_every_tick(
 ) -> None:
     xodr = shared_maps / f"{name}.xodr"
     off, frames = judged(workspace, sample(xodr, seed=5, fill=0.1, segments=30), xodr, tmp_path)
-    assert_exact(off, frames)
+    assert_exact(off, frames, level=name == "carla-2019/Town05")

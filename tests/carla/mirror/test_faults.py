@@ -219,6 +219,32 @@ def test_those_whom_the_server_never_takes_are_named(start: Start) -> None:
 
 
 @pytest.mark.slow
+def test_another_client_that_ticks_ends_the_run_with_its_frames(start: Start) -> None:
+    with StandIn(CROSSING) as server:
+        run = start(server, until=60.0)
+        wait_for_actors(server, run)
+        other = carla.Client(server.host, server.port)
+        other.set_timeout(5.0)
+        other.get_world().tick()
+        code, told, words = run.wait()
+        assert (code, told["status"]) == (3, "failed")
+        assert "only one client may tick" in told["error"] == told["carla"]["error"]
+        assert told["carla"]["left_behind"] == []
+        assert "Traceback" not in words
+        assert recorded(run)
+        assert is_as_before(server)
+
+
+def test_a_time_that_others_set_ends_the_run(start: Start) -> None:
+    with StandIn(CROSSING, time_factor=2.0) as server:
+        code, told, _ = start(server).wait()
+        assert (code, told["status"]) == (3, "failed")
+        assert "a tick of 0.1 s led the CARLA server" in told["error"]
+        assert "by 0.2 s: another client changes its settings" in told["error"]
+        assert is_as_before(server)
+
+
+@pytest.mark.slow
 def test_a_stream_that_is_cut_once_is_taken_up_again(start: Start) -> None:
     with StandIn(CROSSING, drop_stream_at_tick=30) as server:
         code, told, _ = start(server, "--timeout", 2).wait()

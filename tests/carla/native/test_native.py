@@ -250,6 +250,33 @@ def test_a_spawn_that_is_refused_comes_later(options: Any, sample: Sample) -> No
     assert told["figures"]["depart_delay_max"] > 0.0
 
 
+def test_a_server_that_takes_nobody_ends_the_run(options: Any, sample: Sample) -> None:
+    path = sample(CROSSING, seed=5)
+    with StandIn(CROSSING, refuse_spawn_every=1) as server:
+        code, told, _ = run(path, *options(server), "--until", 5)
+        assert left(server) == []
+    assert (code, told["status"]) == (3, "failed")
+    assert "takes no road user" in told["error"]
+    assert "collision" in told["error"]
+
+
+@pytest.mark.slow
+def test_another_client_that_ticks_ends_the_run(options: Any, sample: Sample) -> None:
+    carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
+    path = sample(CROSSING, seed=5)
+    with StandIn(CROSSING) as server:
+        process = start(path, *options(server), "--until", 60)
+        wait_for_actors(server)
+        other = carla.Client(server.host, server.port)
+        other.set_timeout(5.0)
+        other.get_world().tick()
+        out, _ = process.communicate(timeout=180)
+        assert left(server) == []
+    told = json.loads(out)
+    assert (process.returncode, told["status"]) == (3, "failed")
+    assert "only one client may tick" in told["error"]
+
+
 def test_what_a_crashed_traffic_manager_leaves_is_taken_away(options: Any, sample: Sample) -> None:
     path = sample(CROSSING, seed=5)
     with StandIn(CROSSING) as server:

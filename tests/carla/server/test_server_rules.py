@@ -12,13 +12,17 @@ from odscen.carla.server.batch import Batch
 from odscen.carla.server.carla_server import Server
 from odscen.carla.server.client import Address
 from odscen.sumo.realize.run_settings import RunSettings
+from odscen.sumo.runner.in_step import Step
 from odscen.workspace.store import Workspace
-from tests.carla.conftest import MAPS, Sample
+from tests.carla.conftest import MAPS, Sample, scenario_of
 from tests.carla_standin.process import StandIn
+from tests.sumo.story_case import node_at, walk_node_at
 
 carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
 
 CROSSING, TOWN = MAPS / "signal_crossing.xodr", MAPS / "town_5x5.xodr"
+EDGE, HEIGHT = (60.0, 7.875 + 2.5), 0.12
+"""Where the stand-in's ground ends beside a sidewalk of the crossing, and how high that is."""
 _WALL_HEIGHT, _ADDITIONAL_WIDTH = 2, 3
 """Of the parameters by which a world is made."""
 
@@ -45,15 +49,61 @@ def test_a_generated_world_has_no_walls_and_roads_of_the_maps_width() -> None:
     with StandIn(TOWN) as stand_in, Server(address_of(stand_in)) as server:
         server.load_opendrive(CROSSING.read_text(encoding="utf-8"))
         sent = stand_in.generation()
-    assert (sent[_WALL_HEIGHT], sent[_ADDITIONAL_WIDTH]) == (0.0, 0.0)
+        assert (sent[_WALL_HEIGHT], sent[_ADDITIONAL_WIDTH]) == (0.0, 0.0)
+        x, y = EDGE
+        assert server.ground_below(x, y - 0.05, 3.0, 5.0) == pytest.approx(HEIGHT)
+        assert server.ground_below(x, y + 0.2, 3.0, 5.0) is None
+        client = carla.Client(stand_in.host, stand_in.port)
+        client.set_timeout(10.0)
+        world = client.generate_opendrive_world(
+            CROSSING.read_text(encoding="utf-8"), carla.OpendriveGenerationParameters()
+        )
+        wall = world.ground_projection(carla.Location(x, y + 0.2, 3.0), 5.0)
+        assert wall.location.z == pytest.approx(HEIGHT + 1.0), "by default, on a road that is wider"
 
 
-def sleep_beyond(stand_in: StandIn, metres: float) -> None:
-    """Let actors be dormant from so far away."""
+def sleep_beyond(stand_in: StandIn, metres: float, *, tiles: float = 3000.0) -> None:
+    """Let actors be dormant from so far away, and no tile be loaded beyond so many metres."""
     world = carla.Client(stand_in.host, stand_in.port).get_world()
     settings = world.get_settings()
-    settings.actor_active_distance = metres
+    settings.actor_active_distance, settings.tile_stream_distance = metres, tiles
     world.apply_settings(settings)
+
+
+def test_the_egos_role_loads_the_tiles_on_whose_ground_pedestrians_walk(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    kerb = 0.1
+    workspace.add_map(TOWN)
+    name = TOWN.stem
+    actors = [
+        {"id": "ego", "category": "car", "spawn": node_at(name, 215.0, 103.4),
+         "goal": node_at(name, 390.0, 103.4), "speed": 3.0, "ego": True},
+        {"id": "child", "category": "pedestrian", "spawn": walk_node_at(name, 240.0, 100.5),
+         "goal": walk_node_at(name, 260.0, 100.5)},
+    ]  # fmt: skip
+    path = scenario_of(workspace, TOWN, actors, tmp_path)
+    feet: list[float] = []
+    with StandIn(TOWN, large_map=True, kerb=kerb) as stand_in:
+        sleep_beyond(stand_in, 2000.0, tiles=60.0)  # the spectator is further away than that
+
+        def look(_step: Step) -> bool:
+            walkers = [a for a in stand_in.actors() if a["type_id"].startswith("walker.")]
+            feet.extend(a["transform"][0][2] - 0.93 for a in walkers)
+            return True
+
+        result, report = cosim(
+            workspace,
+            path,
+            CosimOptions(address_of(stand_in), on_step=look, parity=False),
+            out=tmp_path,
+            settings=RunSettings(until=4.0, step_length=0.5),
+        )
+    assert (result.status, report.error) == ("completed", None)
+    ground = workspace.map(name).graph().walks.z.max()
+    assert len(feet) > 5
+    # In the first step the ego is not there yet, and so no tile; places are asked for ahead.
+    assert max(abs(z - kerb - ground) for z in feet[3:]) < 0.03
 
 
 def test_a_large_map_without_a_hero_survives_pedestrians_far_from_its_spectator(

@@ -4,10 +4,15 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import sumo
 from lxml import etree
+
+from odscen.sumo.worker.protocol import EgoPose
+from odscen.sumo.worker.session import Session
 
 # libsumo is one global simulation, so each of these runs in a process of its own.
 PRELUDE = """
@@ -224,3 +229,20 @@ with open_session(["-n", net, "--xml-validation", "never"]) as session:
     internal = [edge for edge in edges if edge.get("function") == "internal"]
     assert inside == sorted(lane for edge in internal for lane in driven[edge.get("id")])
     assert len(inside) > 4
+
+
+def test_a_lane_is_looked_for_near_the_place_and_not_all_over_the_map() -> None:
+    """SUMO looks within 100 m by itself, which costs three to four times as much."""
+    asked: list[tuple[Any, ...]] = []
+    vehicle = SimpleNamespace(
+        setSpeed=lambda *_: None,
+        moveToXY=lambda *given: asked.append(given),
+        getRoute=lambda _: (),
+        getRouteIndex=lambda _: -1,
+    )
+    session = Session.__new__(Session)
+    session._sumo, session._errors = SimpleNamespace(vehicle=vehicle), (RuntimeError,)
+    assert session.place("a", EgoPose(1.0, 2.0, 3.0, 4.0), again=True)
+    [(*_, keep_route, radius)] = asked
+    assert keep_route == 2
+    assert 3.0 <= radius <= 10.0

@@ -32,7 +32,7 @@ from odscen.carla.server.batch import (
 )
 from odscen.carla.server.blueprints import Shape
 from odscen.sumo.runner.in_step import Step
-from odscen.sumo.worker.snapshots import VehicleSignal
+from odscen.sumo.worker.observed import VehicleSignal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

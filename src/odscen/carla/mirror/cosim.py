@@ -108,5 +108,6 @@ def _clock(server: Server, options: CosimOptions, step_length: float) -> StepClo
     if options.follow:
         return FollowedTicks(server, step_length)
     ticks = options.ticks(step_length)
-    server.synchronize(step_length / ticks, sensed_speed=options.sensed_speed)
-    return OwnTicks(ticks)
+    delta = step_length / ticks
+    server.synchronize(delta, sensed_speed=options.sensed_speed)
+    return OwnTicks(server, ticks, delta)

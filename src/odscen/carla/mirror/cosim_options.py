@@ -51,9 +51,10 @@ class CosimOptions:
         Whether both worlds are taken down and compared.
     sensed_speed
         Whether vehicles keep physics, without gravity, so that sensors see their velocity. Their
-        wheels are left alone then: a server turns none that has physics.
+        wheels and doors are left alone then: a server turns no wheel of one that has physics.
     wheel_calls
-        Calls in a tick, at most, by which wheels of the vehicles nearest to the ego are turned.
+        Calls in a tick, at most, by which wheels of the vehicles nearest to the ego are turned, and
+        doors of those at stops opened and shut.
     sensors
         What is attached to the ego and recorded, into ``sensors`` of the run's folder.
     hook

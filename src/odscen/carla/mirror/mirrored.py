@@ -9,6 +9,7 @@ import numpy as np
 
 from odscen.base.errors import InputError
 from odscen.carla.mirror.actor_mirror import Mirror
+from odscen.carla.mirror.doors import Doors
 from odscen.carla.mirror.ego import ExternalEgo
 from odscen.carla.mirror.foreign_actors import ForeignActors
 from odscen.carla.mirror.walking_ground import WalkingGround
@@ -51,6 +52,8 @@ class MirroredPlan:
         Where pedestrians walk on the server.
     wheels
         How wheels are turned, if the server turns any.
+    doors
+        How doors are opened, if vehicles have no physics.
     sizes
         Metres by which the length of a blueprint differs from the road user it represents.
     """
@@ -62,6 +65,7 @@ class MirroredPlan:
     foreign: ForeignActors | None
     ground: WalkingGround
     wheels: Wheels | None
+    doors: Doors | None
     sizes: dict[str, float]
 
     @classmethod
@@ -101,10 +105,17 @@ class MirroredPlan:
             )
         walks = np.array([actor.person for actor in plan.actors], dtype=np.bool_)
         ground = WalkingGround(server, walks)
-        wheels = None
-        if server.release.turns_wheels and not options.sensed_speed:
-            wheels = Wheels(plan, calls=options.wheel_calls)
-        return cls(mirror, blueprints, shapes, ego, foreign, ground, wheels, sizes)
+        wheels = doors = None
+        if not options.sensed_speed and options.wheel_calls:
+            able = server.with_doors(blueprints)
+            doors = Doors(
+                plan,
+                np.array([name in able for name in blueprints], dtype=np.bool_),
+                calls=options.wheel_calls,
+            )
+            if server.release.turns_wheels:
+                wheels = Wheels(plan, calls=options.wheel_calls)
+        return cls(mirror, blueprints, shapes, ego, foreign, ground, wheels, doors, sizes)
 
 
 def _spectator(server: Server) -> tuple[float, float]:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from odscen.base.errors import CarlaError
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from odscen.carla.server.carla_server import Server
     from odscen.sumo.runner.in_step import Step
 
+_OFF = 0.01
+"""Share of a tick by which the time of a server, whose ticks are float32, may be off."""
 _HAIR = 1e-6
 """Seconds by which sums of ticks may be off."""
 
@@ -22,15 +26,36 @@ class StepClock(Protocol):
 
 
 class OwnTicks:
-    """We make the ticks: so many a step, evenly."""
+    """We make the ticks: so many a step, evenly.
 
-    def __init__(self, count: int) -> None:
-        self._count = count
+    Parameters
+    ----------
+    delta
+        Seconds by which each leads on.
+    """
+
+    def __init__(self, server: Server, count: int, delta: float) -> None:
+        self._server, self._count, self._delta = server, count, delta
 
     def shares(self, step: Step) -> Iterator[float]:  # noqa: ARG002 - alike in all steps
-        """As :meth:`StepClock.shares`."""
+        """As :meth:`StepClock.shares`.
+
+        Raises
+        ------
+        CarlaError
+            If a tick has not led the server's time on by its seconds: another client sets it.
+        """
         for tick in range(1, self._count + 1):
+            before, cuts = self._server.clock()[0], self._server.interruptions
             yield tick / self._count
+            passed = self._server.clock()[0] - before
+            right = abs(passed - self._delta) <= _OFF * self._delta
+            if not right and self._server.interruptions == cuts:
+                msg = (
+                    f"a tick of {self._delta:g} s led the CARLA server at {self._server.address} "
+                    f"on by {passed:g} s: another client changes its settings"
+                )
+                raise CarlaError(msg)
 
 
 class FollowedTicks:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import CarlaError
-from odscen.carla.server.batch import LIFTS
+from odscen.carla.server.batch import ENOUGH_TRIES
 from odscen.sumo.worker.protocol import Outside
 
 if TYPE_CHECKING:
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table.light_heads import Heads
     from odscen.sumo.runner.in_step import Step
     from odscen.sumo.worker.protocol import EgoPose
-
-ENOUGH_TRIES = 2 * len(LIFTS)
-"""Refused spawns of one road user after which a run in which none was ever taken is given up."""
 
 
 class StepShow:
@@ -67,6 +64,7 @@ class StepShow:
         self._ego = mirrored.ego
         self._ground = mirrored.ground
         self._wheels = mirrored.wheels
+        self._doors = mirrored.doors
         self._foreign = mirrored.foreign
         self._foreign_seen = False
         self._clock = clock
@@ -153,6 +151,8 @@ class StepShow:
             report.own_ms = round(float(median), 3), round(float(worst), 3)
 
     def _show(self, step: Step) -> None:
+        if self._doors is not None:
+            self._doors.before(step)
         for batch in self._timed(step):
             if self._mirror.shown is step:
                 changed = self._changed_lights(step)
@@ -160,7 +160,7 @@ class StepShow:
             self._look(batch)
             waited = self._server.waited
             start = time.perf_counter()
-            self._turn_wheels(batch)
+            self._move_parts(batch)
             self._mirror.answered(self._server.apply(batch))
             self._refuse_an_empty_world()
             took = time.perf_counter() - start
@@ -176,11 +176,14 @@ class StepShow:
             for view in self.views:
                 batch.views.update(view(shown))
 
-    def _turn_wheels(self, batch: Batch) -> None:
-        """Let wheels near the ego go with what the tick shows."""
-        shown = self._mirror.shown
+    def _move_parts(self, batch: Batch) -> None:
+        """Let doors and wheels near the ego go with what the tick shows."""
+        shown, actors = self._mirror.shown, self._mirror.actors
+        if self._doors is not None:
+            batch.doors.update(self._doors.moved(actors))
         if shown is not None and self._wheels is not None:
-            batch.wheels.update(self._wheels.turned(shown, self._mirror.actors))
+            spent = sum(map(len, batch.doors.values()))
+            batch.wheels.update(self._wheels.turned(shown, actors, spent=spent))
 
     def _refuse_an_empty_world(self) -> None:
         """Raise once one was tried again and again and the server has not taken any."""

@@ -24,7 +24,9 @@ LEAST_AHEAD = 0.4
 """Metres ahead of a pedestrian, at least, at which the ground is looked at."""
 _CELL = 0.5
 """Metres from one place to the next that the server is asked for."""
-_UNASKED = float("nan")
+AGAIN = 1.0
+"""Seconds after which a place where no ground was found is asked for again: a large map's tile may
+be there by then, or a body gone."""
 
 
 class WalkingGround:
@@ -40,6 +42,7 @@ class WalkingGround:
         self._server = server
         self._walks = walks
         self._cells: dict[tuple[int, int, int], float] = {}
+        self._blind: dict[tuple[int, int, int], float] = {}
         self._held: dict[int, float] = {}
         self._time = 0.0
 
@@ -66,18 +69,24 @@ class WalkingGround:
                 y + ahead * float(np.sin(hdg)),
                 float(z[k] + ahead * np.tan(step.pitch[k])),
             )
-            if left and self._cell(*there) not in self._cells:
+            if left and self._may_ask(self._cell(*there)):
                 left -= 1
                 self._ask(*there)
-            known = self._cells.get(self._cell(x, y, z[k]), _UNASKED)
-            if not np.isnan(known):
+            known = self._cells.get(self._cell(x, y, z[k]))
+            if known is not None:
                 self._held[row] = known
             z[k] += self._held.setdefault(row, 0.0)
         return replace(step, z=z)
 
     def _ask(self, x: float, y: float, z: float) -> None:
         ground = self._server.ground_below(x, -y, z + HIGHEST, 2.0 * HIGHEST)
-        self._cells[self._cell(x, y, z)] = _UNASKED if ground is None else ground - z
+        if ground is None:
+            self._blind[self._cell(x, y, z)] = self._time
+        else:
+            self._cells[self._cell(x, y, z)] = ground - z
+
+    def _may_ask(self, cell: tuple[int, int, int]) -> bool:
+        return cell not in self._cells and self._time >= self._blind.get(cell, -AGAIN) + AGAIN
 
     @staticmethod
     def _cell(x: float, y: float, z: float) -> tuple[int, int, int]:

@@ -43,6 +43,7 @@ class Wheels:
     """
 
     def __init__(self, plan: Plan, *, calls: int) -> None:
+        self._calls = calls
         self._most = calls // WHEEL_CALLS
         self._ego = next((row for row, actor in enumerate(plan.actors) if actor.ego), None)
         radii = [RADIUS.get(Category(actor.category), 0.0) for actor in plan.actors]
@@ -51,13 +52,17 @@ class Wheels:
         self._last: dict[int, tuple[float, float, float]] = {}
         self._turns: dict[int, WheelTurn] = {}
 
-    def turned(self, shown: Step, actors: Mapping[int, int]) -> dict[int, WheelTurn]:
+    def turned(
+        self, shown: Step, actors: Mapping[int, int], *, spent: int = 0
+    ) -> dict[int, WheelTurn]:
         """Wheels for the tick that shows a step, by actor on the server.
 
         Parameters
         ----------
         actors
             Actor for each row of the plan that is on the server already.
+        spent
+            Calls of the tick that something else has taken: so many fewer are made.
         """
         near = self._near(shown, actors)
         last, self._last = self._last, {}
@@ -67,7 +72,8 @@ class Wheels:
             at = self._last[row] = (float(shown.x[k]), float(shown.y[k]), float(shown.hdg[k]))
             before = turns.get(row, WheelTurn(0.0, 0.0))
             self._turns[row] = self._on(row, before, last.get(row, at), at)
-        return {actors[row]: turn for row, turn in self._turns.items()}
+        most = max(self._calls - spent, 0) // WHEEL_CALLS
+        return {actors[row]: turn for row, turn in list(self._turns.items())[:most]}
 
     def _near(self, shown: Step, actors: Mapping[int, int]) -> list[int]:
         """Positions in a step of the vehicles whose wheels are turned, the nearest first."""

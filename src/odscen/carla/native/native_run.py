@@ -348,7 +348,7 @@ def write_trajectories(plan: Plan, times: list[float], rows: list[np.ndarray], f
     pl.DataFrame(
         {
             "timestep_time": np.repeat(np.array(times), [len(part) for part in rows]),
-            "vehicle_id": [names[row] for row in index],
+            "vehicle_id": pl.Series([names[row] for row in index], dtype=pl.String),
             "vehicle_x": np.asarray(front.x),
             "vehicle_y": np.asarray(front.y),
             "vehicle_z": np.asarray(front.z),

@@ -151,6 +151,11 @@ class Traffic:
             if actor.row in self._tries
         }
 
+    @property
+    def most_tries(self) -> int:
+        """How often the one who was refused most often was tried."""
+        return max((tries.count for tries in self._tries.values()), default=0)
+
     def step(self, time: float, delta: float) -> Happened:
         """Make the tick that begins at ``time``, seconds."""
         happened = Happened()

@@ -15,10 +15,11 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import OdscenError
+from odscen.base.errors import CarlaError, OdscenError
 from odscen.carla.native.native_traffic import Traffic
 from odscen.carla.sensors.camera import View, watch_from_above
 from odscen.carla.sensors.pictures import Wish
+from odscen.carla.server.batch import ENOUGH_TRIES
 from odscen.carla.server.blueprints import choose_blueprints
 from odscen.carla.server.carla_server import Server
 from odscen.carla.server.server_map import ensure_map
@@ -174,10 +175,18 @@ def _steps(
     traffic: Traffic,
     camera: Camera | None,
 ) -> Done:
-    begin, steps, now, stopped = time.perf_counter(), 0, 0.0, False
+    begin, steps, now, stopped, made = time.perf_counter(), 0, 0.0, False, False
     ego = next((actor.row for actor in job.actors if actor.ego), None)
     while now < job.plan.until - job.delta / 2 and traffic.expected and not stopped:
         happened = traffic.step(now, job.delta)
+        made = made or traffic.running > 0
+        if not made and traffic.most_tries >= ENOUGH_TRIES:
+            refused = traffic.refusals()
+            msg = (
+                f"the CARLA server at {job.address} takes no road user, {len(refused)} were "
+                f"tried: {next(iter(refused.values()))}"
+            )
+            raise CarlaError(msg)
         rows = traffic.rows(job.delta)
         events, notes = tuple(happened.events), tuple(happened.notes)
         tell(Tick(now, rows, events, notes, traffic.running, traffic.own))

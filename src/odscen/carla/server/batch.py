@@ -16,6 +16,8 @@ A server refuses bodies that touch the ground, and takes them from 0.15 m on (is
 8313 of carla-simulator/carla); they are put on their place before the tick.
 """
 
+ENOUGH_TRIES = 2 * len(LIFTS)
+"""Refused spawns of one road user after which a run in which none was ever taken is given up."""
 WHEEL_CALLS = 6
 """Calls that turn the wheels of one vehicle: four that roll, two that are steered."""
 
@@ -56,6 +58,13 @@ class WheelTurn(NamedTuple):
 
     steer: float
     pitch: float
+
+
+class DoorMove(NamedTuple):
+    """Open or shut a door: ``FL``, ``FR``, ``RL`` or ``RR`` of CARLA's ``VehicleDoor``."""
+
+    door: str
+    opens: bool
 
 
 class Shine(NamedTuple):
@@ -105,3 +114,5 @@ class Batch:
     """New state (``Red``, ``Yellow``, ``Green``, ``Off``) of traffic lights, by actor id."""
     wheels: dict[int, WheelTurn] = field(default_factory=dict)
     """Wheels of vehicles without physics, by actor id."""
+    doors: dict[int, tuple[DoorMove, ...]] = field(default_factory=dict)
+    """Doors to open and to shut before anything moves, by actor id."""

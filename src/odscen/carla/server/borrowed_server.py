@@ -11,9 +11,9 @@ from odscen.base.errors import CarlaError
 from odscen.carla.server.batch import ROLE, Batch
 from odscen.carla.server.batch_commands import BatchCommands
 from odscen.carla.server.client import answering, connect
+from odscen.carla.server.part_calls import PartCalls
 from odscen.carla.server.releases import release_of
 from odscen.carla.server.server_lights import LightHold
-from odscen.carla.server.wheel_calls import WheelCalls
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,7 +83,7 @@ class BorrowedServer:
         self._settings: Any = None
         self._weather: Any = None
         self._lights = LightHold(self._carla)
-        self._wheels = WheelCalls(self._carla)
+        self._parts = PartCalls(self._carla)
         self._unsure = False
         self._frame: int | None = None
         self._follows = follows
@@ -241,7 +241,7 @@ class BorrowedServer:
 
     # ------------------------------------------------------------------------------- ticks
     def apply(self, batch: Batch) -> list[int | str]:
-        """Do all of a batch, in one call but for lights and wheels, and make the tick.
+        """Do all of a batch, in one call but for lights, wheels and doors, and make the tick.
 
         Returns
         -------
@@ -251,10 +251,11 @@ class BorrowedServer:
         commands = self._wording.commands(batch)
         with self._answering():
             self._lights.switch(batch.signals)
-            self._wheels.turn(self._world, batch.wheels)
-            self._wheels.forget(batch.destroy)
-            # Lights and wheels get no answer, and a call that is answered keeps them from
-            # landing after the tick (issue 8263 of carla-simulator/carla).
+            self._parts.move_doors(self._world, batch.doors)
+            self._parts.turn(self._world, batch.wheels)
+            self._parts.forget(batch.destroy)
+            # These get no answer, and a call that is answered keeps them from landing after the
+            # tick (issue 8263 of carla-simulator/carla).
             responses = self._apply(commands) if commands or batch.signals else []
             self._own -= set(batch.destroy)
             first = len(batch.destroy)

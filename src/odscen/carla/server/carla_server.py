@@ -161,6 +161,13 @@ class Server(BorrowedServer):
             self._destroy(sorted(made.values()))
         return shapes
 
+    def with_doors(self, names: Sequence[str]) -> frozenset[str]:
+        """Those of some blueprints whose doors can be opened, as they say themselves."""
+        wanted, name = set(names), "has_dynamic_doors"
+        with self._answering():
+            known = [one for one in self._library if one.id in wanted and one.has_attribute(name)]
+            return frozenset(one.id for one in known if one.get_attribute(name).as_bool())
+
     def shape(self, actor: int) -> Shape:
         """Bounding box of an actor."""
         with self._answering():

@@ -50,7 +50,7 @@ class Step:
     speed
         m/s.
     signals
-        SUMO's bits, see :class:`~odscen.sumo.worker.snapshots.VehicleSignal`.
+        SUMO's bits, see :class:`~odscen.sumo.worker.observed.VehicleSignal`.
     lights
         State of every traffic light by SUMO id.
     departed, arrived

@@ -114,6 +114,8 @@ class LockstepWatch:
             return
         known = len(self._lane) - 1
         vehicles, persons = session.vehicle_poses(), session.person_poses()
+        doors = session.stop_doors.signals(vehicles.ids, session.time)
+        vehicles = vehicles._replace(signals=vehicles.signals | doors)
         rows = np.concatenate(
             [
                 self._rows(vehicles, session.vehicle_places(vehicles.ids)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import IntFlag
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
@@ -9,6 +10,21 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import NDArray
+
+
+class VehicleSignal(IntFlag):
+    """SUMO's bits: https://sumo.dlr.de/docs/TraCI/Vehicle_Signalling.html."""
+
+    BLINKER_RIGHT = 1
+    BLINKER_LEFT = 2
+    BLINKER_EMERGENCY = 4
+    BRAKE = 8
+    FRONT = 16
+    FOG = 32
+    HIGH_BEAM = 64
+    DOOR_OPEN_LEFT = 512
+    DOOR_OPEN_RIGHT = 1024
+    EMERGENCY_BLUE = 2048
 
 
 class Front(NamedTuple):
@@ -24,7 +40,7 @@ class Poses(NamedTuple):
     """Where all vehicles, or all persons, are: centre of the front, arrays of shape ``(n,)``.
 
     Those that are not on the road have SUMO's INVALID_DOUBLE_VALUE, -2^30, as x. ``signals`` are
-    SUMO's bits for indicators and lights, 0 for persons.
+    bits of :class:`VehicleSignal`, 0 for persons.
     """
 
     ids: Sequence[str]

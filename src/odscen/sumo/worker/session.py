@@ -31,6 +31,7 @@ from odscen.sumo.worker.observed import (
     StepLists,
     StoppedVehicle,
 )
+from odscen.sumo.worker.stop_doors import StopDoors
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -134,6 +135,11 @@ class Session:
         if self._foreign is None:
             self._foreign = ForeignTraffic(self._sumo, self._errors, self.place)
         return self._foreign
+
+    @cached_property
+    def stop_doors(self) -> StopDoors:
+        """Doors of vehicles at stops."""
+        return StopDoors(self._sumo)
 
     @cached_property
     def foreign_lights(self) -> ForeignLights:

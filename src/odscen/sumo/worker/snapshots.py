@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.frames import SumoPose, sumo_to_xodr
+from odscen.sumo.worker.observed import VehicleSignal
 
 if TYPE_CHECKING:
     from odscen.results.records.run_records import Plan
@@ -32,19 +33,6 @@ COLUMNS = 6
 
 _NEAR = 10_000.0
 """Metres from zero at which float32 still tells millimetres apart."""
-
-
-class VehicleSignal(IntFlag):
-    """SUMO's bits: https://sumo.dlr.de/docs/TraCI/Vehicle_Signalling.html."""
-
-    BLINKER_RIGHT = 1
-    BLINKER_LEFT = 2
-    BLINKER_EMERGENCY = 4
-    BRAKE = 8
-    FRONT = 16
-    FOG = 32
-    HIGH_BEAM = 64
-    EMERGENCY_BLUE = 2048
 
 
 class Flag(IntFlag):
