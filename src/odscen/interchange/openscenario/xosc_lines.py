@@ -174,10 +174,11 @@ def _begins(made: Making, part: Any, actor: str) -> GroundPose | None:
 
 def _headed(spots: Sequence[GroundPose]) -> list[GroundPose]:
     """Spots with the heading of the line through them."""
-    found = []
+    found: list[GroundPose] = []
     for row, spot in enumerate(spots):
         before, after = spots[max(row - 1, 0)], spots[min(row + 1, len(spots) - 1)]
         dx, dy = after.x - before.x, after.y - before.y
-        hdg = math.atan2(dy, dx) if math.hypot(dx, dy) > 0.0 else spot.hdg
+        hdg = found[-1].hdg if found else spot.hdg  # who stands at a place keeps looking there
+        hdg = math.atan2(dy, dx) if math.hypot(dx, dy) > 0.0 else hdg
         found.append(GroundPose(spot.x, spot.y, spot.z, hdg))
     return found

@@ -149,6 +149,8 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     if lane is None:
         raise RefusedError(kind, "a change of lane without a target")
     value = int(report.number(lane, "value"))
+    if report.number(kind, "targetLaneOffset", 0.0):
+        report.mark(kind, "approximated", "to the middle of another lane, not beside it")
     if lane.tag == "RelativeTargetLane":
         other = read.conditions.actor(lane)
         if other == entity.id and value:
@@ -156,7 +158,7 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         if other != entity.id and value == 0:
             return {"cut_in": {"to": other, "over": over}}
         if other == entity.id:
-            raise RefusedError(lane, "the lane in which it is")
+            return _within_lane(read, kind, entity, over)
         road, own, side = _start_lane(read, lane, entity.id)
         beside, its, _ = _start_lane(read, lane, other)
         if road != beside:
@@ -170,10 +172,18 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         by = side * (value - own - ((value > 0) - (own > 0)))  # there is no lane 0
         words = f"{by:+d} lanes from the last one that the file names for it"
     if by == 0:
-        report.mark(lane, "approximated", "to the middle of the lane in which it is")
-        return {"offset": {"to": 0.0, "over": over}}
+        report.mark(lane, "approximated", "by none, in the lane in which it is")
+        return _within_lane(read, kind, entity, over)
     report.mark(lane, "approximated", words)
     return {"lane": {"by": by, "over": over}}
+
+
+def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: float) -> Made:
+    """Change of no lanes: to the middle of its own, or beside it."""
+    metres = read.conditions.report.number(kind, "targetLaneOffset", 0.0)
+    metres += _beside_at_first(read, entity)[0]
+    read.offsets[entity.id] = metres
+    return {"offset": {"to": metres, "over": max(over, 0.1)}}
 
 
 def _start_lane(read: ActionReader, element: _Element, actor: str) -> tuple[str, int, int]:
@@ -235,6 +245,8 @@ def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
 def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, float]:
     """Metres to the left of its lane at which the lane is that the file names, and itself."""
     positions = read.conditions.positions
+    if entity.own is not None:  # of which the lane is that of its node, wherever it appears
+        return 0.0, float(entity.own.get("lateral_offset", 0.0))
     starts = [
         positions.starts[name]
         for name, one in read.conditions.entities.items()

@@ -26,6 +26,8 @@ class AppearanceReader:
     ----------
     late
         Names of entities that appear in the story only.
+    departing
+        Names of those of them that only depart later, in a file that odscen wrote.
     deleted
         Names of entities that are deleted before the story begins.
     """
@@ -33,6 +35,7 @@ class AppearanceReader:
     report: ImportReport
     positions: PositionReader
     late: set[str] = field(default_factory=set)
+    departing: set[str] = field(default_factory=set)
     deleted: set[str] = field(default_factory=set)
 
     def read(self, board: _Element, names: Iterable[str]) -> None:
@@ -68,6 +71,9 @@ class AppearanceReader:
         for kind in board.iterfind("Story//Position"):
             if self._puts(kind) == name:
                 self.late.add(name)
+                group = next(kind.iterancestors("ManeuverGroup"), None)
+                if group is not None and group.get("name") == f"{name} departs":
+                    self.departing.add(name)
                 yield lambda kind=kind: self.positions.point(kind)  # type: ignore[misc]
 
     def _begin(self, kind: _Element) -> MapPoint:

@@ -174,7 +174,8 @@ class InitReader:
         made = {"id": entity.id, "category": str(entity.category), **fields}
         nodes, then = self._positions, self._then.get(entity.id, [])
         there = nodes.of_node(made["spawn"])
-        if start is not None and there is not None:
+        by_rule = entity.id in self._appear.late - self._appear.departing
+        if start is not None and there is not None and not by_rule:
             centre = start.moved(entity.ahead)
             where = there.moved(0.0, float(made.get("lateral_offset", 0.0)))
             if centre.away(where) > _SAME_PLACE:
