@@ -4669,6 +4669,8 @@ export interface components {
          *
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
+         *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
+         *     where it is and heads at the begin.
          */
         "PathFollowing-Input": {
             /** Points */
@@ -4688,6 +4690,8 @@ export interface components {
              * @default []
              */
             times?: number[];
+            /** Relative To */
+            relative_to?: string | null;
         };
         /**
          * PathFollowing
@@ -4695,6 +4699,8 @@ export interface components {
          *
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
+         *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
+         *     where it is and heads at the begin.
          */
         "PathFollowing-Output": {
             /** Points */
@@ -4714,6 +4720,8 @@ export interface components {
              * @default []
              */
             times: number[];
+            /** Relative To */
+            relative_to: string | null;
         };
         /**
          * PhaseInfo
@@ -9397,6 +9405,8 @@ export interface components {
          *
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
+         *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
+         *     where it is and heads at the begin.
          */
         "PathFollowing-File": {
             /** Points */
@@ -9419,6 +9429,11 @@ export interface components {
              * @default []
              */
             times?: number[];
+            /**
+             * Relative To
+             * @default null
+             */
+            relative_to?: string | null;
         };
         /**
          * Profile

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_positions import MapPoint, PositionReader
+    from odscen.interchange.openscenario_import.map_points import MapPoint
+    from odscen.interchange.openscenario_import.read_positions import PositionReader
 
 
 @dataclass(slots=True)

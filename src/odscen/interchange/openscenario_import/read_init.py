@@ -9,8 +9,8 @@ from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.actor_places import ActorPlaces
 from odscen.interchange.openscenario_import.global_actions import tell_unread
 from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.map_points import MapPoint
 from odscen.interchange.openscenario_import.read_appearances import AppearanceReader
-from odscen.interchange.openscenario_import.read_positions import MapPoint
 from odscen.scenario.templates.scene_actors import STEADY
 
 if TYPE_CHECKING:
