@@ -8,6 +8,7 @@ the order of lists and in declarations of parameters, whose values are put in, d
 from __future__ import annotations
 
 import argparse
+import math
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,10 +18,13 @@ from odscen.app.export import export
 from odscen.app.scenario_imports import import_scenario
 from odscen.base.errors import OdscenError
 from odscen.changes.acting_differences import acting_differences
+from odscen.lanegraph.query import is_walk_node_id, node_index
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.app.scenario_imports import ImportedScenario
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.document.scenario_document import Scenario
 
 _NAMES = frozenset({"parameters", "description"})
 """Parts of a document that do not act."""
@@ -65,6 +69,19 @@ def _differences(
     files = export(workspace, read.scenario, out, to="openscenario", options={"version": version})
     (file,) = (one for one in files if one.suffix == ".xosc")
     after = import_scenario(workspace, file).scenario
-    return [
-        one.words for one in acting_differences(read.scenario, after) if one.place[0] not in _NAMES
-    ]
+    graph = workspace.map(read.scenario.map.name).graph()
+    found = acting_differences(read.scenario, after, placed=placed(graph, read.scenario))
+    return [one.words for one in found if one.place[0] not in _NAMES]
+
+
+def placed(graph: MapGraph, scenario: Scenario) -> dict[str, list[float]]:
+    """Where the centres of actors on lanes are placed: x and y (m) and heading (rad)."""
+    lanes, found = graph.lanes, {}
+    for actor in scenario.actors:
+        if is_walk_node_id(actor.spawn):
+            continue
+        node = node_index(graph, actor.spawn)
+        hdg, left = float(lanes.hdg[node]), actor.lateral_offset
+        x, y = lanes.x[node] - left * math.sin(hdg), lanes.y[node] + left * math.cos(hdg)
+        found[actor.id] = [float(x), float(y), hdg]
+    return found

@@ -392,3 +392,17 @@ def test_a_falling_edge_a_delay_and_a_count_are_those_of_the_rule(
     made = rule(read(workspace, tmp_path, text), "again")
     assert (made["times"], made["when"]["delay"], made["when"]["edge"]) == (3, 0.5, "rising")
     assert made["when"]["not"] == {"speed": {"of": "Ego", "below": 3.0}}
+
+
+def test_a_catalog_is_found_from_a_folder_above_the_file(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    """Euro NCAP's files in ``NCAP/SET/`` name folders as if they were in ``NCAP/``."""
+    inside = tmp_path / "ncap" / "set"
+    (tmp_path / "catalogs").mkdir()
+    inside.mkdir(parents=True)
+    (tmp_path / "catalogs" / "lines.xosc").write_text(CATALOG)
+    text = meeting(WALKER).replace('path="."', 'path="../catalogs"')
+    found = read(workspace, inside, text)
+    assert found.lists["refused"] == []
+    assert found.scenario.actors[-1].id == "VRU"

@@ -1,8 +1,8 @@
 """1.0 as ScenarioRunner reads it: what its parser demands and refuses, rule by rule.
 
-The parser itself is not run: the package ``carla-scenario-runner`` 0.9.11 lacks modules that it
-imports, and a CARLA server is wanted. Each rule names where it stands: ``config`` is
-``srunner/scenarioconfigs/openscenario_configuration.py``, ``parser``
+The parser itself is not run here: the package ``carla-scenario-runner`` 0.9.11 has its folders
+where it does not import them from, and a CARLA server is wanted. Each rule names where it stands:
+``config`` is ``srunner/scenarioconfigs/openscenario_configuration.py``, ``parser``
 ``srunner/tools/openscenario_parser.py``, ``scenario`` ``srunner/scenarios/open_scenario.py`` of
 github.com/carla-simulator/scenario_runner, in the versions up to 2024.
 """

@@ -4818,6 +4818,8 @@ export interface components {
          *
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
+         *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
+         *     where it is and heads at the begin.
          */
         "PathFollowing-Input": {
             /** Points */
@@ -4837,6 +4839,8 @@ export interface components {
              * @default []
              */
             times?: number[];
+            /** Relative To */
+            relative_to?: string | null;
         };
         /**
          * PathFollowing
@@ -4844,6 +4848,8 @@ export interface components {
          *
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
+         *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
+         *     where it is and heads at the begin.
          */
         "PathFollowing-Output": {
             /** Points */
@@ -4863,6 +4869,8 @@ export interface components {
              * @default []
              */
             times: number[];
+            /** Relative To */
+            relative_to: string | null;
         };
         /**
          * PhaseInfo
@@ -9667,6 +9675,8 @@ export interface components {
          *
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
+         *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
+         *     where it is and heads at the begin.
          */
         "PathFollowing-File": {
             /** Points */
@@ -9689,6 +9699,11 @@ export interface components {
              * @default []
              */
             times?: number[];
+            /**
+             * Relative To
+             * @default null
+             */
+            relative_to?: string | null;
         };
         /**
          * Profile

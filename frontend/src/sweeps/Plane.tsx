@@ -1,18 +1,19 @@
 import { Group, Select } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
 import { useId, useState } from "react";
 
 import type { SweepCases } from "../api/sweeps";
 import { shortNumber } from "../editor/parameters";
 import { axesOf, scaleOf, titleOf, type Verdict, VERDICT_WORD, verdictOf } from "./plan";
 
-const W = 760;
 const H = 420;
-const BOX = { left: 62, right: W - 16, top: 16, bottom: H - 48 };
 const ORDER: readonly Verdict[] = ["other", "calm", "safe", "unsafe"];
 
 /** Cases in the plane of two parameters, and the boundary between those that are safe and not. */
 export function Plane({ table, onOpen }: { table: SweepCases; onOpen: (name: string) => void }) {
   const id = useId();
+  const W = useMediaQuery("(max-width: 760px)") ? 380 : 760;
+  const BOX = { left: 62, right: W - 16, top: 16, bottom: H - 48 };
   const axes = axesOf(table);
   const [chosen, setChosen] = useState<[number, number]>([0, 1]);
   const [across, up] = [axes[chosen[0]], axes[chosen[1]]];

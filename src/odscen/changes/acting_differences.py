@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,13 +17,16 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
 Parts = dict[str, Any]
+Pose = Sequence[float]
 _DIGITS: Final = 4
 """Of metres, seconds and radians: a file may round more than a document does."""
 _MOST_GROUPS: Final = 256
 _ALWAYS: Final[Parts] = {"time": {"after": 0.0}}
 
 
-def acting_differences(before: Scenario, after: Scenario) -> tuple[ScenarioChange, ...]:
+def acting_differences(
+    before: Scenario, after: Scenario, *, placed: Mapping[str, Pose] | None = None
+) -> tuple[ScenarioChange, ...]:
     """Find what two scenarios do differently.
 
     Names of scenarios and rules, the order of lists of which it does not matter, and differences
@@ -30,14 +34,20 @@ def acting_differences(before: Scenario, after: Scenario) -> tuple[ScenarioChang
     said, or a rule brakes, stops, or changes its speed to 0 likewise. Places are as of
     :func:`~odscen.changes.scenario_differences.scenario_differences`, but ``when`` is whole and
     ``then`` has numbers: ``("rules", "cut-in", "then", "0")``.
+
+    Parameters
+    ----------
+    placed
+        Where the centres of actors are placed, by id: x and y (m) and heading (rad). An actor that
+        appears ``at`` that place appears where it is placed.
     """
-    old, new = _plain(before), _plain(after)
+    old, new = (_plain(one, _rounded(dict(placed or {}))) for one in (before, after))
     old["rules"] = {rule["id"]: _rule(rule, old, {}) for rule in old["rules"]}
     new["rules"] = _renamed(new, old["rules"])
     return tuple(field_differences(old, new))
 
 
-def _plain(scenario: Scenario) -> Parts:
+def _plain(scenario: Scenario, placed: Mapping[str, Pose]) -> Parts:
     data: Parts = _rounded(scenario.model_dump(mode="json", exclude={"name", "formulas"}))
     data["roi"] = sorted(data["roi"])
     for name in ("actors", "flows", "measures"):
@@ -47,6 +57,8 @@ def _plain(scenario: Scenario) -> Parts:
         for part in _parts(rule["then"]):
             if part.get("appear") and part["appear"].get("speed") is None:
                 part["appear"]["speed"] = own or 0.0
+            if part.get("appear") and part["appear"]["at"] == placed.get(rule["actor"], 0):
+                part["appear"]["at"] = None
     return data
 
 

@@ -58,7 +58,8 @@ function pathWords(values: Values): string {
     : paced
       ? ", with a speed at each"
       : maybe(values.speed, " at", "km/h", 3.6);
-  return `follow a path through ${many} point${many === 1 ? "" : "s"}${how}`;
+  const from = given(values.relative_to) ? ` ahead of where ${text(values.relative_to)} is` : "";
+  return `follow a path through ${many} point${many === 1 ? "" : "s"}${from}${how}`;
 }
 
 /** Every kind of action that a document can have. */
@@ -179,7 +180,15 @@ export const ACTION_KINDS: Record<ActionKind, Kind> = {
   },
   path: {
     label: "Follow a path",
-    fields: [{ is: "points", name: "points", label: "Points", timed: true }],
+    fields: [
+      { is: "points", name: "points", label: "Points", timed: true },
+      {
+        is: "actor",
+        name: "relative_to",
+        label: "Metres ahead and left of (empty: places of the map)",
+        optional: true,
+      },
+    ],
     words: pathWords,
   },
   replay: {

@@ -91,8 +91,8 @@ function pathOf(kind: string, values: Item["values"]): readonly unknown[] {
   switch (kind) {
     case "walk":
       return [...list(values.through), values.to];
-    case "path":
-      return list(values.points);
+    case "path": // where one relative to a road user leads is known in the run only
+      return values.relative_to == null ? list(values.points) : [];
     case "replay":
       return list(values.rows).map((row) => list(row).slice(1, 3));
     default:

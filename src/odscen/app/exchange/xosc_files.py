@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _MOST = 20_000_000
 """Bytes of an OpenSCENARIO file or catalog."""
+_ABOVE = 3
+"""Folders above a file that may have the catalogs it names."""
 
 
 class XoscFiles(Protocol):
@@ -84,9 +86,15 @@ class FolderFiles:
         return FolderFiles(self.file.parent / _slashes(named), self.maps, self.on_map)
 
     def catalogs(self, folders: tuple[str, ...]) -> Iterator[tuple[_Element, str]]:
-        """All OpenSCENARIO files in these folders, relative to its own."""
+        """All OpenSCENARIO files in these folders, relative to its own or one above.
+
+        Euro NCAP's collection names those in ``NCAP/SET/`` as if from ``NCAP/``.
+        """
+        above = (self.file.parent, *self.file.absolute().parents[1 : 1 + _ABOVE])
         for folder in folders:
-            for other in sorted((self.file.parent / folder).glob("*.xosc")):
+            places = [one / _slashes(folder) for one in above]
+            there = next((one for one in places if one.is_dir()), places[0])
+            for other in sorted(there.glob("*.xosc")):
                 yield read_tree(other, name=str(other)), other.name
 
     def map(self, workspace: Workspace, named: str) -> MapEntry:

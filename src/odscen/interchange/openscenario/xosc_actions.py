@@ -124,14 +124,16 @@ def _release(made: Actions, _part: Any, _actor: str, _where: str) -> list[_Eleme
     return [_controller(made, lateral=True, longitudinal=True)]
 
 
-def _lane_change(over: float, target: _Element) -> _Element:
+def _lane_change(over: float, target: _Element, offset: float | None = None) -> _Element:
     dynamics = xml(
         "LaneChangeActionDynamics",
         dynamicsShape="sinusoidal",
         dynamicsDimension="time",
         value=float(over),
     )
-    change = xml("LaneChangeAction", dynamics, xml("LaneChangeTarget", target))
+    change = xml(
+        "LaneChangeAction", dynamics, xml("LaneChangeTarget", target), targetLaneOffset=offset
+    )
     return private(xml("LateralAction", change))
 
 
@@ -153,9 +155,12 @@ def _cut_in(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]
 
 
 def _offset(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
-    made.notes.approximated.append((where, "an offset has no duration but an acceleration"))
     asked = [one.offset.to for one in made.before(part, actor) if one.offset is not None]
     moves = abs(part.to - (asked[-1] if asked else made.actors[actor].lateral_offset))
+    if not moves and not made.dialect.for_scenario_runner:  # no acceleration tells how long
+        own = xml("RelativeTargetLane", entityRef=actor, value=0)
+        return [_lane_change(part.over, own, float(part.to))]
+    made.notes.approximated.append((where, "an offset has no duration but an acceleration"))
     # Greatest of y = moves / 2 (1 - cos(pi t / over)).
     greatest = math.pi**2 * moves / (2.0 * part.over**2)
     dynamics = xml(

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario.dialect import xml
-from odscen.interchange.openscenario.xosc_places import GroundPose
+from odscen.interchange.openscenario.xosc_places import GroundPose, RelativePose
 from odscen.interchange.openscenario.xosc_presence import private, speed_action
+from odscen.interchange.openscenario.xosc_triggers import CannotSayError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -37,6 +38,10 @@ class Making(Protocol):
     @property
     def places(self) -> Places:
         """Nodes and bodies."""
+
+    @property
+    def dialect(self) -> Dialect:
+        """Of the file."""
 
     @property
     def notes(self) -> ExportNotes:
@@ -92,12 +97,16 @@ def follow_line(
 
 def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     """Trajectory of the reference point of an actor whose front follows a path."""
-    spots, times = [made.places.spot(place) for place in part.points], list(part.times or ())
+    spots, times = _spots(made, part), list(part.times or ())
+    base = part.relative_to and made.actors.get(part.relative_to)
     own = made.actors[actor]
     walks = own.category is Category.PEDESTRIAN
     front = 0.0 if walks else made.places.centre_ahead(own) + made.places.body(own).length / 2.0
     begin = _begins(made, part, actor)
-    if begin is None and len(spots) == 1:  # a line of one point is none
+    if base:
+        begin = GroundPose(0.0, 0.0, 0.0, 0.0).back(made.places.centre_ahead(base))
+        begin = begin if base is own else None
+    elif begin is None and len(spots) == 1:  # a line of one point is none
         made.notes.approximated.append((where, "it leads there from where the actor begins"))
         begin = made.places.start(own)
     first = spots[0] if begin is None else begin.back(-front)
@@ -108,6 +117,9 @@ def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     if begin is None or front > 0.0:
         made.notes.approximated.append((where, "the reference point follows, not the front"))
     vertices = [begin or line[0].back(front), *(spot.back(front) for spot in line[1:])]
+    if base:
+        ahead = made.places.centre_ahead(base)
+        vertices = [RelativePose(one.x + ahead, one.y, 0.0, one.hdg, base.id) for one in vertices]
     name = f"{actor}: {where}"
     if times:
         before = 0.0 if begin is not None else 0.99 * times[0]
@@ -116,6 +128,18 @@ def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
         made.notes.approximated.append((where, "speeds at the points are left out"))
     found = made.trajectory(name, *timed(vertices, part.speed or _USUAL_SPEED), timed=False)
     return [found] if part.speed is None else [found, speed_action(part.speed, "step", "time", 0.0)]
+
+
+def _spots(made: Making, part: Any) -> list[GroundPose]:
+    if part.relative_to is None:
+        return [made.places.spot(place) for place in part.points]
+    if made.dialect.for_scenario_runner:
+        msg = "a path relative to an actor, which ScenarioRunner does not turn with it"
+        raise CannotSayError(msg)
+    if part.relative_to not in made.actors:
+        msg = f"a path relative to {part.relative_to!r}, a vehicle of a flow"
+        raise CannotSayError(msg)
+    return [GroundPose(x, y, 0.0, 0.0) for x, y in part.points]
 
 
 def timed(spots: Sequence[GroundPose], speed: float) -> tuple[list[GroundPose], list[float]]:
@@ -174,10 +198,11 @@ def _begins(made: Making, part: Any, actor: str) -> GroundPose | None:
 
 def _headed(spots: Sequence[GroundPose]) -> list[GroundPose]:
     """Spots with the heading of the line through them."""
-    found = []
+    found: list[GroundPose] = []
     for row, spot in enumerate(spots):
         before, after = spots[max(row - 1, 0)], spots[min(row + 1, len(spots) - 1)]
         dx, dy = after.x - before.x, after.y - before.y
-        hdg = math.atan2(dy, dx) if math.hypot(dx, dy) > 0.0 else spot.hdg
+        hdg = found[-1].hdg if found else spot.hdg  # who stands at a place keeps looking there
+        hdg = math.atan2(dy, dx) if math.hypot(dx, dy) > 0.0 else hdg
         found.append(GroundPose(spot.x, spot.y, spot.z, hdg))
     return found

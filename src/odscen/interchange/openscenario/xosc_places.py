@@ -64,6 +64,19 @@ class GroundPose:
 
 
 @dataclass(frozen=True, slots=True)
+class RelativePose(GroundPose):
+    """A place by metres ahead and left of the reference point of an entity, and its direction."""
+
+    entity: str = ""
+
+    def element(self) -> _Element:
+        """``Position`` relative to the entity."""
+        turn = xml("Orientation", type="relative", h=self.hdg)
+        place = {"entityRef": self.entity, "dx": self.x, "dy": self.y}
+        return xml("Position", xml("RelativeObjectPosition", turn, **place))
+
+
+@dataclass(frozen=True, slots=True)
 class Places:
     """Nodes of a map, and the bodies of a scenario's actors."""
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.read_positions import MapPoint
-from odscen.interchange.openscenario_import.read_teleports import put_there
+from odscen.interchange.openscenario_import.map_points import MapPoint
+from odscen.interchange.openscenario_import.read_motions import put_there
 from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.lanegraph.shortest_paths import reachable

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.read_teleports import JUMP, put_there, stays
-from odscen.interchange.openscenario_import.read_trajectories import read_trajectory
+from odscen.interchange.openscenario_import.read_motions import (
+    JUMP,
+    followed,
+    lines_up,
+    stays,
+    teleported,
+)
 from odscen.lanegraph.query import node_id
 
 if TYPE_CHECKING:
@@ -73,6 +77,9 @@ class ActionReader:
         names = [name for name, one in self.conditions.entities.items() if one is entity]
         if kind.tag == "TeleportAction" and stays(report, kind, names):
             return []
+        if kind.tag == "TeleportAction" and lines_up(report, kind, names):
+            self.offsets[entity.id] = 0.0
+            return [{"offset": {"to": 0.0, "over": JUMP}}]
         return [make(self, kind, entity)]
 
     def absolute_speed(self, target: _Element) -> float:
@@ -149,6 +156,8 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     if lane is None:
         raise RefusedError(kind, "a change of lane without a target")
     value = int(report.number(lane, "value"))
+    if report.number(kind, "targetLaneOffset", 0.0):
+        report.mark(kind, "approximated", "to the middle of another lane, not beside it")
     if lane.tag == "RelativeTargetLane":
         other = read.conditions.actor(lane)
         if other == entity.id and value:
@@ -156,7 +165,7 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         if other != entity.id and value == 0:
             return {"cut_in": {"to": other, "over": over}}
         if other == entity.id:
-            raise RefusedError(lane, "the lane in which it is")
+            return _within_lane(read, kind, entity, over)
         road, own, side = _start_lane(read, lane, entity.id)
         beside, its, _ = _start_lane(read, lane, other)
         if road != beside:
@@ -170,10 +179,18 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         by = side * (value - own - ((value > 0) - (own > 0)))  # there is no lane 0
         words = f"{by:+d} lanes from the last one that the file names for it"
     if by == 0:
-        report.mark(lane, "approximated", "to the middle of the lane in which it is")
-        return {"offset": {"to": 0.0, "over": over}}
+        report.mark(lane, "approximated", "by none, in the lane in which it is")
+        return _within_lane(read, kind, entity, over)
     report.mark(lane, "approximated", words)
     return {"lane": {"by": by, "over": over}}
+
+
+def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: float) -> Made:
+    """Change of no lanes: to the middle of its own, or beside it."""
+    metres = read.conditions.report.number(kind, "targetLaneOffset", 0.0)
+    metres += _beside_at_first(read, entity)[0]
+    read.offsets[entity.id] = metres
+    return {"offset": {"to": metres, "over": max(over, 0.1)}}
 
 
 def _start_lane(read: ActionReader, element: _Element, actor: str) -> tuple[str, int, int]:
@@ -235,6 +252,8 @@ def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
 def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, float]:
     """Metres to the left of its lane at which the lane is that the file names, and itself."""
     positions = read.conditions.positions
+    if entity.own is not None:  # of which the lane is that of its node, wherever it appears
+        return 0.0, float(entity.own.get("lateral_offset", 0.0))
     starts = [
         positions.starts[name]
         for name, one in read.conditions.entities.items()
@@ -284,40 +303,11 @@ def _gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
 
 
 def _trajectory(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
-    report, positions = read.conditions.report, read.conditions.positions
-    front = 0.0 if entity.category is Category.PEDESTRIAN else entity.ahead + entity.length / 2
-    with positions.exactly():
-        found = read_trajectory(report, positions, kind)
-    vertices = [
-        (one.time, round(at.x, 4), round(at.y, 4)) for one in found for at in (one.at.moved(front),)
-    ]
-    report.mark(kind, "approximated", "followed by the front, from where the actor is")
-    return {"path": _timed(read, kind, vertices[1:])}
-
-
-def _timed(read: ActionReader, kind: _Element, vertices: list[tuple[float, float, float]]) -> Made:
-    """Points of a path, with their times where the file has timing."""
-    report = read.conditions.report
-    reference = report.child(kind, "TimeReference")
-    timing = None if reference is None else report.child(reference, "Timing", "None")
-    report.child(kind, "TrajectoryFollowingMode")
-    points = [list(vertex[1:]) for vertex in vertices]
-    if timing is None or timing.tag != "Timing":
-        return {"points": points}
-    scale, offset = report.number(timing, "scale", 1.0), report.number(timing, "offset", 0.0)
-    times = [scale * vertex[0] + offset for vertex in vertices]
-    if times[0] <= 0 or any(one >= other for one, other in itertools.pairwise(times)):
-        raise RefusedError(timing, "times of vertices that do not grow")
-    return {"points": points, "times": times}
+    return followed(read.conditions, kind, entity)
 
 
 def _teleport(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
-    """Put an actor somewhere: by a recording of 0.1 s there, after which it drives on."""
-    report, positions = read.conditions.report, read.conditions.positions
-    with positions.exactly():
-        centre = positions.point(report.only(kind)).moved(entity.ahead)
-    report.mark(kind, "approximated", f"it is led there for {JUMP:g} s, and drives on")
-    return put_there(centre, read.speeds.get(entity.id, 0.0))
+    return teleported(read.conditions, kind, entity, read.speeds.get(entity.id, 0.0))
 
 
 def _profile(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_positions import MapPoint, PositionReader
+    from odscen.interchange.openscenario_import.map_points import MapPoint
+    from odscen.interchange.openscenario_import.read_positions import PositionReader
 
 
 @dataclass(slots=True)
@@ -26,6 +27,8 @@ class AppearanceReader:
     ----------
     late
         Names of entities that appear in the story only.
+    departing
+        Names of those of them that only depart later, in a file that odscen wrote.
     deleted
         Names of entities that are deleted before the story begins.
     """
@@ -33,6 +36,7 @@ class AppearanceReader:
     report: ImportReport
     positions: PositionReader
     late: set[str] = field(default_factory=set)
+    departing: set[str] = field(default_factory=set)
     deleted: set[str] = field(default_factory=set)
 
     def read(self, board: _Element, names: Iterable[str]) -> None:
@@ -68,6 +72,9 @@ class AppearanceReader:
         for kind in board.iterfind("Story//Position"):
             if self._puts(kind) == name:
                 self.late.add(name)
+                group = next(kind.iterancestors("ManeuverGroup"), None)
+                if group is not None and group.get("name") == f"{name} departs":
+                    self.departing.add(name)
                 yield lambda kind=kind: self.positions.point(kind)  # type: ignore[misc]
 
     def _begin(self, kind: _Element) -> MapPoint:

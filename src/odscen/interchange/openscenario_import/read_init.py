@@ -9,8 +9,8 @@ from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.actor_places import ActorPlaces
 from odscen.interchange.openscenario_import.global_actions import tell_unread
 from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.map_points import MapPoint
 from odscen.interchange.openscenario_import.read_appearances import AppearanceReader
-from odscen.interchange.openscenario_import.read_positions import MapPoint
 from odscen.scenario.templates.scene_actors import STEADY
 
 if TYPE_CHECKING:
@@ -174,7 +174,8 @@ class InitReader:
         made = {"id": entity.id, "category": str(entity.category), **fields}
         nodes, then = self._positions, self._then.get(entity.id, [])
         there = nodes.of_node(made["spawn"])
-        if start is not None and there is not None:
+        by_rule = entity.id in self._appear.late - self._appear.departing
+        if start is not None and there is not None and not by_rule:
             centre = start.moved(entity.ahead)
             where = there.moved(0.0, float(made.get("lateral_offset", 0.0)))
             if centre.away(where) > _SAME_PLACE:

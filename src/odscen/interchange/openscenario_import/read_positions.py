@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 
 from odscen.base.errors import OdscenError
 from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.map_points import MapPoint
 from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.query import is_walk_node_id, node_id, node_index, walk_node_index
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
+    from odscen.interchange.openscenario_import.map_points import MovingFrame
     from odscen.lanegraph.graphs import MapGraph
 
 _EXACT = 1e-5
@@ -30,28 +32,6 @@ _EXACT = 1e-5
 _IN_ROUTE: Final = ("FromLaneCoordinates", "FromRoadCoordinates", "FromCurrentEntity")
 _STRAIGHT: Final = 1e-4
 """Radians between the headings of a lane that counts as straight."""
-
-
-class MapPoint(NamedTuple):
-    """A point on the ground: metres in the OpenDRIVE frame, radians counter-clockwise from x.
-
-    ``node`` is the node of the lane that the file names, if it names one.
-    """
-
-    x: float
-    y: float
-    hdg: float
-    node: int | None = None
-
-    def moved(self, ahead: float, left: float = 0.0) -> MapPoint:
-        """Return the point so many metres ahead and to the left."""
-        cos, sin = math.cos(self.hdg), math.sin(self.hdg)
-        x, y = self.x + ahead * cos - left * sin, self.y + ahead * sin + left * cos
-        return self._replace(x=x, y=y)
-
-    def away(self, other: MapPoint) -> float:
-        """Metres to another point."""
-        return math.hypot(self.x - other.x, self.y - other.y)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,15 +66,31 @@ class PositionReader:
     moving: set[str] = field(default_factory=set)
     on_trajectory: Callable[[PositionReader, _Element], MapPoint] | None = None
     _modes: dict[str, bool] = field(default_factory=dict)
+    _frames: list[MovingFrame] = field(default_factory=list)
 
     @contextmanager
-    def exactly(self) -> Iterator[None]:
-        """Refuse places relative to entities that have moved by then."""
+    def exactly(self, frame: MovingFrame | None = None) -> Iterator[None]:
+        """Refuse places relative to entities that have moved by then, or have them of a frame."""
         self._modes["exact"] = True
+        if frame is not None and self._modes.get("story"):
+            self._frames.append(frame)
         try:
             yield
         finally:
             self._modes["exact"] = False
+            self._frames.clear()
+
+    def itself(self, element: _Element) -> MapPoint:
+        """Where the entity is that begins a trajectory which does not say so.
+
+        Raises
+        ------
+        RefusedError
+            If that is not asked in the story.
+        """
+        if not self._frames:
+            raise RefusedError(element, "a first segment without PositionStart")
+        return self._frames[-1].itself()
 
     def begin_story(self) -> None:
         """From now on entities that move are no longer where they start."""
@@ -122,8 +118,17 @@ class PositionReader:
         }.get(str(kind.tag))
         if read is None:
             raise RefusedError(kind, f"a place given as {kind.tag}")
+        frame = self._frames[-1] if self._frames else None
+        if frame is not None:
+            if kind.get("entityRef") in self.moving:
+                found = frame.point(kind)
+                return self._turned(found, kind)
+            frame.fixed = True
         found = read(kind)
         self.report.positions[position] = (round(float(found.x), 2), round(float(found.y), 2))
+        return self._turned(found, kind)
+
+    def _turned(self, found: MapPoint, kind: _Element) -> MapPoint:
         turn = self.report.child(kind, "Orientation")
         if turn is None:
             return found

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.read_positions import MapPoint
+from odscen.interchange.openscenario_import.map_points import MapPoint
 from odscen.opendrive.geometry import PlanView
 from odscen.opendrive.road_model import Geometry, GeometryKind
 
@@ -159,7 +159,7 @@ def _clothoid_spline(
         elif found:
             start = found[-1].at
         else:
-            raise RefusedError(segment, "a first segment without PositionStart")
+            start = positions.itself(segment)
         turn = positions.side * report.number(segment, "hOffset", 0.0)
         start = start._replace(hdg=start.hdg + turn)
         bends = [

@@ -141,12 +141,23 @@ class PathFollowing(Part):
 
     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
     the begin at which it is there; none of them leaves the speed as it is.
+    With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
+    where it is and heads at the begin.
     """
 
     points: Annotated[tuple[RulePlace, ...], Field(min_length=1, max_length=10_000)]
     speed: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
     speeds: Annotated[tuple[RuleSpeed, ...], Field(max_length=10_000)] = ()
     times: Annotated[tuple[Positive, ...], Field(max_length=10_000)] = ()
+    relative_to: Identifier | None = None
+
+    @model_validator(mode="after")
+    def _metres_from_it(self) -> Self:
+        for place in self.points if self.relative_to is not None else ():
+            if isinstance(place, str):
+                msg = f"{place!r} is a node; relative to {self.relative_to!r} give x and y"
+                raise ValueError(msg)
+        return self
 
     @model_validator(mode="after")
     def _one_timing(self) -> Self:

@@ -12,6 +12,7 @@ from odscen.scenario.document.actions_document import (
     LaneChange,
     LateralMove,
     NewGoal,
+    PathFollowing,
     SpeedChange,
     Walking,
 )
@@ -69,6 +70,8 @@ def places_of(part: Part) -> Iterator[tuple[str, RulePlace]]:
     """Places that a condition or action names, with the names of their fields."""
     if isinstance(part, Appearing):  # an exact pose, no place of the map
         return
+    if isinstance(part, PathFollowing) and part.relative_to is not None:
+        return
     for name in ("place", "to", "at", "when_at"):
         value = getattr(part, name, None)
         if value is not None and not (name == "to" and _to_is_actor(part)):
@@ -80,9 +83,9 @@ def places_of(part: Part) -> Iterator[tuple[str, RulePlace]]:
 
 def actors_of(part: Part) -> Iterator[tuple[str, str]]:
     """Actors that a condition or action names, with the names of their fields."""
-    for name in ("of", "to"):
+    for name in ("of", "to", "relative_to"):
         value = getattr(part, name, None)
-        if isinstance(value, str) and (name == "of" or _to_is_actor(part)):
+        if isinstance(value, str) and (name != "to" or _to_is_actor(part)):
             yield name, value
 
 

@@ -293,7 +293,9 @@ ACTIONS = {
         ),
         ActionKind(
             "path", "follow a line over the ground through `points`, with one `speed`, `speeds` at "
-            "the points or `times` at which it is there; SUMO leads a vehicle on from its end",
+            "the points or `times` at which it is there; SUMO leads a vehicle on from its end. "
+            "Points are metres ahead and left of the actor `relative_to`, if it is given, "
+            "by where that is at the begin",
             "m/s, s", "`moveToXY`", "FollowTrajectoryAction (Polyline)", _MIRRORED, follow_path,
             on_the_path, end_of_path,
         ),

@@ -74,9 +74,10 @@ def follow_path(part: PathFollowing, one: ActingActor) -> float:
     Raises
     ------
     CannotAct
-        If the actor stands, and no rule says how fast it goes.
+        If the actor stands, and no rule says how fast it goes; or who the points are relative to
+        is not on the road.
     """
-    points = [one.view.place(place) for place in part.points]
+    points = _points(part, one)
     line = (_own_point(one), *points)
     if line_length(line) < 1e-6:
         return one.instant
@@ -96,6 +97,22 @@ def follow_path(part: PathFollowing, one: ActingActor) -> float:
         msg = "it is stopped; the path has to say how fast it is followed"
         raise CannotAct(msg)
     return math.inf
+
+
+def _points(part: PathFollowing, one: ActingActor) -> list[Point]:
+    if part.relative_to is None:
+        return [one.view.place(place) for place in part.points]
+    base = one.view.actor(part.relative_to)
+    if base is None:
+        msg = f"{part.relative_to!r} is not on the road"
+        raise CannotAct(msg)
+    # The actor itself is where it is at the instant of the begin, within the step.
+    x, y = one.spot() if part.relative_to == one.actor.id else (base.x, base.y)
+    c, s = math.cos(base.hdg), math.sin(base.hdg)
+    return [
+        (x + ahead * c - left * s, y + ahead * s + left * c)
+        for ahead, left in (one.view.place(place) for place in part.points)
+    ]
 
 
 def on_the_path(part: PathFollowing, one: ActingActor, end: float) -> float:
