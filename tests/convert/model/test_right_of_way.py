@@ -17,7 +17,9 @@ from odscen.convert.model.right_of_way import (
     Walkway,
     find_conflicts,
     in_turn,
+    making_room,
     requests,
+    sight_before,
     wrapped,
 )
 
@@ -138,6 +140,23 @@ def test_two_roads_as_fast_as_each_other_that_only_merge_go_in_turn() -> None:
     assert one.yields_to == {1}
     assert other.yields_to == {0}
     assert in_turn(pair, found, Rules()) == {(0, 1)}
+
+
+def test_a_motorway_makes_room_for_an_equally_fast_ramp_as_it_has_lanes_beside() -> None:
+    road = movement(EAST, EAST)
+    beside = replace(
+        road,
+        source=(road.source[0], road.source[1] + 1),
+        target=(road.target[0], road.target[1] + 1),
+        shape=road.shape + np.array([0.0, 3.5, 0.0]),
+    )
+    listed = [road, beside, movement(0.4, EAST)]
+    found = find_conflicts(listed, [])
+    assert in_turn(listed, found, Rules()) == frozenset()
+    assert making_room(listed, found, Rules()) == {(0, 2)}
+    rights = requests(listed, found, Rules())
+    assert [right.yields_to for right in rights] == [{2}, frozenset(), frozenset()]
+    assert sight_before(road, rights[0], listed, room=True) == 100.0
 
 
 def test_nobody_goes_in_turn_where_lanes_cross_or_somebody_must_wait() -> None:

@@ -10,6 +10,7 @@ from odscen.convert.model.right_of_way import (
     Sign,
     find_conflicts,
     in_turn,
+    making_room,
     requests,
     sight_before,
 )
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 class Ruling(NamedTuple):
     """Who meets whom, and who goes first.
 
-    ``zipped`` are the movements that go in turn with others; where all have equal right, ``equal``.
+    ``zipped`` are the movements that go in turn with others, ``yielding`` those that make room for
+    others; where all have equal right, ``equal``.
     """
 
     movements: Sequence[Movement]
@@ -32,6 +34,7 @@ class Ruling(NamedTuple):
     rules: Rules
     rights: Sequence[Request]
     zipped: frozenset[int]
+    yielding: frozenset[int]
     equal: bool
 
 
@@ -63,9 +66,10 @@ def ruled(
         major = major_edges(movements, cars)
     rules = Rules(high_low, lefthand, all_stop, signalled, major)
     zipped = frozenset(n for pair in in_turn(movements, conflicts, rules) for n in pair)
-    equal = unruled and not major and not all_stop and not zipped
+    yielding = frozenset(waits for waits, _ in making_room(movements, conflicts, rules))
+    equal = unruled and not major and not all_stop and not zipped and not yielding
     rights = requests(movements, conflicts, rules)
-    return Ruling(movements, conflicts, rules, rights, zipped, equal)
+    return Ruling(movements, conflicts, rules, rights, zipped, yielding, equal)
 
 
 def signposts(ruling: Ruling, rows: Mapping[int, int]) -> list[tuple[str, float | None]]:
@@ -75,7 +79,7 @@ def signposts(ruling: Ruling, rows: Mapping[int, int]) -> list[tuple[str, float 
         if n in ruling.zipped:
             posts.append(("Z", None))
             continue
-        sight = sight_before(movement, right, ruling.movements)
+        sight = sight_before(movement, right, ruling.movements, room=n in ruling.yielding)
         posts.append((_state(ruling, movement, right, lit=n in rows), sight))
     return posts
 
