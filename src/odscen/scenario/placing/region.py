@@ -40,7 +40,7 @@ _MOST = 200_000
 """Pairs of places that a region remembers; then it begins anew."""
 
 
-class _Ways:
+class _PathsInside:
     """What is known of the ways inside a set of segments, in whatever order they are named."""
 
     def __init__(self, graph: MapGraph, lanes: BoolArray, walks: BoolArray) -> None:
@@ -83,7 +83,7 @@ class Region:
     segments: tuple[SegmentId, ...]
     lanes: BoolArray
     walks: BoolArray
-    _ways: _Ways = field(repr=False, compare=False)
+    _ways: _PathsInside = field(repr=False, compare=False)
 
     @classmethod
     def of(cls, graph: MapGraph, segments: Iterable[str]) -> Region:
@@ -187,10 +187,10 @@ def _region(graph: MapGraph, segments: tuple[str, ...]) -> Region:
 
 
 @lru_cache(maxsize=16)
-def _ways(graph: MapGraph, segments: frozenset[SegmentId]) -> _Ways:
+def _ways(graph: MapGraph, segments: frozenset[SegmentId]) -> _PathsInside:
     """One for all regions of a batch with these segments."""
     roi = induced(graph, sorted(segments))
-    return _Ways(graph, roi.nodes, roi.walk_nodes)
+    return _PathsInside(graph, roi.nodes, roi.walk_nodes)
 
 
 def place_of(graph: MapGraph, node: str) -> NodePlace | None:

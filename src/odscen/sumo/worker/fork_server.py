@@ -41,9 +41,11 @@ _INITIALIZE = (
 def main() -> None:
     """Import what simulations need, then fork one for each message."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.disable()  # what is imported stays
     _import_all()
     gc.collect()
     gc.freeze()  # forked processes need not go through it, nor copy it
+    gc.enable()
     with socket.socket(fileno=0) as control, _Children() as children:
         while children.wait(control):
             data, descriptors, *_ = socket.recv_fds(control, _MOST_BYTES, MOST_DESCRIPTORS)
