@@ -10,12 +10,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
-from odscen.base.errors import InputError
-from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo
-from odscen.lanegraph.query import node_id, walk_node_id
+from odscen.base.late_modules import import_when_used
+
+import_when_used("numpy.f2py", "numpy.testing")
+from scipy import sparse  # noqa: E402 - which names these
+from scipy.sparse import csgraph  # noqa: E402
+
+from odscen.base.errors import InputError  # noqa: E402
+from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo  # noqa: E402
+from odscen.lanegraph.query import node_id, walk_node_id  # noqa: E402
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
