@@ -19,7 +19,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.app.scenarios import GenerationSettings, generate
 from odscen.scenario.document.sampling_config import SamplingConfig
@@ -27,10 +27,18 @@ from odscen.sumo.folder import layout
 from odscen.sumo.runner.forked_worker import worker_environment
 from odscen.workspace.store import Workspace
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 ACTORS = 20
 SECONDS = 60.0
 JOBS = 2
 MAP = Path(__file__).parents[1] / "maps" / "signal_crossing.xodr"
+KINDS = {
+    "records": ["--no-report"],
+    "figures": ["--no-report", "--json"],
+    "reports": ["--report"],
+}
 _POOL = """
 import sys
 from multiprocessing import get_context
@@ -53,15 +61,18 @@ if __name__ == "__main__":
 
 def main() -> None:
     options = argparse.ArgumentParser(prog="bench short_runs")
-    options.add_argument("--runs", type=int, default=20, help="scenarios")
-    options.add_argument("--repeats", type=int, default=3, help="rounds; medians are shown")
+    options.add_argument("--runs", type=int, default=200, help="scenarios")
+    options.add_argument("--repeats", type=int, default=5, help="rounds; medians are shown")
+    options.add_argument(
+        "--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="what is made of each"
+    )
     options.add_argument("--actors", type=int, default=ACTORS, help="of each scenario")
     options.add_argument("--seconds", type=float, default=SECONDS, help="of each scenario")
     options.add_argument("--map", type=Path, default=MAP, help="file with the map")
     asked = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="odscen-bench-") as name:
         size = Size(asked.map, asked.actors, asked.seconds)
-        compare(Path(name), size, runs=asked.runs, repeats=asked.repeats)
+        compare(Path(name), size, asked.kinds, runs=asked.runs, repeats=asked.repeats)
 
 
 class Size(NamedTuple):
@@ -72,22 +83,18 @@ class Size(NamedTuple):
     seconds: float
 
 
-def compare(folder: Path, size: Size, *, runs: int, repeats: int) -> None:
+def compare(folder: Path, size: Size, chosen: Sequence[str], *, runs: int, repeats: int) -> None:
     scenarios = _scenarios(folder, size, runs)
     script = folder / "pool.py"
     script.write_text(_POOL % (size.seconds, JOBS), encoding="utf-8")
     out = folder / "runs"
-    kinds = {
-        "records": ["--no-report"],
-        "figures": ["--no-report", "--json"],
-        "reports": ["--report"],
-    }
+    kinds = {kind: KINDS[kind] for kind in chosen}
     batches = {kind: _command(folder, out, scenarios, *more) for kind, more in kinds.items()}
     lone = {
         kind: _command(folder, folder / "alone", scenarios[:1], *more)
         for kind, more in kinds.items()
     }
-    _cpu(batches["records"])
+    _cpu(_command(folder, out, scenarios, *KINDS["records"]))
     configs = sorted(out.glob(f"*/{layout.SUMO_FOLDER}/{layout.CONFIG_FILE}"))
     bare = folder / "bare"
     for config in configs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -179,6 +180,7 @@ def run(
     from odscen.sumo.runner.forked_worker import get_ready
 
     get_ready()  # its imports take as long as ours, and are done meanwhile
+    gc.disable()  # what is imported stays, and need not be gone through again and again
     from odscen.app import runs
     from odscen.app.scenarios import scenario_files
     from odscen.results.judging.expectations import parse_expectation
@@ -186,6 +188,8 @@ def run(
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.workspace.store import Workspace
 
+    gc.freeze()
+    gc.enable()
     recording = Recording() if trajectories is None else parse_recording(trajectories)
     slice_length: SliceLength = "auto" if slice_ == "auto" else None
     if slice_ not in ("auto", "none"):

@@ -10,12 +10,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
-from odscen.base.errors import InputError
-from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo
-from odscen.lanegraph.query import node_id, walk_node_id
+from odscen.base.late_modules import import_when_used
+
+import_when_used("numpy.f2py", "numpy.testing")
+from scipy import sparse  # noqa: E402 - which names these
+from scipy.sparse import csgraph  # noqa: E402
+
+from odscen.base.errors import InputError  # noqa: E402
+from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo  # noqa: E402
+from odscen.lanegraph.query import node_id, walk_node_id  # noqa: E402
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
@@ -26,6 +30,9 @@ MIN_EDGE_LENGTH = 1e-6
 
 
 _KEPT = 2
+"""Trees of shortest paths that are kept, at least."""
+_NODES_KEPT = 1 << 17
+"""Nodes that they have together, where they are more: 12 bytes each."""
 _FEW = 64
 """Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
 
@@ -34,7 +41,8 @@ class _PathFinder:
     """Shortest paths inside ``mask``; node numbers outside are the whole map's.
 
     An *end* is a node that is left by at most ``end_degree`` edges. Trees of the last sources are
-    kept: a caller asks for goals of one or two first, and for the path to one of them next.
+    kept: a caller asks for goals of one or two first, and for the path to one of them next, and the
+    scenarios of a batch have their spawns in common.
     """
 
     end_degree = 0
@@ -61,7 +69,8 @@ class _PathFinder:
         self.out_degree = np.bincount(rows, minlength=len(self.nodes))
         if not directed:
             self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
-        self._trees: tuple[tuple[int, FloatArray, Int32Array], ...] = ()
+        self._trees: dict[int, tuple[FloatArray, Int32Array]] = {}
+        self._kept = max(_KEPT, _NODES_KEPT // max(1, len(self.nodes)))
 
     def distances(self, source: int) -> FloatArray:
         """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
@@ -246,8 +255,7 @@ class _PathFinder:
         if not 0 <= source < len(self.mask) or not self.mask[source]:
             msg = f"{self._name(source)} is outside the region of interest"
             raise InputError(msg)
-        trees = self._trees  # other threads may ask for theirs
-        tree = next((one for one in trees if one[0] == source), None)
+        tree = self._trees.get(source)
         if tree is None:
             distances, predecessors = csgraph.dijkstra(
                 self._matrix,
@@ -255,9 +263,11 @@ class _PathFinder:
                 indices=np.asarray(self._local[source]),
                 return_predecessors=True,
             )
-            tree = source, distances, predecessors
-            self._trees = (tree, *trees[: _KEPT - 1])
-        return tree[1], tree[2]
+            tree = distances, predecessors
+            if len(self._trees) >= self._kept:
+                self._trees.pop(next(iter(list(self._trees)), -1), None)  # threads may be here
+            self._trees[source] = tree
+        return tree
 
     def _name(self, node: int) -> str:
         return f"node {node}"

@@ -17,7 +17,6 @@ from odscen.app.template_scenarios import template_scenario
 from odscen.app.variants import apply_edit
 from odscen.base.categories import Category
 from odscen.base.errors import InputError, NotFoundError
-from odscen.lanegraph.shortest_paths import Router
 from odscen.results.judging.criteria import criteria_problems
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
@@ -235,7 +234,7 @@ def path(name: str, spawn: str, goal: str, shared: Shared) -> Path:
         region = _region(shared, scenario)
         category = Category.PEDESTRIAN if start.walk else Category.CAR
         user = RoadUser("user", category, start.node, end.node, depart=0.0)
-        drivable = Router(graph, region.lanes & sumo.drivable)
+        drivable = region.router_over(sumo.drivable)
         ((_, path),) = each_path([user], region, drivable)
     found = path.tolist()
     nodes = region.nodes_of(start)

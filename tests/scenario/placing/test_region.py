@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from odscen.lanegraph.query import node_ids
 from odscen.scenario.placing import region as region_module
 from odscen.scenario.placing.region import Region
@@ -23,6 +25,19 @@ def test_scenarios_with_the_same_region_share_it_and_its_paths() -> None:
     assert Region.of(region.graph, ["r1"]) is not region
 
 
+def test_the_order_of_segments_makes_another_region_with_the_same_paths() -> None:
+    region = road()
+    other = Region.of(region.graph, ["r2", "r1"])
+    assert other.segments == ("r2", "r1")
+    assert other.router is region.router
+    assert Region.of(region.graph, ["r1"]).router is not region.router
+    mask = np.zeros(len(region.lanes), dtype=np.bool_)
+    mask[0] = True
+    assert region.router_over(mask) is other.router_over(mask)
+    assert region.router_over(mask).nodes.tolist() == [0]
+    assert region.router_over(~mask).nodes.tolist() == np.flatnonzero(~mask).tolist()
+
+
 def test_a_region_that_remembers_too_much_begins_anew_and_says_the_same(monkeypatch) -> None:
     region = road()
     first, *_, last = node_ids(region.graph)
@@ -33,4 +48,4 @@ def test_a_region_that_remembers_too_much_begins_anew_and_says_the_same(monkeypa
         region.look_up([(first, last), (last, first)])
         assert region.leads(*places)
         assert not region.leads(*places[::-1])
-    assert len(region._leads) == 2
+    assert len(region._ways.leads) == 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -40,6 +40,31 @@ _MOST = 200_000
 """Pairs of places that a region remembers; then it begins anew."""
 
 
+class _PathsInside:
+    """What is known of the ways inside a set of segments, in whatever order they are named."""
+
+    def __init__(self, graph: MapGraph, lanes: BoolArray, walks: BoolArray) -> None:
+        self.graph, self.lanes, self.walks = graph, lanes, walks
+        self.leads: dict[tuple[NodePlace, NodePlace], bool] = {}
+        self.candidates: dict[tuple[NodePlace, NodePlace], bool] = {}
+        self.places: dict[str, NodePlace | None] = {}
+        self._over: tuple[BoolArray, Router] | None = None
+
+    @cached_property
+    def router(self) -> Router:
+        return Router(self.graph, self.lanes)
+
+    @cached_property
+    def walk_router(self) -> WalkRouter:
+        return WalkRouter(self.graph, self.walks)
+
+    def over(self, mask: BoolArray) -> Router:
+        known = self._over  # other threads may ask for theirs
+        if known is None or known[0] is not mask:
+            known = self._over = (mask, Router(self.graph, self.lanes & mask))
+        return known[1]
+
+
 @dataclass(frozen=True)
 class Region:
     """The segments of a scenario that the map has, and their nodes.
@@ -58,25 +83,30 @@ class Region:
     segments: tuple[SegmentId, ...]
     lanes: BoolArray
     walks: BoolArray
+    _ways: _PathsInside = field(repr=False, compare=False)
 
     @classmethod
     def of(cls, graph: MapGraph, segments: Iterable[str]) -> Region:
         """The region of these segments; names that the map does not have are left out."""
         return _region(graph, tuple(segments))
 
-    @cached_property
+    @property
     def router(self) -> Router:
         """Paths on the lane graph inside the region."""
-        return Router(self.graph, self.lanes)
+        return self._ways.router
 
-    @cached_property
+    @property
     def walk_router(self) -> WalkRouter:
         """Paths on the pedestrian graph inside the region."""
-        return WalkRouter(self.graph, self.walks)
+        return self._ways.walk_router
+
+    def router_over(self, mask: BoolArray) -> Router:
+        """Paths inside the region over the nodes of a mask, shape ``(N,)``; the last is kept."""
+        return self._ways.over(mask)
 
     def place(self, node: str) -> NodePlace | None:
         """Where a node id leads on the map, inside the region or not; ``None`` if nowhere."""
-        known = self._places
+        known = self._ways.places
         if node not in known:
             if len(known) > _MOST:
                 known.clear()
@@ -101,17 +131,17 @@ class Region:
 
     def is_candidate(self, spawn: NodePlace, goal: NodePlace) -> bool:
         """Whether a goal that a path leads to is among the candidates of a spawn."""
-        known = self._candidates.get((spawn, goal))
+        known = self._ways.candidates.get((spawn, goal))
         if known is None:
             known = self.router_of(spawn).is_candidate(spawn.node, goal.node)
-            self._candidates[spawn, goal] = known
+            self._ways.candidates[spawn, goal] = known
         return known
 
     def leads(self, spawn: NodePlace, goal: NodePlace) -> bool:
         """Whether a path inside the region leads from ``spawn`` on to ``goal``."""
         if spawn.walk != goal.walk or spawn == goal or not self.holds(goal):
             return False
-        known = self._leads.get((spawn, goal))
+        known = self._ways.leads.get((spawn, goal))
         if known is None:
             known = bool(self.router_of(spawn).reachable(spawn.node)[goal.node])
         return known
@@ -127,32 +157,20 @@ class Region:
     def look_up(self, pairs: Iterable[tuple[str, str | None]]) -> None:
         """Find the paths between many spawns and goals at once, for :meth:`leads` to remember."""
         places = {(self.place(spawn), self.place(goal)) for spawn, goal in pairs if goal}
-        if len(self._leads) > _MOST:
-            self._leads.clear()
+        if len(self._ways.leads) > _MOST:
+            self._ways.leads.clear()
         for router, walk in ((self.router, False), (self.walk_router, True)):
             asked = [
                 (spawn, goal)
                 for spawn, goal in places
                 if spawn and goal and spawn.walk == goal.walk == walk
-                if (spawn, goal) not in self._leads
+                if (spawn, goal) not in self._ways.leads
                 if self.holds(spawn) and self.holds(goal)
             ]
             if asked:
                 nodes = np.array([(spawn.node, goal.node) for spawn, goal in asked])
                 found = router.leads(nodes[:, 0], nodes[:, 1]).tolist()
-                self._leads.update(zip(asked, found, strict=True))
-
-    @cached_property
-    def _places(self) -> dict[str, NodePlace | None]:
-        return {}
-
-    @cached_property
-    def _leads(self) -> dict[tuple[NodePlace, NodePlace], bool]:
-        return {}
-
-    @cached_property
-    def _candidates(self) -> dict[tuple[NodePlace, NodePlace], bool]:
-        return {}
+                self._ways.leads.update(zip(asked, found, strict=True))
 
     def segment_of(self, place: NodePlace) -> SegmentId:
         """Return the segment that a place lies in."""
@@ -164,8 +182,15 @@ def _region(graph: MapGraph, segments: tuple[str, ...]) -> Region:
     """One region for all scenarios of a batch that have it, with what is known of its paths."""
     known = set(graph.segments.ids)
     inside = tuple(SegmentId(name) for name in dict.fromkeys(segments) if name in known)
-    roi = induced(graph, inside)
-    return Region(graph, inside, roi.nodes, roi.walk_nodes)
+    ways = _ways(graph, frozenset(inside))
+    return Region(graph, inside, ways.lanes, ways.walks, ways)
+
+
+@lru_cache(maxsize=16)
+def _ways(graph: MapGraph, segments: frozenset[SegmentId]) -> _PathsInside:
+    """One for all regions of a batch with these segments."""
+    roi = induced(graph, sorted(segments))
+    return _PathsInside(graph, roi.nodes, roi.walk_nodes)
 
 
 def place_of(graph: MapGraph, node: str) -> NodePlace | None:

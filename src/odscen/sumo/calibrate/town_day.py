@@ -14,7 +14,6 @@ from scipy import sparse
 
 from odscen.base.errors import InputError
 from odscen.lanegraph.segments import segment_name
-from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.demand.count_stations import Passing, transitions
 from odscen.scenario.demand.day_profiles import DAY, Curve, known_profiles
 from odscen.scenario.document.scenario_document import Background, Demand
@@ -157,7 +156,7 @@ def _sampled(scenario: Scenario, sumo_map: SumoMap, mix: Mapping[Any, float]) ->
     sample = Background.model_validate({"id": "sample", "trips": SAMPLE, "mix": mix})
     drawn = scenario.model_copy(update={"demand": Demand(background=(sample,))})
     users, _ = all_road_users(drawn, sumo_map, region, until=DAY)
-    drivable = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
+    drivable = region.router_over(sumo_map.drivable)
     routes = sorted(each_passing(users, region, drivable, passing), key=lambda route: route[0].id)
     if not routes:
         msg = "no trips are possible on this map"

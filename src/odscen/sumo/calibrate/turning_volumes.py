@@ -10,7 +10,6 @@ import numpy as np
 
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.convert.model.net import CROSSED
-from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.driving import KINDS
 from odscen.sumo.realize.realization import all_road_users
@@ -74,7 +73,7 @@ def planned_vehicles(scenario: Scenario, sumo_map: SumoMap) -> Iterator[PlannedV
     region = Region.of(sumo_map.graph, scenario.roi)
     users, _ = all_road_users(scenario, sumo_map, region, until=scenario.simulation.duration)
     vehicles = [user for user in users if not user.person]
-    router = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
+    router = region.router_over(sumo_map.drivable)
     planner = RoutePlanner(sumo_map.graph.lanes, sumo_map.net, sumo_map.lane_places)
     for index, path in RoutesOfDemand(scenario, region, router).each_path(vehicles):
         user = vehicles[index]

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import Plan
 
 
-_SMALL = 1 << 20
+_SMALL = 32 << 20
 """Bytes."""
 
 

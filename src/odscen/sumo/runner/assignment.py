@@ -23,7 +23,6 @@ import numpy as np
 
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import SimulationError
-from odscen.lanegraph.shortest_paths import Router
 from odscen.results.records.assignment_steps import Assignment, AssignmentStep
 from odscen.results.records.run_records import EventKind, events_from_json
 from odscen.scenario.placing.region import Region
@@ -209,7 +208,7 @@ class _Search:
         self._network = TimedNetwork(sumo_map)
         self._closings = measure_actions(scenario, sumo_map, until=until).closings
         self._edges = EdgeSteps(self._lanes)
-        self._drivable = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
+        self._drivable = region.router_over(sumo_map.drivable)
         routes = RoutesOfDemand(scenario, region, self._drivable)
         self._trips = [user for user in users if routes.chooses(user) and not routes.shared(user)]
         found = dict(routes.each_path(self._trips))

@@ -7,6 +7,7 @@ import shutil
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -190,10 +191,15 @@ def make_summary(
     summary["files"] = found_files(folder)
     summary["versions"] = {
         "odscen": __version__,
-        "sumo": version("libsumo"),
+        "sumo": _sumo_version(),
         "python": ".".join(map(str, sys.version_info[:3])),
     }
     return summary
+
+
+@cache
+def _sumo_version() -> str:
+    return version("libsumo")
 
 
 def drop_torn_records(folder: Path) -> None:

@@ -98,15 +98,15 @@ def run_prepared(
             write_run_folder(prepared, folder)
             if simulate is None:
                 limit = prepared.settings.time_limit
-                many = is_one_of_many()
+                forked = (is_one_of_many() or is_ready()) and live is None
                 ended = run_worker(
                     folder,
                     progress=progress,
                     time_limit=limit,
                     live=live,
                     keep=(lock,),
-                    forked=(many or is_ready()) and live is None,
-                    tables=partial(make_tables, folder, prepared.plan) if many else None,
+                    forked=forked,
+                    tables=partial(make_tables, folder, prepared.plan) if forked else None,
                 )
             else:
                 ended = simulate(folder)

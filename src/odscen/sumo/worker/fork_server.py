@@ -14,6 +14,7 @@ The process ends when the socket is closed, or when it has had nothing to do for
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import json
 import os
@@ -27,17 +28,24 @@ from pathlib import Path
 from typing import Any, NoReturn, Self
 
 IDLE = 60.0
-"""Wall seconds without a run after which the process ends, for it holds 160 MB."""
+"""Wall seconds without a run after which the process ends, for it holds 110 MB."""
 MOST_DESCRIPTORS = 8
 _MOST_BYTES = 1 << 16
+_XERCES = "libxerces-c-3"
+_INITIALIZE = (
+    "_ZN11xercesc_3_216XMLPlatformUtils10InitializeEPKcS2_PNS_12PanicHandlerEPNS_13MemoryManagerE"
+)
+"""``xercesc::XMLPlatformUtils::Initialize(locale, home, handler, memory)``."""
 
 
 def main() -> None:
     """Import what simulations need, then fork one for each message."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.disable()  # what is imported stays
     _import_all()
     gc.collect()
     gc.freeze()  # forked processes need not go through it, nor copy it
+    gc.enable()
     with socket.socket(fileno=0) as control, _Children() as children:
         while children.wait(control):
             data, descriptors, *_ = socket.recv_fds(control, _MOST_BYTES, MOST_DESCRIPTORS)
@@ -47,16 +55,33 @@ def main() -> None:
 
 
 def _import_all() -> None:
-    # Polars first: its threads, which no fork has, are asleep when libsumo has been imported. What
-    # it computes with starts when it is first used, and it must not be used here.
+    # Not polars: what is here each fork has to be given, and tables are made elsewhere.
     import lxml.etree
-    import polars as pl
 
     from odscen.sumo.outputs import output_tables
     from odscen.sumo.worker import session, simulate
 
-    del lxml, pl, output_tables, simulate
+    del lxml, output_tables, simulate
     session.import_libsumo()
+    _ready_xerces()
+
+
+def _ready_xerces() -> bool:
+    """Have the XML reader that SUMO uses make its tables of characters, which are always the same.
+
+    Each fork would make them, which takes a tenth of a short simulation. It is SUMO's own first
+    call, and counted there: to make it again is nothing. Where its library is another one, or built
+    in, nothing is done, and the answer is false.
+    """
+    with suppress(OSError, AttributeError):
+        maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace")
+        paths = {line.split(maxsplit=5)[-1] for line in maps.splitlines() if _XERCES in line}
+        for path in paths:
+            initialize = getattr(ctypes.CDLL(path), _INITIALIZE)
+            initialize.argtypes, initialize.restype = [ctypes.c_char_p] * 4, None
+            initialize(b"en_US", None, None, None)  # what it is called with by default
+        return bool(paths)
+    return False
 
 
 class _Children:

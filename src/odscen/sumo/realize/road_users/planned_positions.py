@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import ScenarioError
-from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.rules_document import appearing_actors
 from odscen.sumo.realize.road_users.departures import road_users
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import FloatArray, Int32Array
     from odscen.base.categories import Body
+    from odscen.lanegraph.shortest_paths import Router
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser
@@ -160,7 +160,7 @@ def _paths(
     users: Sequence[RoadUser], bodies: Sequence[Body], sumo_map: SumoMap, region: Region
 ) -> list[Int32Array]:
     """Nodes of the route of each; empty where there is none."""
-    drivable = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
+    drivable = region.router_over(sumo_map.drivable)
     found: list[Int32Array] = [np.empty(0, dtype=np.int32)] * len(users)
     asked = list(range(len(users)))
     if len(users) >= GROUPED_FROM:

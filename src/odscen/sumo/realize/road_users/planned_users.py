@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.lanegraph.query import node_id, walk_node_id
-from odscen.lanegraph.shortest_paths import Router
 from odscen.results.records.run_records import PlannedActor
 from odscen.scenario.placing.region import turns_round
 from odscen.sumo.realize.driving import KINDS
@@ -86,7 +85,7 @@ class RoadUserWriter:
         self._signalled = {
             lane.edge for name in sources if (lane := sumo_map.net.lanes.get(name)) is not None
         }
-        self._drivable = Router(graph, region.lanes & sumo_map.drivable)
+        self._drivable = region.router_over(sumo_map.drivable)
         self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
         self._ways = RoutesOfDemand(scenario, region, self._drivable)
         self._period = scenario.demand.routes.period

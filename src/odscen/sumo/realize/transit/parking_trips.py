@@ -7,7 +7,6 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
-from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.demand.parked_trips import ParkableTrip, ParkingChoice
 from odscen.scenario.demand.trips import FIRST
 from odscen.sumo.realize.road_user import ParkingStay, appears_at
@@ -30,7 +29,7 @@ class ParkingOfTrips:
         demand = scenario.demand
         areas = [one.area for one in parking_positions(sumo_map, region.lanes).values()]
         lanes = region.graph.lanes
-        router = Router(region.graph, region.lanes & sumo_map.drivable)
+        router = region.router_over(sumo_map.drivable)
         self._choice = ParkingChoice(scenario, areas, lanes, router)
         self._unreached = sumo_map.parking.unreached
         inside = [area for area in sumo_map.parking.areas if region.lanes[area.node]]

@@ -1,0 +1,24 @@
+"""Modules that are imported when they are first used, not when another library names them."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+
+
+def import_when_used(*names: str) -> None:
+    """Put modules of packages where importers find them, to be loaded when they are first used.
+
+    SciPy names all of NumPy, among it what builds Fortran and what tests arrays: a fifth of what
+    SciPy takes to be imported. One that is there already, or is not installed, is left alone.
+    """
+    for name in names:
+        package, _, own = name.rpartition(".")
+        spec = None if name in sys.modules else importlib.util.find_spec(name)
+        if spec is None or spec.loader is None:
+            continue
+        spec.loader = importlib.util.LazyLoader(spec.loader)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        spec.loader.exec_module(module)
+        setattr(sys.modules[package], own, module)

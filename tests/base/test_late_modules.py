@@ -1,0 +1,17 @@
+"""Modules that wait until they are used."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+
+def test_paths_do_not_import_what_builds_fortran_and_it_is_there_when_used() -> None:
+    code = (
+        "import sys; import odscen.lanegraph.shortest_paths as s; import numpy as np;"
+        "print('numpy.f2py.f2py2e' in sys.modules, 'numpy.testing._private' in sys.modules);"
+        "np.testing.assert_allclose(1.0, 1.0); from numpy.testing import assert_array_equal;"
+        "print('numpy.testing._private' in sys.modules, s.csgraph.__name__)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False", "True", "scipy.sparse.csgraph"]
