@@ -47,7 +47,8 @@ class CheckedAction:
             raise InputError(msg)
         self.rows = np.flatnonzero(mask)
         kinds = np.broadcast_to(np.asarray(action.kind), (count,))
-        used = np.unique(kinds[mask]).tolist()
+        some = kinds[mask] if np.ndim(action.kind) else kinds[self.rows[:1]]
+        used = np.unique(some).tolist()
         if unknown := [kind for kind in used if kind not in {*DrivingKind}]:
             msg = f"there is no kind of action {unknown[0]!r}"
             raise InputError(msg)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,8 +29,10 @@ class SeenLights:
         self._road = road
         self._lights = sorted({light for light, _ in links.values()})
         self._sizes = [len(road.light_state(light)) for light in self._lights]
-        first = dict(zip(self._lights, np.cumsum([0, *self._sizes[:-1]]).tolist(), strict=False))
-        self._number = {key: first[light] + place for key, (light, place) in links.items()}
+        first = dict(zip(self._lights, accumulate(self._sizes, initial=0), strict=False))
+        self._number: dict[tuple[str, str], int] = {
+            key: first[light] + place for key, (light, place) in links.items()
+        }
 
     def number(self, lane: str, target: str) -> int:
         """Of the link from a lane to another; -1 without a light."""
