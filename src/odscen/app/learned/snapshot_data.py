@@ -60,6 +60,8 @@ SKIPPED = ".skipped.json"
 OFF_NODE = 2.5
 """Metres from the centre of a body to a node; vehicles farther from any are left out."""
 BRAKING_SECONDS = 2.0
+_FEW = 30
+"""Vehicles."""
 ATTEMPTS = 3
 """Runs that are tried until one does not gridlock, each with half the traffic of the last."""
 _HEADING = 4.0
@@ -83,7 +85,8 @@ class DataSettings:
     snapshots
         Of each run.
     stopped_most
-        Share of stopped vehicles in a snapshot above which its run counts as gridlocked.
+        Share of stopped vehicles in a snapshot above which its run counts as gridlocked; a jam
+        that grows is none of traffic's ordinary states.
     """
 
     runs: int = 6
@@ -273,11 +276,18 @@ def _judged(
     each = span / settings.snapshots
     times = settings.warm_up + each * (np.arange(settings.snapshots) + rng.random())
     snapshots = snapshots_of(run, loaded, [round(float(2 * one)) / 2 for one in times])
-    speeds = np.concatenate([one.speed for one in snapshots])
-    stopped = float(np.mean(speeds < STOPPED)) if len(speeds) else 0.0
+    stopped = _stopped(snapshots)
     if stopped > settings.stopped_most:
         return f"gridlocked: {stopped:.0%} of the vehicles are stopped", ()
     return None, snapshots
+
+
+def _stopped(snapshots: Sequence[Snapshot]) -> float:
+    """Largest share of stopped vehicles; snapshots of few count together: a light stops them."""
+    few = [one.speed for one in snapshots if len(one.speed) < _FEW]
+    many = [one.speed for one in snapshots if len(one.speed) >= _FEW]
+    groups = [*many, np.concatenate([np.empty(0), *few])]
+    return max((float(np.mean(one < STOPPED)) for one in groups if len(one)), default=0.0)
 
 
 def snapshots_of(run: Run, loaded: LoadedMap, times: Sequence[float]) -> tuple[Snapshot, ...]:

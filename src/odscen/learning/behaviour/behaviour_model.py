@@ -96,9 +96,11 @@ class BehaviourScene:
     lane_shape_y: FloatArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class RoadObservation:
     """The ``N`` vehicles on the road before a step; arrays of shape ``(N,)``, but ``ahead``.
+
+    In a run a field is read from the simulation when a model first looks at it.
 
     Attributes
     ----------

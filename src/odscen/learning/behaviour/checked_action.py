@@ -29,7 +29,7 @@ class CheckedAction:
     rows
         Of those that it controls.
     kind, speed, change
-        Lists with a value for each vehicle; speed and change ``None`` if it does not use them.
+        A value for each vehicle; speed and change ``None`` if it does not use them.
     real, whole
         The other fields that it uses, by name; values of those that it does not control mean
         nothing.
@@ -47,18 +47,19 @@ class CheckedAction:
             raise InputError(msg)
         self.rows = np.flatnonzero(mask)
         kinds = np.broadcast_to(np.asarray(action.kind), (count,))
-        used = np.unique(kinds[mask]).tolist()
+        some = kinds[mask] if np.ndim(action.kind) else kinds[self.rows[:1]]
+        used = np.unique(some).tolist()
         if unknown := [kind for kind in used if kind not in {*DrivingKind}]:
             msg = f"there is no kind of action {unknown[0]!r}"
             raise InputError(msg)
-        self.kind = kinds.tolist()
+        self.kind = kinds
         self.real = {
             name: self._numbers(action, name, count)
             for name in ("speed", "pos", "x", "y", "hdg")
             if getattr(action, name) is not None
         }
         self.whole = {
-            name: self._numbers(action, name, count).astype(np.int64).tolist()
+            name: self._numbers(action, name, count).astype(np.int64)
             for name in ("lane", "change")
             if getattr(action, name) is not None
         }
@@ -74,7 +75,7 @@ class CheckedAction:
                 bad = low if low < 0.0 else high
                 msg = f"a speed of {bad:g} m/s is not between 0 and {_FASTEST:g}"
                 raise InputError(msg)
-        self.speed = None if speed is None else speed.tolist()
+        self.speed = speed
         self.change = self.whole.get("change")
 
     def _numbers(self, action: DrivingAction, name: str, count: int) -> Array:

@@ -52,21 +52,27 @@ class LaneOrder:
 
     def leaders(self, ahead: Int32Array, lane_length: FloatArray) -> tuple[Int32Array, FloatArray]:
         """Leader of each vehicle and the gap to it, on its lane or on lanes ahead ``(N, K)``."""
-        count = len(self._lane)
-        place = np.empty(count, dtype=np.int64)
-        place[self._rows] = np.arange(1, count + 1)
-        row, gap = self._taken(place, self._lane, self._pos)
-        rest = np.where(self._lane >= 0, lane_length[self._lane] - self._pos, 0.0)
-        zero = np.zeros(count)
-        for column in ahead.T:
-            open_ = (row < 0) & (column >= 0)
-            if not open_.any():
-                break
-            found, more = self.ahead(column[open_], zero[open_])
-            row[open_] = found
-            gap[open_] = more + rest[open_]
-            rest += np.where(column >= 0, lane_length[column], 0.0)
-        return row.astype(np.int32), gap
+        lane, rows = self._lane, self._rows
+        ordered = lane[rows]
+        follows = ordered[:-1] == ordered[1:]
+        nearest = np.full(len(rows), -1, dtype=np.int64)
+        nearest[rows[:-1][follows]] = rows[1:][follows]
+        hindmost = np.full(len(lane_length) + 1, -1, dtype=np.int64)
+        heads = np.append(True, ~follows)[: len(rows)]
+        hindmost[ordered[heads]] = rows[heads]
+        hindmost[-1] = -1  # of no lane
+        nearest[lane < 0] = -1
+        # Columns: the lane that it is on, and those ahead.
+        found = np.column_stack([nearest, hindmost[ahead]])
+        lengths = np.append(lane_length, 0.0)
+        rest = np.where(lane >= 0, lengths[lane] - self._pos, 0.0)
+        metres = np.cumsum(np.column_stack([rest, lengths[ahead[:, :-1]]]), axis=1)
+        each = np.arange(len(lane))
+        column = (found >= 0).argmax(axis=1)
+        leader = found[each, column]
+        gap = self._pos[leader] - self._length[leader]
+        gap += np.where(column > 0, metres[each, column - 1], -self._pos)
+        return leader.astype(np.int32), np.where(leader >= 0, gap, np.inf)
 
     def _taken(self, place: IntArray, lane: Array, pos: FloatArray) -> tuple[IntArray, FloatArray]:
         inside = (place < len(self._rows)) & (lane >= 0)

@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from odscen.learning.traffic_snapshots import LightView
 
 WEIGHTS = "reference_model.npz"
-PASSES = 6
-CLOSE_ENOUGH = 0.03
-"""Share of the vehicles wanted by which a pass may miss their number."""
-DECELERATION = 3.0
-"""m/s², at which a vehicle can stop at a red light."""
+PASSES = 10
+MORE = 1.05
+"""Share of the vehicles wanted that a pass may place at most; those too many are taken away."""
+SHARPNESS = 2.0
+"""Power of the shares of speeds of those who move: what is rare is often what nobody drives."""
 GAP = 0.7
 """Metres between bodies, at least."""
 _FACTOR = (1.0, 0.1, 0.75, 1.2)
@@ -134,13 +134,20 @@ def place_traffic(
     bias, best = 0.0, NOBODY
     for _ in range(PASSES if wanted else 0):
         found = draw.traffic(bias, rng)
-        if abs(len(found.node) - wanted) < abs(len(best.node) - wanted):
+        if _missing(found, wanted) < _missing(best, wanted):
             best = found
-        if abs(len(found.node) - wanted) <= CLOSE_ENOUGH * wanted:
+        if wanted <= len(found.node) <= MORE * wanted + 1.0:
             break
-        bias += float(np.clip(1.2 * np.log((wanted + 0.5) / (len(found.node) + 0.5)), -2.0, 2.0))
+        aim = (1.0 + MORE) / 2.0 * wanted
+        bias += float(np.clip(1.2 * np.log((aim + 0.5) / (len(found.node) + 0.5)), -2.0, 2.0))
     keep = np.sort(rng.permutation(len(best.node))[:wanted])
     return PlacedTraffic(best.node[keep], best.category[keep], best.speed[keep])
+
+
+def _missing(found: PlacedTraffic, wanted: int) -> float:
+    """How far a pass is from the number wanted: too few cannot be mended, too many can."""
+    more = len(found.node) - wanted
+    return -3.0 * more if more < 0 else more
 
 
 class _Draw(NamedTuple):
@@ -189,7 +196,7 @@ class _Draw(NamedTuple):
         some = shares.sum(axis=1) > 0
         nodes, x, limit, shares = nodes[some], x[some], limit[some], shares[some]
         category = _drawn(shares, rng)
-        odds = softmax(self.model.speed(with_category(x, category)))
+        odds = _sharpened(softmax(self.model.speed(with_category(x, category))))
         speed = speed_within(_drawn(odds, rng), limit, rng.random(len(nodes)))
         most = np.minimum(self._stoppable(nodes, category), self._safe(nodes, category, states))
         return PlacedTraffic(nodes, category, np.minimum(speed, most))
@@ -202,11 +209,19 @@ class _Draw(NamedTuple):
         return np.where(leader >= 0.0, safe, np.inf)
 
     def _stoppable(self, nodes: IntArray, category: IntArray) -> FloatArray:
-        """Highest speed from which one can stop at a red light, m/s."""
+        """Krauss's safe speed before a red light, m/s: that at which SUMO's drivers approach it."""
         root = self.site.strips.root[nodes]
         red = self.lights.state[self.site.lane[root]] == SignalAhead.RED
-        metres = np.maximum(self.site.strips.to_end[nodes] - self.lengths[category] / 2.0, 0.0)
-        return np.where(red, np.sqrt(2.0 * DECELERATION * metres), np.inf)
+        metres = self.site.strips.to_end[nodes] - self.lengths[category] / 2.0
+        return np.where(red, safe_speed(metres, 0.0), np.inf)
+
+
+def _sharpened(odds: FloatArray) -> FloatArray:
+    """Raise the shares of speeds to a power, but for the share of those who are stopped."""
+    moving = odds[:, 1:] ** SHARPNESS
+    total = np.maximum(moving.sum(axis=1, keepdims=True), 1e-12)
+    found: FloatArray = np.column_stack([odds[:, 0], moving / total * (1.0 - odds[:, :1])])
+    return found
 
 
 def _drawn(shares: FloatArray, rng: np.random.Generator) -> IntArray:

@@ -177,7 +177,8 @@ def _ends(lanes: LaneGraph, strips: Strips, flow: FloatArray) -> list[FloatArray
     """What comes at the last node of each strip, for all nodes; shapes ``(N,)``.
 
     Whether a junction follows, the sharpest and least turns there, whether several ways lead on,
-    and the share of this road in all the traffic that comes together behind it.
+    the share of this road in the busiest that comes into the junction, how much traffic the others
+    bring, and on how many lanes all of it comes.
     """
     count = len(lanes.x)
     follows = lanes.relation == Relation.SUCCESSOR
@@ -200,7 +201,19 @@ def _ends(lanes: LaneGraph, strips: Strips, flow: FloatArray) -> list[FloatArray
     np.maximum.at(busiest, at[held], flow[held])
     share = np.where(held, flow / np.maximum(busiest[np.maximum(at, 0)], 1e-9), 1.0)
     least = np.where(ways > 0, least, 0.0)
-    return [held.astype(np.float64), most / np.pi, least / np.pi, np.minimum(ways, 4) / 4, share]
+    total = np.bincount(at[held], weights=flow[held], minlength=len(busiest))
+    lanes_in = np.bincount(at[held], minlength=len(busiest))
+    others = np.where(held, np.maximum(total[np.maximum(at, 0)] - flow, 0.0), 0.0)
+    many = np.where(held, lanes_in[np.maximum(at, 0)], 0)
+    return [
+        held.astype(np.float64),
+        most / np.pi,
+        least / np.pi,
+        np.minimum(ways, 4) / 4,
+        share,
+        np.log(0.1 + others) / 2.0,
+        np.minimum(many, 12) / 12,
+    ]
 
 
 def _numbered(names: tuple[str | None, ...]) -> list[tuple[str | None, int]]:

@@ -61,3 +61,20 @@ class Wrong(Nobody):
             DrivingKind.LANE_POSITION, lane=np.full(count, 10**6), pos=np.zeros(count)
         )
         return place, np.ones(count, dtype=bool)
+
+
+class Keeper(Nobody):
+    """Looks at what it was shown a step ago, and every second time only."""
+
+    def __init__(self) -> None:
+        self.kept: Any = None
+
+    def act(self, seen: Any, state: Any) -> tuple[DrivingAction, Any]:
+        before, self.kept = self.kept, seen
+        if before is not None and round(seen.time / state.step_length) % 2:
+            moved = seen.pos[seen.index == 0] - before.pos[before.index == 0]
+            slow = 0.5 * (seen.speed[seen.index == 0] + before.speed[before.index == 0])
+            if (seen.lane == before.lane).all() and (abs(moved) < 0.1 * slow).any():
+                msg = f"it was shown {before.time:g} s and sees {seen.time:g} s"
+                raise ValueError(msg)
+        return DrivingAction(speed=np.zeros(len(seen))), np.zeros(len(seen), dtype=bool)

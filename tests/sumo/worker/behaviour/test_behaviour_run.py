@@ -70,6 +70,11 @@ def test_a_model_that_controls_nobody_leaves_every_byte_as_it_is(tmp_path: Path)
         assert (tmp_path / "plain" / name).read_bytes() == (run.folder / name).read_bytes(), name
 
 
+def test_an_observation_that_is_kept_holds_what_it_showed(tmp_path: Path) -> None:
+    run = driven(tmp_path / "kept", name=f"{HERE}:Keeper")
+    assert run.status == "completed", run.summary["error"]
+
+
 def test_the_same_seed_gives_the_same_bytes_and_idm_drives(tmp_path: Path) -> None:
     options = {"spread": 0.1, "headway": 3.0}
     one, two = (driven(tmp_path / n, name="idm", options=options) for n in "ab")

@@ -3,34 +3,36 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from operator import ne
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.learning.behaviour.behaviour_model import (
     AHEAD,
     BehaviourScene,
-    LightAhead,
-    RoadObservation,
 )
 from odscen.learning.behaviour.lane_order import LaneOrder
+from odscen.sumo.worker.behaviour.lazy_observation import LazyObservation
+from odscen.sumo.worker.behaviour.seen_lights import SeenLights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.base.arrays import Int32Array
+    from odscen.base.arrays import FloatArray, Int32Array
+    from odscen.learning.behaviour.behaviour_model import RoadObservation
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.driven_vehicles import DrivenVehicles, LaneFacts
 
-_LETTERS = {
-    **dict.fromkeys("gG", LightAhead.GREEN), **dict.fromkeys("yYu", LightAhead.YELLOW),
-    **dict.fromkeys("rs", LightAhead.RED),
+_GETTERS = {
+    "speed": "Speed", "acceleration": "Acceleration", "pos": "LanePosition",
+    "left": "LateralLanePosition",
 }  # fmt: skip
-"""What letters of SUMO's lights mean; others (off, blinking) are no light."""
+"""Fields that are a number of SUMO's."""
 
 
 class RoadSight:
-    """Sees it. Lane, leader, and what is ahead are looked up anew where a vehicle changes lanes."""
+    """Sees it. What is ahead is looked up anew where a vehicle changes lanes."""
 
     def __init__(self, road: DrivenVehicles, plan: Plan, time: float) -> None:
         self._road = road
@@ -42,66 +44,110 @@ class RoadSight:
         self._lane_row = {lane.id: row for row, lane in enumerate(lanes)}
         self.scene = self._scene(lanes, plan, time)
         self._inside = frozenset(via for lane in lanes for _, via in lane.links if via)
-        self._lights = road.light_links()
+        self._lights = SeenLights(road)
         count = len(self._vehicles)
-        self._known: list[str | None] = [None] * count
         self._ahead = np.full((count, AHEAD), -1, dtype=np.int32)
         self._can = np.zeros((count, 2), dtype=np.bool_)
-        self._link: list[tuple[str, int] | None] = [None] * count
+        self._link = np.full(count, -1, dtype=np.int64)
+        self._lane = np.full(count, -1, dtype=np.int32)
+        self._lane_ids: list[str | None] = [None] * count
+        self._route_index = [-1] * count
+        self._moved: dict[int, str] = {}
+        """Rows and ids of vehicles that have come to another lane."""
         self._paths: dict[tuple[str, tuple[str, ...], str], tuple[list[int], bool, bool, str]] = {}
+        self._names: list[str] = []
+        self._index = np.empty(0, dtype=np.int32)
+        self._rows: list[int] = []
+        self._before: tuple[list[str], list[str]] = [], []
+        self._steps = 0
+        self._read_at = 0
+        """Number of the step in which lanes were read last."""
 
-    def look(self, time: float) -> tuple[RoadObservation, list[str]]:
-        """Everyone on the road, and their ids."""
-        seen = self._road.traffic(self._row)
-        rows = [self._row[name] for name in seen.names]
-        for name, row, lane in zip(seen.names, rows, seen.lane, strict=True):
-            if self._known[row] != lane:
-                self._known[row] = lane
-                self._look_ahead(name, row, lane)
-        index = np.array(rows, dtype=np.int32)
-        lanes = np.array([self._lane_row.get(lane, -1) for lane in seen.lane], dtype=np.int32)
-        length = self.scene.vehicle_length[index]
-        hdg = np.radians(90.0 - seen.angle_deg)
-        ahead, can = self._ahead[index], self._can[index]
-        leader, gap = LaneOrder(lanes, seen.pos, length).leaders(ahead, self.scene.lane_length)
-        observation = RoadObservation(
-            time=time,
-            index=index,
-            x=seen.x - 0.5 * length * np.cos(hdg) - self._offset[0],
-            y=seen.y - 0.5 * length * np.sin(hdg) - self._offset[1],
-            hdg=np.arctan2(np.sin(hdg), np.cos(hdg)),
-            speed=seen.speed,
-            acceleration=seen.acceleration,
-            lane=lanes,
-            pos=seen.pos,
-            left=seen.left,
-            leader=leader,
-            gap=gap,
-            ahead=ahead,
-            can_left=can[:, 0],
-            can_right=can[:, 1],
-            light=self._lights_ahead(rows),
-        )
-        return observation, seen.names
+    def look(self, time: float) -> tuple[LazyObservation, list[str]]:
+        """Everyone on the road, and their ids; the same list where nobody has come or gone."""
+        self._steps += 1
+        names = self._road.present(self._row)
+        if names is not self._names:
+            self._names = names
+            self._rows = [self._row[name] for name in names]
+            self._index = np.array(self._rows, dtype=np.int32)
+        return LazyObservation(time, self._index.copy(), self._read), names
 
-    def _lights_ahead(self, rows: Sequence[int]) -> Int32Array:
-        links = [self._link[row] for row in rows]
-        states = {
-            light: self._road.light_state(light)
-            for light in {link[0] for link in links if link is not None}
+    def _read(self, field: str, seen: RoadObservation) -> dict[str, Any]:
+        """Read a field of this step, and those that come with it."""
+        if field in _GETTERS:
+            return {field: self._road.numbers(_GETTERS[field], self._names)}
+        if field in ("x", "y", "hdg"):
+            return self._bodies()
+        if field == "lane":
+            return {"lane": self._lanes_now()}
+        if field in ("leader", "gap"):
+            length = self.scene.vehicle_length[self._index]
+            order = LaneOrder(seen.lane, seen.pos, length)
+            leader, gap = order.leaders(self._ways(), self.scene.lane_length)
+            return {"leader": leader, "gap": gap}
+        if field == "light":
+            self._ways()
+            return {"light": self._lights.ahead(self._link[self._index])}
+        ahead, can = self._ways(), self._can[self._index]
+        return {"ahead": ahead, "can_left": can[:, 0], "can_right": can[:, 1]}
+
+    def _bodies(self) -> dict[str, FloatArray]:
+        """Centres of bodies, from the middle of their fronts."""
+        x, y = self._road.fronts(self._names)
+        half = 0.5 * self.scene.vehicle_length[self._index]
+        hdg = np.radians(90.0 - self._road.numbers("Angle", self._names))
+        return {
+            "x": x - half * np.cos(hdg) - self._offset[0],
+            "y": y - half * np.sin(hdg) - self._offset[1],
+            "hdg": np.arctan2(np.sin(hdg), np.cos(hdg)),
         }
-        shown = [
-            LightAhead.NONE
-            if link is None
-            else _LETTERS.get(states[link[0]][link[1]], LightAhead.NONE)
-            for link in links
-        ]
-        return np.array(shown, dtype=np.int32)
+
+    def _lanes_now(self) -> Int32Array:
+        """Row of the lane of each vehicle on the road."""
+        if self._read_at != self._steps:
+            names, rows = self._names, self._rows
+            lanes = self._road.lanes_of(names)
+            if names is self._before[0]:
+                other = np.fromiter(map(ne, lanes, self._before[1]), np.bool_, len(lanes))
+                places = np.flatnonzero(other).tolist()
+            else:
+                known = self._lane_ids
+                places = [k for k, row in enumerate(rows) if known[row] != lanes[k]]
+            for place in places:
+                row, lane = rows[place], lanes[place]
+                self._lane[row] = self._lane_row.get(lane, -1)
+                self._lane_ids[row] = lane
+                self._moved[row] = names[place]
+            if self._read_at != self._steps - 1:
+                self._look_for_rings()
+            self._before, self._read_at = (names, lanes), self._steps
+        found: Int32Array = self._lane[self._index]
+        return found
+
+    def _look_for_rings(self) -> None:
+        """Find who is on the same lane as when it was last looked at, but was elsewhere."""
+        for row, name in zip(self._rows, self._names, strict=True):
+            if self._route_index[row] != self._road.route_index(name):
+                self._moved[row] = name
+
+    def _ways(self) -> Int32Array:
+        """Bring what is ahead of vehicles up to date; rows of lanes ``(N, AHEAD)``."""
+        self._lanes_now()
+        if self._moved:
+            present = set(self._rows)
+            for row, name in self._moved.items():
+                if row in present:
+                    self._route_index[row] = self._road.route_index(name)
+                    self._look_ahead(name, row, str(self._lane_ids[row]))
+            self._moved.clear()
+        found: Int32Array = self._ahead[self._index]
+        return found
 
     def _look_ahead(self, name: str, row: int, lane: str) -> None:
         """Find where a vehicle goes from a lane that it has just come to."""
         if lane not in self._lanes:
-            self._ahead[row], self._can[row], self._link[row] = -1, False, None
+            self._ahead[row], self._can[row], self._link[row] = -1, False, -1
             return
         edges, kind = self._road.coming_edges(name), self._road.vehicle_class(name)
         key = lane, edges[: AHEAD + 1], kind
@@ -110,7 +156,7 @@ class RoadSight:
         path, left, right, target = self._paths[key]
         self._ahead[row] = path
         self._can[row] = left, right
-        self._link[row] = self._lights.get((lane, target))
+        self._link[row] = self._lights.number(lane, target)
 
     def _path(
         self, lane: str, edges: tuple[str, ...], kind: str
