@@ -163,6 +163,26 @@ def test_who_departs_later_and_what_begins_with_another_rule_come_back(tmp_path:
         assert after.actors == before.actors
 
 
+def test_a_rest_at_the_end_of_a_path_and_an_offset_by_nothing_come_back(tmp_path: Path) -> None:
+    goal, spawn = (node_at("town_5x5", x, 103.4) for x in (390.0, 215.0))
+    actors = [
+        {"id": "ego", "category": "car", "spawn": spawn, "goal": goal, "initial_speed": 8.0},
+        {"id": "van", "category": "van", "spawn": node_at("town_5x5", 240.0, 103.4), "goal": goal},
+    ]
+    path = {"points": [[230.0, 103.4], [250.0, 103.4], [250.0, 103.4]], "times": [2.0, 4.0, 6.0]}
+    rules = [
+        {"id": "rests", "actor": "ego", "when": {"time": {"after": 0.0}}, "then": [{"path": path}]},
+        {"id": "beside", "actor": "van", "when": {"time": {"after": 1.0}}, "then": [
+            {"appear": {"at": [262.0, 105.0, 0.0], "speed": 5.0}},
+            {"offset": {"to": 1.5, "over": 0.1}},
+            {"offset": {"to": 1.5, "over": 4.0}},
+        ]},
+    ]  # fmt: skip
+    before = document("town_5x5", actors, rules, flows=[])
+    after, _ = there_and_back(before, tmp_path, "1.2")
+    assert acting_differences(before, after) == ()
+
+
 def test_what_is_changed_in_the_file_holds_and_not_the_property(tmp_path: Path) -> None:
     entry("motorway_weave")
     before = template_scenario(workspace(), "cut-in", "motorway_weave")

@@ -109,3 +109,13 @@ def test_what_acts_is_told_with_its_place() -> None:
     slow, on = BEFORE["rules"]
     faster = slow | {"then": [{"speed": {"to": 5.0, "rate": 2.0}}]}
     assert places({}, {"rules": [faster, on]}) == [("rules", "slow", "then", "0", "speed", "to")]
+
+
+def test_who_appears_at_the_place_where_it_is_placed_appears_there() -> None:
+    at = {"appear": {"at": [3.0, -1.75, 0.0], "speed": 0.0}}
+    old, new = (
+        Scenario.model_validate(BEFORE | when({"time": {"after": 0.0}}, then=[then]))
+        for then in (at, {"appear": {}})
+    )
+    assert len(acting_differences(old, new)) == 1
+    assert acting_differences(old, new, placed={"van": (3.0, -1.75, 0.0)}) == ()

@@ -41,7 +41,8 @@ def acting_differences(
         Where the centres of actors are placed, by id: x and y (m) and heading (rad). An actor that
         appears ``at`` that place appears where it is placed.
     """
-    old, new = (_plain(one, _rounded(dict(placed or {}))) for one in (before, after))
+    at = {name: _rounded(list(pose)) for name, pose in (placed or {}).items()}
+    old, new = (_plain(one, at) for one in (before, after))
     old["rules"] = {rule["id"]: _rule(rule, old, {}) for rule in old["rules"]}
     new["rules"] = _renamed(new, old["rules"])
     return tuple(field_differences(old, new))
