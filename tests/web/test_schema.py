@@ -82,6 +82,7 @@ def test_the_server_keeps_to_its_schema(
         "name": f"{CROSSING}-0001",
         "run": "x-1",
         "sweep": "x-1",
+        "study": "rain",
         "case": "case-001",
         "job": "job-1",
         "junction": light,
