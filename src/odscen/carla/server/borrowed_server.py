@@ -216,6 +216,11 @@ class BorrowedServer:
         stamp = self._world.get_snapshot().timestamp
         return float(stamp.elapsed_seconds), float(stamp.delta_seconds)
 
+    def own_time(self) -> float | None:
+        """Simulated seconds after our last tick; ``None`` if there is none, or a newer state."""
+        snapshot = self._world.get_snapshot()
+        return float(snapshot.timestamp.elapsed_seconds) if snapshot.frame == self._frame else None
+
     def first_clock(self) -> tuple[float, float]:
         """As :meth:`clock`, behind a call that is answered: a recording then has when this was."""
         with self._answering():
