@@ -13,7 +13,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from odscen.interchange.openscenario_import.read_actions import IGNORED
+from odscen.interchange.openscenario_import.story.read_actions import IGNORED
 
 ROOT: Final = Path(__file__).parents[1]
 LIST: Final = Path(__file__).with_name("openscenario_elements.txt")
@@ -119,7 +119,7 @@ def named_in(*folders: Path) -> frozenset[str]:
     """Names that stand in the texts of Python sources, but not in words for people."""
     found: set[str] = set()
     for folder in folders:
-        for file in sorted(folder.glob("*.py")) if folder.is_dir() else [folder]:
+        for file in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder]:
             for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
                 text = node.value if isinstance(node, ast.Constant) else None
                 if isinstance(text, str) and not re.search(r"\s", text):

@@ -14,8 +14,8 @@ from odscen.base.errors import InputError, NoMapError, NotFoundError
 from odscen.base.text_files import write_text
 from odscen.interchange.openscenario.xosc_signals import movement_of
 from odscen.interchange.openscenario_import.import_report import ImportReport
-from odscen.interchange.openscenario_import.read_distributions import read_distribution
-from odscen.interchange.openscenario_import.resolved_tree import TreeResolver
+from odscen.interchange.openscenario_import.source.read_distributions import read_distribution
+from odscen.interchange.openscenario_import.source.resolved_tree import TreeResolver
 from odscen.interchange.openscenario_import.xosc_reader import (
     MaplessSource,
     XoscSource,

@@ -6,19 +6,19 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from odscen.base.categories import DEFAULT_BODY, Category
-from odscen.interchange.openscenario_import.entity_selections import name_entities
-from odscen.interchange.openscenario_import.kept_parameters import with_parameters
-from odscen.interchange.openscenario_import.own_files import is_own
-from odscen.interchange.openscenario_import.read_actions import ActionReader
-from odscen.interchange.openscenario_import.read_conditions import ConditionReader
-from odscen.interchange.openscenario_import.read_entities import read_entities
-from odscen.interchange.openscenario_import.read_environment import read_environment
-from odscen.interchange.openscenario_import.read_init import InitReader
-from odscen.interchange.openscenario_import.read_positions import Nowhere, PositionReader
-from odscen.interchange.openscenario_import.read_signals import SignalReader
-from odscen.interchange.openscenario_import.read_storyboard import StoryReader
-from odscen.interchange.openscenario_import.read_trajectories import trajectory_place
-from odscen.interchange.openscenario_import.value_changes import first_values
+from odscen.interchange.openscenario_import.places.read_positions import Nowhere, PositionReader
+from odscen.interchange.openscenario_import.places.read_trajectories import trajectory_place
+from odscen.interchange.openscenario_import.source.entity_selections import name_entities
+from odscen.interchange.openscenario_import.source.kept_parameters import with_parameters
+from odscen.interchange.openscenario_import.source.own_files import is_own
+from odscen.interchange.openscenario_import.start.read_init import InitReader
+from odscen.interchange.openscenario_import.story.read_actions import ActionReader
+from odscen.interchange.openscenario_import.story.read_conditions import ConditionReader
+from odscen.interchange.openscenario_import.story.read_signals import SignalReader
+from odscen.interchange.openscenario_import.story.read_storyboard import StoryReader
+from odscen.interchange.openscenario_import.story.value_changes import first_values
+from odscen.interchange.openscenario_import.world.read_entities import read_entities
+from odscen.interchange.openscenario_import.world.read_environment import read_environment
 from odscen.lanegraph.query import largest_part
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.templates.scene_actors import STEADY, STEADY_DRIVER
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_entities import ReadEntity
-    from odscen.interchange.openscenario_import.read_environment import ReadEnvironment
+    from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.world.read_environment import ReadEnvironment
     from odscen.lanegraph.graphs import MapGraph
 
 EgoDriver = Literal["sumo", "story"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import DEFAULT_BODY, Category
-from odscen.interchange.openscenario_import.own_files import is_own, own_fields
+from odscen.interchange.openscenario_import.source.own_files import is_own, own_fields
 
 if TYPE_CHECKING:
     from lxml.etree import _Element

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.map_points import MapPoint
-from odscen.interchange.openscenario_import.read_motions import put_there
+from odscen.interchange.openscenario_import.places.map_points import MapPoint
+from odscen.interchange.openscenario_import.story.read_motions import put_there
 from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.lanegraph.shortest_paths import reachable
 
 if TYPE_CHECKING:
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_entities import ReadEntity
-    from odscen.interchange.openscenario_import.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.places.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
 
 _BESIDE: Final = 10.0
 """Metres that an actor can be beside its lane."""

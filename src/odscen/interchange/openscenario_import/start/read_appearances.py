@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.read_trajectories import read_trajectory
+from odscen.interchange.openscenario_import.places.read_trajectories import read_trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.map_points import MapPoint
-    from odscen.interchange.openscenario_import.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.places.map_points import MapPoint
+    from odscen.interchange.openscenario_import.places.read_positions import PositionReader
 
 
 @dataclass(slots=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.own_files import without_repeats
-from odscen.interchange.openscenario_import.read_environment import clock_of
+from odscen.interchange.openscenario_import.source.own_files import without_repeats
+from odscen.interchange.openscenario_import.world.read_environment import clock_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_entities import ReadEntity
-    from odscen.interchange.openscenario_import.read_environment import ReadEnvironment
-    from odscen.interchange.openscenario_import.read_positions import PositionReader
-    from odscen.interchange.openscenario_import.read_signals import SignalReader
+    from odscen.interchange.openscenario_import.places.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.story.read_signals import SignalReader
+    from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.world.read_environment import ReadEnvironment
 
 Made = dict[str, Any]
 ALWAYS: Final[Made] = {"time": {"after": 0.0}}

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.map_points import MapPoint, MovingFrame
-from odscen.interchange.openscenario_import.read_trajectories import read_trajectory
+from odscen.interchange.openscenario_import.places.map_points import MapPoint, MovingFrame
+from odscen.interchange.openscenario_import.places.read_trajectories import read_trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Container
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_conditions import ConditionReader
-    from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.story.read_conditions import ConditionReader
+    from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
 
 Made = dict[str, Any]
 JUMP: Final = 0.1

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.map_points import MapPoint
+from odscen.interchange.openscenario_import.places.map_points import MapPoint
 from odscen.opendrive.geometry import PlanView
 from odscen.opendrive.road_model import Geometry, GeometryKind
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.places.read_positions import PositionReader
 
 _STEP: Final = 1.0
 """Metres between the points of a curve at most."""

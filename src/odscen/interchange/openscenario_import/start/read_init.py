@@ -6,20 +6,20 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
-from odscen.interchange.openscenario_import.actor_places import ActorPlaces
-from odscen.interchange.openscenario_import.global_actions import tell_unread
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.map_points import MapPoint
-from odscen.interchange.openscenario_import.read_appearances import AppearanceReader
+from odscen.interchange.openscenario_import.places.map_points import MapPoint
+from odscen.interchange.openscenario_import.start.actor_places import ActorPlaces
+from odscen.interchange.openscenario_import.start.read_appearances import AppearanceReader
+from odscen.interchange.openscenario_import.story.global_actions import tell_unread
 from odscen.scenario.templates.scene_actors import STEADY
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_entities import ReadEntity
-    from odscen.interchange.openscenario_import.read_positions import PositionReader
-    from odscen.interchange.openscenario_import.read_storyboard import StoryReader
+    from odscen.interchange.openscenario_import.places.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.story.read_storyboard import StoryReader
+    from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
 
 _SAME_PLACE: Final = 0.05
 _SAME_SPEED: Final = 1e-4

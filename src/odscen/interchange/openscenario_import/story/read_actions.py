@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.read_motions import (
+from odscen.interchange.openscenario_import.story.read_motions import (
     JUMP,
     followed,
     lines_up,
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
-    from odscen.interchange.openscenario_import.read_conditions import ConditionReader
-    from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.story.read_conditions import ConditionReader
+    from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
 
 Made = dict[str, Any]
 _SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}

@@ -22,7 +22,7 @@ from odscen.interchange.openscenario.xosc_weather import (
     SAID,
     environment,
 )
-from odscen.interchange.openscenario_import.own_files import value_of
+from odscen.interchange.openscenario_import.source.own_files import value_of
 from odscen.sumo.realize.weather_effects import CLEAR, DENSE, WET_GRIP
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from lxml.etree import _Element
 
-    from odscen.interchange.openscenario_import.read_entities import ReadEntity
-    from odscen.interchange.openscenario_import.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.places.read_positions import PositionReader
+    from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
 
 Made = dict[str, Any]
 _SAME: Final = 1e-3

@@ -6,14 +6,17 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
-from odscen.interchange.openscenario_import.global_actions import READ, tell_unread
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.own_entity_actions import own_entity_action, with_speed
-from odscen.interchange.openscenario_import.own_files import said_in_properties
-from odscen.interchange.openscenario_import.read_actions import FOLLOWING
-from odscen.interchange.openscenario_import.read_conditions import ALWAYS, joined
-from odscen.interchange.openscenario_import.read_entities import plain_id
-from odscen.interchange.openscenario_import.value_changes import new_value, sets_in_story
+from odscen.interchange.openscenario_import.source.own_files import said_in_properties
+from odscen.interchange.openscenario_import.story.global_actions import READ, tell_unread
+from odscen.interchange.openscenario_import.story.own_entity_actions import (
+    own_entity_action,
+    with_speed,
+)
+from odscen.interchange.openscenario_import.story.read_actions import FOLLOWING
+from odscen.interchange.openscenario_import.story.read_conditions import ALWAYS, joined
+from odscen.interchange.openscenario_import.story.value_changes import new_value, sets_in_story
+from odscen.interchange.openscenario_import.world.read_entities import plain_id
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -21,8 +24,8 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.read_actions import ActionReader
-    from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.story.read_actions import ActionReader
+    from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
 
 Made = dict[str, Any]
 _HOLDERS = frozenset({"Story", "Act", "ManeuverGroup", "Maneuver"})

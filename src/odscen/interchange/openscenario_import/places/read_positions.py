@@ -11,7 +11,7 @@ import numpy as np
 
 from odscen.base.errors import OdscenError
 from odscen.interchange.openscenario_import.import_report import RefusedError
-from odscen.interchange.openscenario_import.map_points import MapPoint
+from odscen.interchange.openscenario_import.places.map_points import MapPoint
 from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.query import is_walk_node_id, node_id, node_index, walk_node_index
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.interchange.openscenario_import.import_report import ImportReport
-    from odscen.interchange.openscenario_import.map_points import MovingFrame
+    from odscen.interchange.openscenario_import.places.map_points import MovingFrame
     from odscen.lanegraph.graphs import MapGraph
 
 _EXACT = 1e-5

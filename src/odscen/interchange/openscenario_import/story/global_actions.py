@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from odscen.interchange.openscenario_import.read_environment import STAYS
+from odscen.interchange.openscenario_import.world.read_environment import STAYS
 
 if TYPE_CHECKING:
     from lxml.etree import _Element

@@ -1,0 +1,1 @@
+"""The file before it means anything: parameters, catalogs and names put in."""

@@ -1,0 +1,1 @@
+"""The storyboard as rules: triggers, actions, paths and signals."""

@@ -1,0 +1,1 @@
+"""What there is: entities with their bodies, and the weather."""
