@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from odscen.scenario.story.road_view import Stood, leapt
 from odscen.scenario.story.story_engine import StoryEngine, StoryEvent
 from tests.scenario.story.straight_road import CAR, Road, rule, started
 
@@ -138,6 +139,17 @@ def test_the_leap_of_a_lane_change_is_not_drawn_out_to_the_next_step(*, patient:
     changes = [("car", 0.0, -7)]
     found, _ = _story(when, patient=patient, step=0.05, bodies=bodies, changes=changes)
     assert found == []
+
+
+def test_who_follows_a_bend_does_not_leap_and_who_changes_lanes_does() -> None:
+    turn, radius = 0.6, 12.0  # 7 m of a bend in one step
+    bend = replace(
+        CAR, x=radius * math.sin(turn), y=radius * (1.0 - math.cos(turn)), hdg=turn, speed=7.0
+    )
+    assert not leapt(CAR, bend)
+    aside = replace(bend, x=bend.x - 3.2 * math.sin(turn), y=bend.y + 3.2 * math.cos(turn))
+    assert leapt(CAR, aside)
+    assert leapt(Stood(0.0, 0.0, math.pi), replace(CAR, x=-7.0, y=3.2, hdg=-math.pi))
 
 
 def test_who_stays_on_a_bound_is_met_there_whatever_was_before() -> None:
