@@ -3,13 +3,15 @@
 The parser itself is not run here: the package ``carla-scenario-runner`` 0.9.11 has its folders
 where it does not import them from, and a CARLA server is wanted. Each rule names where it stands:
 ``config`` is ``srunner/scenarioconfigs/openscenario_configuration.py``, ``parser``
-``srunner/tools/openscenario_parser.py``, ``scenario`` ``srunner/scenarios/open_scenario.py`` of
+``srunner/tools/openscenario_parser.py``, ``scenario`` ``srunner/scenarios/open_scenario.py`` and
+``atomics`` ``srunner/scenariomanager/scenarioatomics`` of
 github.com/carla-simulator/scenario_runner, in the versions up to 2024.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from datetime import datetime
 from functools import cache
 from pathlib import Path
@@ -20,6 +22,7 @@ from lxml import etree
 
 from odscen.app.export import export, export_run
 from odscen.app.template_scenarios import template_scenario
+from odscen.interchange.openscenario.xosc_actions import UNSAID_GOAL
 from tests.interchange.test_openscenario_as_run import scenario as scenario_that_ran
 from tests.interchange.test_openscenario_export import scenario as with_every_rule
 from tests.sumo.story_case import entry, run, workspace
@@ -211,6 +214,52 @@ def paths_of_elements_are_different(root: _Element) -> bool:
     return len(set(found)) == len(found)
 
 
+def nobody_has_a_route(root: _Element) -> bool:
+    """atomics since 2022, ChangeActorWaypoints: ``len(self._times)`` of a route is a TypeError."""
+    return not list(root.iter("AcquirePositionAction", "AssignRouteAction"))
+
+
+def numbers_are_plain(root: _Element) -> bool:
+    """parser since 0.9.13, ParameterRef: what does not match this is no number, as ``1e-05``."""
+    plain = re.compile(r"(-)?\d+(\.\d*)?")
+    acting = root.find("Storyboard")
+    return acting is not None and all(
+        plain.fullmatch(value)
+        for one in acting.iter("*")
+        for value in one.attrib.values()
+        if _is_number(value)
+    )
+
+
+def _is_number(text: str | bytes) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def distances_between_actors_are_of_a_known_kind(root: _Element) -> bool:
+    """atomics, get_distance_between_actors: others come out as straight distances."""
+    kinds = {one.get("relativeDistanceType") for one in root.iter("RelativeDistanceCondition")}
+    return kinds <= {"cartesianDistance", "longitudinal", "lateral"}
+
+
+def signal_controllers_have_phases_with_states(root: _Element) -> bool:
+    """parser since 2022, set_traffic_signal_controller: reads the first of each."""
+    controllers = list(root.iter("TrafficSignalController"))
+    return all(one.find("Phase/TrafficSignalState") is not None for one in controllers)
+
+
+def it_lasts_as_long_as_the_run(root: _Element) -> bool:
+    """scenario, _create_behavior: it ends when all acts are over, whatever stops the storyboard."""
+    ends = [
+        root.xpath(f"string(Storyboard/{where}//SimulationTimeCondition/@value)")
+        for where in ("StopTrigger", "Story/Act/StopTrigger", "Story/Act/ManeuverGroup[last()]")
+    ]
+    return bool(ends[0]) and ends == ends[:1] * 3
+
+
 RULES: tuple[Callable[[Any], bool], ...] = (
     only_version_1_0, one_story_and_an_init, frame_is_not_said_to_be_carlas,
     catalog_locations_are_there, entities_have_properties, pedestrians_have_a_model,
@@ -221,7 +270,9 @@ RULES: tuple[Callable[[Any], bool], ...] = (
     conditions_are_known, private_actions_are_known, activated_controllers_say_longitudinal,
     gaps_are_metres, lane_changes_are_relative, arrivals_have_a_final_speed,
     trajectories_are_polylines_with_times, events_have_triggers_and_actions,
-    paths_of_elements_are_different,
+    paths_of_elements_are_different, nobody_has_a_route, numbers_are_plain,
+    distances_between_actors_are_of_a_known_kind, signal_controllers_have_phases_with_states,
+    it_lasts_as_long_as_the_run,
 )  # fmt: skip
 
 
@@ -285,8 +336,12 @@ def test_who_is_not_there_yet_waits_below_the_ground_and_comes_up(folder: Path) 
     assert float(event.find(".//SimulationTimeCondition").get("value")) == 4.0
 
 
-def test_goals_are_given_in_the_story_from_the_start(folder: Path) -> None:
-    root, _ = exported("cut-in", folder)
-    event = root.find('.//Event[@name="ego has a goal"]')
-    assert event.find(".//AcquirePositionAction//WorldPosition") is not None
-    assert float(event.find(".//SimulationTimeCondition").get("value")) == 0.0
+def test_goals_are_listed_and_kept_in_properties(folder: Path) -> None:
+    root, notes = exported("every rule", folder)
+    given = with_every_rule()
+    for index, actor in enumerate(given.actors):
+        property_ = f'.//ScenarioObject[@name="{actor.id}"]//Property[@name="odscen.goal"]'
+        assert root.find(property_).get("value") == actor.goal
+        assert {"place": f"actors[{index}].goal", "reason": UNSAID_GOAL} in notes["left_out"]
+    (rule,) = (n for n, one in enumerate(given.rules) if one.then[0].goal is not None)
+    assert {"place": f"rules[{rule}]", "reason": UNSAID_GOAL} in notes["left_out"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from odscen.scenario.document.rules_document import StoryRule
-from odscen.scenario.story.road_view import ActorView
+from odscen.scenario.story.road_view import ActorView, leapt
 from odscen.scenario.story.story_engine import StoryEngine
 
 if TYPE_CHECKING:
@@ -31,6 +31,12 @@ class Road:
     appears: dict[str, float] = field(default_factory=dict)
     letters: Callable[[float], str] = lambda _: "r"
     time: float = 0.0
+    step: float = 0.1
+
+    def leapt(self, name: str) -> bool:
+        now, self.time = self.actor(name), self.time - self.step
+        before, self.time = self.actor(name), self.time + self.step
+        return before is not None and now is not None and leapt(before, now)
 
     def actor(self, name: str) -> ActorView | None:
         one = next((one for one in self.actors if one.id == name), None)
@@ -93,7 +99,7 @@ def story(
 ) -> list[StoryEvent]:
     """What rules do; what they do to actors moves none of them."""
     engine = StoryEngine(rules, step=step)
-    seen = Road(actors, engine.rule_changes, **road)
+    seen = Road(actors, engine.rule_changes, step=step, **road)
     events: list[StoryEvent] = []
     for number in range(round(until / step)):
         seen.time = number * step

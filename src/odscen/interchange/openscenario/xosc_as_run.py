@@ -14,7 +14,7 @@ from odscen.interchange.openscenario.xosc_lines import follow_line
 from odscen.interchange.openscenario.xosc_places import GroundPose, reference_behind
 from odscen.interchange.openscenario.xosc_presence import add_entity, delete_entity, private
 from odscen.interchange.openscenario.xosc_signals import light_action
-from odscen.interchange.openscenario.xosc_storyboard import event, maneuver_group
+from odscen.interchange.openscenario.xosc_storyboard import act, event, maneuver_group
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -64,14 +64,14 @@ class AsRun:
             self.triggers.notes.left_out.append(("traffic lights", words))
         elif changes := list(self._changes(states)):
             groups.append(maneuver_group("traffic lights", None, changes))
-        start = xml("StartTrigger", self.triggers.at_time(0.0, "begin"))
-        act = xml("Act", *groups, start, name="as run")
+        until, sky = self.happened.until, self.environment
+        whole = act("as run", groups, self.triggers, until=until, sky=sky)
         name = self.source.scenario.name
-        end = self.triggers.at_time(self.happened.until, "end of the run")
+        end = self.triggers.at_time(until, "end of the run")
         return xml(
             "Storyboard",
             xml("Init", xml("Actions", *self._init(states))),
-            xml("Story", xml("ParameterDeclarations"), act, name=name),
+            xml("Story", xml("ParameterDeclarations"), whole, name=name),
             xml("StopTrigger", end),
         )
 

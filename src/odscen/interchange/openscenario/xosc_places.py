@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from odscen.base.categories import Body
     from odscen.interchange.exporter import ExportSource
-    from odscen.interchange.openscenario.dialect import Dialect
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.conditions_document import RulePlace
     from odscen.scenario.document.scenario_document import Actor
@@ -121,12 +120,9 @@ class Places:
         """Metres from the reference point, the rear axle, ahead to the centre of the body."""
         return reference_behind(actor.category, self.body(actor).length)
 
-    def goal(self, node: str, dialect: Dialect) -> _Element:
-        """``Position`` of a lane node by road, lane and s; of others in world coordinates.
-
-        ScenarioRunner asks CARLA for the lane, whose ids are numbers, and refuses one it has not.
-        """
-        if is_walk_node_id(node) or dialect.for_scenario_runner:
+    def goal(self, node: str) -> _Element:
+        """``Position`` of a lane node by road, lane and s; of others in world coordinates."""
+        if is_walk_node_id(node):
             return self.spot(node).element()
         lanes, index = self.graph.lanes, node_index(self.graph, node)
         key = lanes.lanes.keys[int(lanes.lane[index])]

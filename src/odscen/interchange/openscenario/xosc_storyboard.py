@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from odscen.interchange.openscenario.dialect import xml
 from odscen.interchange.openscenario.xosc_actions import (
     IGNORES,
+    UNSAID_GOAL,
     Actions,
     acquire,
 )
@@ -29,6 +31,10 @@ if TYPE_CHECKING:
     from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.document.scenario_document import Actor, Scenario
 
+_LONGEST: Final = 300.0
+"""Seconds after which ScenarioRunner stops a scenario: the default in its class OpenScenario."""
+_END: Final = "end of the run"
+
 
 @dataclass(frozen=True, slots=True)
 class Story:
@@ -43,24 +49,23 @@ class Story:
     def storyboard(self) -> _Element:
         """``Storyboard``."""
         actors = {actor.id: actor for actor in self.scenario.actors}
+        self._note_goals()
         groups = [
-            group
-            for actor in self.scenario.actors
-            for group in (self._later(actor), self._goal(actor))
-            if group is not None
+            group for actor in self.scenario.actors if (group := self._later(actor)) is not None
         ]
         groups += self._rules(actors)
         duration = self.scenario.simulation.duration
         triggers = Triggers(self.places, self.dialect, self.notes, {})
-        if not groups:  # a story needs one
-            nobody = xml("Actors", selectTriggeringEntities=False)
-            groups = [xml("ManeuverGroup", nobody, name="none", maximumExecutionCount=1)]
-        act = xml("Act", *groups, xml("StartTrigger", triggers.at_time(0.0, "begin")), name="rules")
         return xml(
             "Storyboard",
             xml("Init", xml("Actions", *self._init(self.scenario.actors))),
-            xml("Story", xml("ParameterDeclarations"), act, name=self.scenario.name),
-            xml("StopTrigger", triggers.at_time(duration, "end of the run")),
+            xml(
+                "Story",
+                xml("ParameterDeclarations"),
+                act("rules", groups, triggers, until=duration, sky=self.environment),
+                name=self.scenario.name,
+            ),
+            xml("StopTrigger", triggers.at_time(duration, _END)),
         )
 
     def _init(self, actors: Sequence[Actor]) -> Iterable[_Element]:
@@ -79,7 +84,7 @@ class Story:
                 speed_action(actor.initial_speed or 0.0, "step", "time", 0.0),
             ]
             if actor.goal is not None and not self.dialect.for_scenario_runner:
-                actions.append(acquire(self.places, actor.goal, self.dialect))
+                actions.append(acquire(self.places, actor.goal))
             yield xml("Private", *actions, entityRef=actor.id)
 
     def _appears(self, actor: str) -> bool:
@@ -90,23 +95,13 @@ class Story:
             for part in item.parts
         )
 
-    def _goal(self, actor: Actor) -> _Element | None:
-        """Maneuver group that gives an actor its goal.
-
-        ScenarioRunner places an actor at the last position that ``Init`` has of it.
-        """
-        if (
-            actor.goal is None
-            or actor.depart > 0
-            or self._appears(actor.id)
-            or not self.dialect.for_scenario_runner
-        ):
-            return None
-        triggers = Triggers(self.places, self.dialect, self.notes, {})
-        name = f"{actor.id} has a goal"
-        trigger = xml("StartTrigger", triggers.at_time(0.0, name))
-        action = acquire(self.places, actor.goal, self.dialect)
-        return maneuver_group(name, actor.id, [event(name, [action], trigger, 1)])
+    def _note_goals(self) -> None:
+        if self.dialect.for_scenario_runner:
+            self.notes.left_out += [
+                (f"actors[{index}].goal", UNSAID_GOAL)
+                for index, actor in enumerate(self.scenario.actors)
+                if actor.goal is not None
+            ]
 
     def _later(self, actor: Actor) -> _Element | None:
         """Maneuver group of an actor that departs later."""
@@ -117,8 +112,8 @@ class Story:
             add_entity(actor.id, self.places.start(actor), self.dialect),
             speed_action(actor.initial_speed or 0.0, "step", "time", 0.0),
         ]
-        if actor.goal is not None:
-            actions.append(acquire(self.places, actor.goal, self.dialect))
+        if actor.goal is not None and not self.dialect.for_scenario_runner:
+            actions.append(acquire(self.places, actor.goal))
         trigger = xml("StartTrigger", triggers.at_time(actor.depart, f"{actor.id} departs"))
         name = f"{actor.id} departs"
         return maneuver_group(name, actor.id, [event(name, actions, trigger, 1)])
@@ -180,6 +175,35 @@ class Story:
             )
             made.append(event(name, actions, trigger, rule.times))
         return maneuver_group(rule.id, rule.actor, made)
+
+
+def act(
+    name: str,
+    groups: Sequence[_Element],
+    triggers: Triggers,
+    *,
+    until: float,
+    sky: _Element | None,
+) -> _Element:
+    """``Act`` with all maneuver groups, from the start of the run on.
+
+    ScenarioRunner does not ask when the storyboard stops: it ends when all acts are over, or after
+    300 s. So there the act has a stop trigger, and an event at the end that sets the weather again.
+    """
+    start, stop = xml("StartTrigger", triggers.at_time(0.0, "begin")), None
+    if triggers.dialect.for_scenario_runner:
+        if until > _LONGEST:
+            words = f"ScenarioRunner stops after {_LONGEST:g} s"
+            triggers.notes.approximated.append(("simulation.duration", words))
+        end = xml("StartTrigger", triggers.at_time(until, _END))
+        weather = xml("GlobalAction", xml("EnvironmentAction", deepcopy(sky)))
+        last = event(f"weather at the {_END}", [weather], end, 1)
+        groups = [*groups, maneuver_group(_END, None, [last])]
+        stop = xml("StopTrigger", triggers.at_time(until, f"{_END}, of the act"))
+    if not groups:  # a story needs one
+        nobody = xml("Actors", selectTriggeringEntities=False)
+        groups = [xml("ManeuverGroup", nobody, name="none", maximumExecutionCount=1)]
+    return xml("Act", *groups, start, stop, name=name)
 
 
 def event(name: str, actions: Sequence[_Element], trigger: _Element, times: int) -> _Element:

@@ -1,7 +1,8 @@
 """A rule's condition over one step: leaves read once, combined to the instant.
 
 A leaf that is not met, and whose margin grows, is taken to come true where the line through its
-last two readings says; if the next reading shows that it did not, it turns back there.
+last two readings says; if the next reading shows that it did not, it turns back there. Between
+readings before and after a leap there is no line: SUMO changes lanes within one step.
 """
 
 from __future__ import annotations
@@ -163,18 +164,20 @@ class _Leaf:
             self.now = LeafMemory(None, holds=False)
             return Flips(was, (view.time,) if was else ())
         value, margin, rate = reading
-        flips = self._turns(margin, rate, before, view.time)
+        flips = self._turns(margin, rate, before, view)
         near = -math.inf < margin < math.inf
         far = not -math.inf < value < math.inf
         self.now = LeafMemory(margin if near else None, flips.last, None if far else value)
         return flips
 
     def _turns(
-        self, margin: float, rate: float | None, before: LeafMemory | None, time: float
+        self, margin: float, rate: float | None, before: LeafMemory | None, view: RoadView
     ) -> Flips:
-        last = None if before is None else before.margin
+        time, last = view.time, None if before is None else before.margin
         if rate is None and last is not None:
-            rate = (margin - last) / self._step
+            change = margin - last
+            near = abs(margin) <= max(abs(change), CLOSE)  # it could come to the bound in this step
+            rate = None if near and self._leapt(view) else change / self._step
         holds = margin >= 0.0
         if abs(margin) <= CLOSE:
             holds = rate is None or rate * self._step >= -CLOSE
@@ -187,6 +190,10 @@ class _Leaf:
         if not at:  # nearly always
             return _ALWAYS if was else NEVER_IN_STEP
         return Flips(was, at)
+
+    def _leapt(self, view: RoadView) -> bool:
+        names = (getattr(self._part, "of", None) or self._actor, getattr(self._part, "to", None))
+        return any(view.leapt(name) for name in names if name is not None)
 
 
 class _AfterRule:

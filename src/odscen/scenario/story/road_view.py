@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,6 +15,16 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 MOST_GAIN = 10.0
 """m/s²; what SUMO drives accelerates less."""
+_ASIDE = 1.0
+"""Metres that nobody comes aside of where he looks in one step, but by a change of lanes."""
+
+
+class Stood(NamedTuple):
+    """Where an actor was: centre of the body, and where it looked."""
+
+    x: float
+    y: float
+    hdg: float
 
 
 @dataclass(slots=True)  # not frozen: many are made in each step, and that takes three times as long
@@ -72,6 +82,16 @@ class ActorView:
         )
 
 
+def leapt(before: ActorView | Stood, now: ActorView) -> bool:
+    """Whether an actor was put aside between two steps, as SUMO changes lanes within one.
+
+    Who follows a bend comes in the middle between where he looked and where he looks.
+    """
+    hdg = before.hdg + math.remainder(now.hdg - before.hdg, math.tau) / 2.0
+    aside = (now.y - before.y) * math.cos(hdg) - (now.x - before.x) * math.sin(hdg)
+    return abs(aside) > _ASIDE
+
+
 class RoadView(Protocol):
     """What conditions ask."""
 
@@ -84,6 +104,9 @@ class RoadView(Protocol):
 
     def gone(self, name: str) -> bool:
         """Whether an actor has left the road for good."""
+
+    def leapt(self, name: str) -> bool:
+        """Whether an actor who was there a step before has been put aside since, :func:`leapt`."""
 
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""

@@ -163,7 +163,10 @@ class StoryReader:
     def _act(self, act: _Element) -> None:
         trigger = self.report.child(act, "StartTrigger")
         for stop in act.iterchildren("StopTrigger"):
-            self.report.ignore(stop, "rules end with what they do")
+            if self.own:  # the end of the run, as that of the storyboard
+                self.report.take(stop)
+            else:
+                self.report.ignore(stop, "rules end with what they do")
         for group in self.report.children(act, "ManeuverGroup"):
             if group.get("maximumExecutionCount", "1") not in {"0", "1"}:
                 self.report.mark(group, "approximated", "its maneuvers take place once")

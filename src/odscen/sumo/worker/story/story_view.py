@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import SumoPose, body_centre, sumo_to_xodr
-from odscen.scenario.story.road_view import MOST_GAIN, ActorView
+from odscen.scenario.story.road_view import MOST_GAIN, ActorView, Stood, leapt
 from odscen.scenario.story.side_motion import beside, line_length
 
 if TYPE_CHECKING:
@@ -64,6 +64,8 @@ class StoryView:
         self._driven: Mapping[str, float] = {}
         self._road: MovedActors
         self._views: dict[str, ActorView | None] = {}
+        self._before: Mapping[str, ActorView | Stood | None] = {}
+        self._restored: Mapping[str, Stood] = {}
         self._nearest: dict[Point, tuple[str, float, int]] = {}
         self._half_widths: dict[str, float] = {}
         self._gains: dict[str, float] = {}
@@ -83,7 +85,7 @@ class StoryView:
     ) -> None:
         """Begin to read a step; ``driven`` are speeds of persons that were moved, m/s."""
         self._road, self._now, self._step, self._driven = road, time, step, driven
-        self._views = {}
+        self._before, self._views, self._restored = self._restored or self._views, {}, {}
         if self._eager is None:
             own = self._actors.items()
             self._eager = tuple(name for name, one in own if one.person or name in self.always)
@@ -116,6 +118,11 @@ class StoryView:
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""
         return tuple(one for one in map(self.actor, self._actors) if one is not None)
+
+    def leapt(self, name: str) -> bool:
+        """Whether an actor who was read a step before has been put aside since."""
+        before, now = self._before.get(name), self.actor(name)
+        return before is not None and now is not None and leapt(before, now)
 
     def gone(self, name: str) -> bool:
         """Whether an actor has left the road for good."""
@@ -191,6 +198,7 @@ class StoryView:
             "standing": self._standing,
             "gone": sorted(self._gone),
             "last": {name: list(one) for name, one in self._last.items()},
+            "seen": {n: [one.x, one.y, one.hdg] for n, one in self._views.items() if one},
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -199,6 +207,7 @@ class StoryView:
         self._standing = dict(state["standing"])
         self._gone = set(state["gone"])
         self._last = {name: (x, y, v) for name, (x, y, v) in state["last"].items()}
+        self._restored = {name: Stood(*one) for name, one in state.get("seen", {}).items()}
 
     def _where(self, place: str | Point) -> tuple[str, float, int]:
         if not isinstance(place, str):
