@@ -18,6 +18,7 @@ from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import signal_kind
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import OpenDrive, Signal
+from tests.carla_standin.lane_mesh import FINE, LaneMesh
 from tests.carla_standin.wire import Pose
 
 _SPAWN_EVERY = 25.0
@@ -27,7 +28,9 @@ _SPAWN_HEIGHT = 0.5
 _GROUND_EVERY = 1.0
 """Metres between points of a lane whose heights are known."""
 _GROUND_NEAR = 2.5
-"""Metres from such a point at which its height is still that of the ground."""
+"""Metres from such a point at which its height is still that of the ground for what is made."""
+_BESIDE = 1.5
+"""Metres beside the lanes where the ground goes on as at their border."""
 _WALL = 0.2
 """Metres of a wall's thickness, at the edge of the ground."""
 _SIGNS = {"stop": "traffic.stop", "yield": "traffic.yield"}
@@ -59,6 +62,8 @@ class RoadMap:
     """Points of all lanes, shape ``(N, 3)``."""
     walks: np.ndarray
     """Which of them are on sidewalks, shape ``(N,)``."""
+    mesh: LaneMesh
+    """What bodies stand on."""
     wall_height: float = 0.0
     additional_width: float = 0.0
     """Of a generated world: metres of the walls that stand along its edges, and by which its roads
@@ -68,36 +73,33 @@ class RoadMap:
     def _tree(self) -> cKDTree | None:
         return cKDTree(self.ground[:, :2]) if len(self.ground) else None
 
-    def _near(self, x: float, y: float) -> list[int]:
-        """Points that are near a place, in the order of the lanes."""
-        if self._tree is None:
-            return []
-        found: list[int] = self._tree.query_ball_point((x, y), self._reach, return_sorted=True)
-        return found
-
-    @property
-    def _reach(self) -> float:
-        return _GROUND_NEAR + self.additional_width / 2.0
-
     def ground_at(self, x: float, y: float) -> np.ndarray:
         """Heights of the ground below and above a place; several where roads cross, or none."""
-        return self.ground[self._near(x, y), 2]
+        if self._tree is None:
+            return np.empty(0)
+        reach = _GROUND_NEAR + self.additional_width / 2.0
+        near = self._tree.query_ball_point((x, y), reach, return_sorted=True)
+        heights: np.ndarray = self.ground[near, 2]
+        return heights
 
     def surface(self, x: float, y: float, z: float, kerb: float) -> tuple[float, bool] | None:
         """Height of what is below a place, and whether that is a sidewalk, ``kerb`` metres high.
 
-        Sidewalks stand above the file's surface: pull request 2491 of carla-simulator/carla.
+        Sidewalks stand above the file's surface (pull request 2491 of carla-simulator/carla), from
+        their border on; of lanes that overlap the uppermost counts.
         """
-        near = np.array(self._near(x, y), dtype=int)
-        near = near[self.ground[near, 2] <= z]
-        if not len(near):
+        reach = _BESIDE + self.additional_width / 2.0
+        away, height, rows = self.mesh.around(x, y, reach)
+        walks = self.mesh.walks[rows]
+        height = height + np.where(walks, kerb, 0.0)
+        height = height + np.where(away > reach - _WALL, self.wall_height, 0.0)
+        fits = height <= z
+        if not fits.any():
             return None
-        away = np.hypot(*(self.ground[near, :2] - (x, y)).T)
-        best = int(near[np.argmin(away)])
-        walk = bool(self.walks[best])
-        on_wall = float(away.min()) > self._reach - _WALL
-        higher = (kerb if walk else 0.0) + (self.wall_height if on_wall else 0.0)
-        return self._height(best, x, y) + higher, walk
+        away, height, walks = away[fits], height[fits], walks[fits]
+        nearest = away <= away.min() + 1e-9
+        best = int(np.flatnonzero(nearest)[np.argmax(height[nearest])])
+        return float(height[best]), bool(walks[best])
 
     @cached_property
     def _walk_tree(self) -> cKDTree:
@@ -126,16 +128,32 @@ class RoadMap:
 
     @classmethod
     def of(
-        cls, text: str, name: str, *, wall_height: float = 0.0, additional_width: float = 0.0
+        cls,
+        text: str,
+        name: str,
+        *,
+        wall_height: float = 0.0,
+        additional_width: float = 0.0,
+        every: float = FINE,
+        smooth: bool = False,
     ) -> RoadMap:
-        """Map of an OpenDRIVE text; of a generated world with how it was made."""
+        """Map of an OpenDRIVE text; of a generated world with how it was made.
+
+        Parameters
+        ----------
+        every, smooth
+            Metres between vertices of the ground, and whether that of junctions is smoothed.
+        """
         odr = parse(text.encode(), file=name)
         table = RoadTable.of(odr)
         signs = tuple(_signs(odr, table))
         lights = {sign.id for sign in signs if sign.type_id == "traffic.traffic_light"}
         points = tuple(_spawn_points(odr, table))
         groups, (ground, walks) = _groups(odr, lights), _ground(table)
-        return cls(name, text, points, signs, groups, ground, walks, wall_height, additional_width)
+        mesh = LaneMesh.of(odr, table, every=every, smooth=smooth)
+        return cls(
+            name, text, points, signs, groups, ground, walks, mesh, wall_height, additional_width
+        )
 
 
 def _ground(table: RoadTable) -> tuple[np.ndarray, np.ndarray]:

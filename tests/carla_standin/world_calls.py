@@ -70,12 +70,14 @@ class WorldCalls:
         if not name:
             road_map = world.map
         elif short == _OPENDRIVE_MAP and self._copied:
-            wall_height, additional_width = self.generation[2:4]
+            every, _longest, wall_height, additional_width, smooth, *_ = self.generation
             road_map = RoadMap.of(
                 self._copied,
                 f"{_FOLDER}/{_OPENDRIVE_MAP}",
                 wall_height=wall_height,
                 additional_width=additional_width,
+                every=every,
+                smooth=smooth,
             )
         elif short in self._maps:
             road_map = RoadMap.read(self._maps[short], f"{_FOLDER}/{short}")

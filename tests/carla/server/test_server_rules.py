@@ -21,7 +21,7 @@ from tests.sumo.story_case import node_at, walk_node_at
 carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
 
 CROSSING, TOWN = MAPS / "signal_crossing.xodr", MAPS / "town_5x5.xodr"
-EDGE, HEIGHT = (60.0, 7.875 + 2.5), 0.12
+EDGE, HEIGHT = (60.0, 9.125 + 1.5), 0.12
 """Where the stand-in's ground ends beside a sidewalk of the crossing, and how high that is."""
 _WALL_HEIGHT, _ADDITIONAL_WIDTH = 2, 3
 """Of the parameters by which a world is made."""

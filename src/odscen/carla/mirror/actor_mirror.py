@@ -35,7 +35,7 @@ from odscen.sumo.runner.in_step import Step
 from odscen.sumo.worker.observed import VehicleSignal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from odscen.results.records.run_records import Plan
 
@@ -79,6 +79,8 @@ class Mirror:
     spectator
         x and y that count as the ego's for that while there is no ego: a server without a hero goes
         by its spectator.
+    on_ground
+        Puts pedestrians on the ground in what is shown between two steps.
 
     Attributes
     ----------
@@ -102,6 +104,7 @@ class Mirror:
         ego_role: str | None = None,
         walkers_within: float | None = None,
         spectator: tuple[float, float] | None = None,
+        on_ground: Callable[[Step], Step] = lambda shown: shown,
     ) -> None:
         self.refusals: dict[int, Refusal] = {}
         self.spawned = 0
@@ -114,6 +117,7 @@ class Mirror:
         self._ego_role = ego_role
         self._walkers_within = walkers_within
         self._spectator = spectator
+        self._on_ground = on_ground
         self._nearby = nearby or Nearby()
         self._lights = lights
         known = [shapes.get(name, _NO_SHAPE) for name in self._blueprints]
@@ -150,7 +154,7 @@ class Mirror:
                 self.shown = step
                 yield self._batch(step, wanted, whole=True)
             elif last is not None:
-                self.shown = between(last, step, share)
+                self.shown = self._on_ground(between(last, step, share))
                 yield self._batch(self.shown, self._among(self.shown), whole=False)
             else:
                 yield Batch()

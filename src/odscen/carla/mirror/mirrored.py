@@ -12,6 +12,7 @@ from odscen.carla.mirror.actor_mirror import Mirror
 from odscen.carla.mirror.doors import Doors
 from odscen.carla.mirror.ego import ExternalEgo
 from odscen.carla.mirror.foreign_actors import ForeignActors
+from odscen.carla.mirror.lane_surface import LaneSurface
 from odscen.carla.mirror.walking_ground import WalkingGround
 from odscen.carla.mirror.wheels import Wheels
 from odscen.carla.server.batch import HEROES
@@ -86,6 +87,8 @@ class MirroredPlan:
         free = ego is None and server.find_role(*HEROES) is None
         if free:
             server.roles.add(HEROES[0])
+        walks = np.array([actor.person for actor in plan.actors], dtype=np.bool_)
+        ground = WalkingGround(server, walks, lambda: LaneSurface.of(run.entry.read("xodr")))
         mirror = Mirror(
             plan,
             blueprints,
@@ -96,6 +99,7 @@ class MirroredPlan:
             ego_role=HEROES[0] if free else None,
             walkers_within=WAKE * server.active_distance(),
             spectator=_spectator(server) if free else None,
+            on_ground=ground.between,
         )
         foreign = None
         if options.foreign is not None:
@@ -103,8 +107,6 @@ class MirroredPlan:
             foreign = ForeignActors(
                 server, plan.net_offset, run.assets, options.foreign, left_out=hero
             )
-        walks = np.array([actor.person for actor in plan.actors], dtype=np.bool_)
-        ground = WalkingGround(server, walks)
         wheels = doors = None
         if not options.sensed_speed and options.wheel_calls:
             able = server.with_doors(blueprints)
