@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from odscen.app.generators import Placer, open_generator
 from odscen.app.maps import load_map, map_of
 from odscen.base.errors import InputError
 from odscen.base.given_files import read_given, read_given_text
@@ -16,9 +15,6 @@ from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
-from odscen.scenario.sampling.sampler import choose_map, sample_scenario
-from odscen.sumo.realize.signals_ahead import lights_at_start
-from odscen.sumo.runner.network_fit import place_fit, route_fit
 from odscen.workspace.store import plain_name
 from odscen.workspace.wastebasket import SCENARIO_SUFFIX
 
@@ -148,6 +144,8 @@ def check_scenario(workspace: Workspace, scenario: Scenario | Path) -> tuple[Pro
     InputError
         If the file cannot be read, or the map of that name has other content.
     """
+    from odscen.sumo.runner.network_fit import place_fit, route_fit
+
     scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
     problems = check(
@@ -218,6 +216,11 @@ def generate(
     ScenarioError
         If the configuration cannot be met.
     """
+    # A run needs nothing of these, and would wait for their imports.
+    from odscen.app.generators import Placer, open_generator
+    from odscen.scenario.sampling.sampler import choose_map, sample_scenario
+    from odscen.sumo.realize.signals_ahead import lights_at_start
+
     placer = None if generator is None else Placer(open_generator(generator))
     config, map_name = settings.sampling, settings.map_name
     if map_name is not None:

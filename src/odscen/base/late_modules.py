@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import sys
+from types import ModuleType
+from typing import Any
 
 
 def import_when_used(*names: str) -> None:
@@ -22,3 +25,22 @@ def import_when_used(*names: str) -> None:
         sys.modules[name] = module
         spec.loader.exec_module(module)
         setattr(sys.modules[package], own, module)
+
+
+def function_when_used(module: str, name: str) -> None:
+    """Put a module where importers find it that has one function, which imports it when called.
+
+    For a module of which a package takes that function and nothing else: SciPy's Laplacian needs
+    all of its linear algebra, as much to import as all that its shortest paths need.
+    """
+    if module in sys.modules:
+        return
+    stand_in = ModuleType(module)
+
+    def call(*values: Any, **named: Any) -> Any:
+        if sys.modules.get(module) is stand_in:
+            del sys.modules[module]
+        return getattr(importlib.import_module(module), name)(*values, **named)
+
+    setattr(stand_in, name, call)
+    sys.modules[module] = stand_in

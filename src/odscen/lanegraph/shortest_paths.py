@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.late_modules import import_when_used
+from odscen.base.late_modules import function_when_used, import_when_used
 
-import_when_used("numpy.f2py", "numpy.testing")
+import_when_used("numpy.ctypeslib", "numpy.f2py", "numpy.ma", "numpy.polynomial", "numpy.testing")
+function_when_used("scipy.sparse.csgraph._laplacian", "laplacian")
 from scipy import sparse  # noqa: E402 - which names these
 from scipy.sparse import csgraph  # noqa: E402
 

@@ -7,20 +7,37 @@ figures can be had from a run alone.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields
-from functools import lru_cache
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 from odscen.base.stored_files import stored_document
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
     import polars as pl
 
 _FORMAT = "odscen-lane-places"
 _VERSION = 1
+_PLACE = {"junction": str, "control": str, "length": float}
+_COLUMNS: dict[str, dict[str, type]] = {
+    "lanes": {
+        "lane": str,
+        "length": float,
+        "motor": bool,
+        "segment": str,
+        "share": float,
+        "entry": bool,
+    },
+    "ways": dict.fromkeys(("lane", "junction", "approach", "source", "via", "movement"), str),
+    "segments": {"segment": str, "length": float},
+    "junctions": _PLACE,
+    "movements": {"movement": str, **_PLACE},
+}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LanePlaces:
     """Tables about the lanes that vehicles may use; metres.
 
@@ -45,11 +62,28 @@ class LanePlaces:
         ways.
     """
 
-    lanes: pl.DataFrame
-    ways: pl.DataFrame
-    segments: pl.DataFrame
-    junctions: pl.DataFrame
-    movements: pl.DataFrame
+    columns: Mapping[str, Mapping[str, Sequence[Any]]]
+    """Of each table: what a run writes, which then need not wait for a library for tables."""
+
+    @cached_property
+    def lanes(self) -> pl.DataFrame:  # noqa: D102 - above
+        return self._table("lanes")
+
+    @cached_property
+    def ways(self) -> pl.DataFrame:  # noqa: D102
+        return self._table("ways")
+
+    @cached_property
+    def segments(self) -> pl.DataFrame:  # noqa: D102
+        return self._table("segments")
+
+    @cached_property
+    def junctions(self) -> pl.DataFrame:  # noqa: D102
+        return self._table("junctions")
+
+    @cached_property
+    def movements(self) -> pl.DataFrame:  # noqa: D102
+        return self._table("movements")
 
     def to_json(self) -> str:
         """One JSON document, columns as lists."""
@@ -67,24 +101,30 @@ class LanePlaces:
         return _from_json(text)
 
     @classmethod
-    def of(cls, **tables: object) -> LanePlaces:
-        """Make it from columns or rows of each table."""
+    def of(cls, **tables: Iterable[Sequence[object]]) -> LanePlaces:
+        """Make it from rows of each table."""
+        columns = {}
+        for name, rows in tables.items():
+            kinds = _COLUMNS[name]
+            values = list(zip(*rows, strict=True)) or [()] * len(kinds)
+            columns[name] = {
+                column: [None if value is None else kind(value) for value in some]
+                for (column, kind), some in zip(kinds.items(), values, strict=True)
+            }
+        return cls(columns)
+
+    def _table(self, name: str) -> pl.DataFrame:
         import polars as pl
 
-        schemas = _schemas()
-        return cls(
-            **{
-                name: pl.DataFrame(data, schema=schemas[name], orient="row")  # type: ignore[arg-type]
-                for name, data in tables.items()
-            }
-        )
+        types = {str: pl.String, float: pl.Float64, bool: pl.Boolean}
+        schema = {column: types[kind] for column, kind in _COLUMNS[name].items()}
+        return pl.DataFrame(self.columns[name], schema=schema)
 
 
 @lru_cache(maxsize=4)
 def _to_json(places: LanePlaces) -> str:
     """One text for all runs on a map."""
-    tables = {f.name: getattr(places, f.name).to_dict(as_series=False) for f in fields(places)}
-    data = {"format": _FORMAT, "version": _VERSION, **tables}
+    data = {"format": _FORMAT, "version": _VERSION, **places.columns}
     return json.dumps(data, separators=(",", ":"), allow_nan=False)
 
 
@@ -100,26 +140,7 @@ def _from_json(text: str) -> LanePlaces:
         version=_VERSION,
         what="the places of lanes",
     ) as data:
-        return LanePlaces.of(**{field.name: data[field.name] for field in fields(LanePlaces)})
-
-
-def _schemas() -> dict[str, dict[str, type[pl.DataType]]]:
-    import polars as pl
-
-    place = {"junction": pl.String, "control": pl.String, "length": pl.Float64}
-    return {
-        "lanes": {
-            "lane": pl.String,
-            "length": pl.Float64,
-            "motor": pl.Boolean,
-            "segment": pl.String,
-            "share": pl.Float64,
-            "entry": pl.Boolean,
-        },
-        "ways": dict.fromkeys(
-            ("lane", "junction", "approach", "source", "via", "movement"), pl.String
-        ),
-        "segments": {"segment": pl.String, "length": pl.Float64},
-        "junctions": place,
-        "movements": {"movement": pl.String, **place},
-    }
+        places = LanePlaces({name: data[name] for name in _COLUMNS})
+        for name in _COLUMNS:
+            getattr(places, name)  # what does not fit is found here
+        return places
