@@ -94,9 +94,9 @@ def _strip(table: RoadTable, row: int, every: float) -> _Floats:
     s = np.append(np.arange(start, end - 1e-6, every), end)
     rows = np.full(len(s), row)
     sides = [table.lane_points(rows, s, at=at) for at in (0.0, 1.0)]
-    return np.stack(
-        [np.column_stack([side.x, -side.y, side.z]) for side in sides], axis=1
-    ).reshape(-1, 3)
+    return np.stack([np.column_stack([side.x, -side.y, side.z]) for side in sides], axis=1).reshape(
+        -1, 3
+    )
 
 
 def _triangles(strip: _Floats) -> _Floats:
