@@ -16,7 +16,7 @@ import pytest
 from typer.main import get_command
 
 from odscen.app import runs
-from odscen.cli import app
+from odscen.cli.commands import command_line
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page
 from odscen.results.records.outcomes import StopReason
@@ -132,7 +132,7 @@ def test_texts_of_the_page_use_the_terms_of_the_glossary() -> None:
 
 
 def test_help_texts_use_the_terms_of_the_glossary() -> None:
-    texts = dict(_helps(get_command(app), "odscen"))
+    texts = dict(_helps(get_command(command_line()), "odscen"))
     assert len(texts) > 50
     assert {name: words for name, text in texts.items() if (words := replaced_words(text))} == {}
 

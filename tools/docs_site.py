@@ -15,7 +15,7 @@ import typer
 from mkdocs.structure.files import File
 from typer.cli import get_docs_for_click
 
-from odscen.cli import app
+from odscen.cli.commands import command_line
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -96,7 +96,7 @@ def _place_on_site(source: str) -> str | None:
 
 
 def _command_line() -> str:
-    command = typer.main.get_command(app)
+    command = typer.main.get_command(command_line())
     context = typer.Context(command, info_name="odscen")
     text = get_docs_for_click(obj=command, ctx=context, name="odscen", title="The command line")
     # Lists of commands cut their help short; a page has room for its first sentence.

@@ -13,7 +13,7 @@ from odscen.app.runs import run
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.app.trajectories import attach_trajectory
 from odscen.base.errors import InputError, ScenarioError
-from odscen.cli import app
+from odscen.cli.commands import command_line
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
 
@@ -51,7 +51,7 @@ def test_the_command_writes_a_rule_and_replaces_the_one_before(
     out = tmp_path / "out.scenario.json"
     for source in (sampled, out):
         arguments = ["replay", str(source), str(table), "--actor", name, "-o", str(out), "--json"]
-        found = CliRunner().invoke(app, arguments)
+        found = CliRunner().invoke(command_line(), arguments)
         assert found.exit_code == 0, found.output
     assert json.loads(found.stdout)["rule"] == f"replay-{name}"
     [rule] = read_scenario(out).rules

@@ -247,6 +247,7 @@ def test_a_signal_where_python_cannot_raise_ends_a_command_all_the_same():
     script = (
         "import signal, time, weakref\n"
         "from odscen import cli\n"
+        "from odscen.cli import commands\n"
         "class Thing: pass\n"
         "def app():\n"
         "    thing = Thing()\n"
@@ -254,7 +255,7 @@ def test_a_signal_where_python_cannot_raise_ends_a_command_all_the_same():
         "    del thing\n"
         "    time.sleep(30)\n"
         "    print('not interrupted')\n"
-        "cli.app = app\n"
+        "commands.command_line = lambda _: app\n"
         "cli.main()\n"
     )
     done = subprocess.run(

@@ -21,7 +21,7 @@ from odscen.carla.selfcheck.selfcheck_page import selfcheck_data, selfcheck_page
 from odscen.carla.selfcheck.selfcheck_run import selfcheck
 from odscen.carla.server.client import Address
 from odscen.carla.server.protocol_recording import recorded_protocol
-from odscen.cli import app
+from odscen.cli.commands import command_line
 from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS
 from tests.carla_standin.process import Replay, StandIn
@@ -192,6 +192,6 @@ def test_words_of_a_server_are_shown_as_words() -> None:
 
 
 def test_cosim_without_a_scenario_says_what_to_name() -> None:
-    done = CliRunner().invoke(app, ["cosim"])
+    done = CliRunner().invoke(command_line(), ["cosim"])
     assert isinstance(done.exception, InputError)
     assert "no scenario is named" in str(done.exception)
