@@ -11,6 +11,7 @@ import numpy as np
 from odscen.base.categories import Category
 from odscen.learning.fill import VEHICLES, Fill
 from odscen.learning.reference.gap_states import GapStates
+from odscen.learning.reference.onward_goals import NO_GOAL, onward_goals
 from odscen.learning.reference.site_features import light_columns, site_of, traffic_columns
 from odscen.learning.reference.small_network import logistic, softmax
 from odscen.learning.reference.traffic_model import (
@@ -79,6 +80,7 @@ class ReferenceGenerator:
             spacing=graph.lanes.spacing, wanted=request.vehicles, lengths=lengths, rng=rng,
         )  # fmt: skip
         desired = _desired(traffic, site.limit[traffic.node], rng)
+        goal = onward_goals(graph, request.roads, node=traffic.node, speed=traffic.speed, rng=rng)
         walkers = _walkers(request, rng)
         rest = np.full(len(walkers), np.nan)
         return Fill(
@@ -88,6 +90,7 @@ class ReferenceGenerator:
             ),
             initial_speed=np.concatenate([traffic.speed, rest]),
             desired_speed=np.concatenate([desired, rest]),
+            goal=np.concatenate([goal, np.full(len(walkers), NO_GOAL)]),
         )
 
 
