@@ -15,3 +15,14 @@ def test_paths_do_not_import_what_builds_fortran_and_it_is_there_when_used() -> 
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False", "True", "scipy.sparse.csgraph"]
+
+
+def test_paths_do_not_import_linear_algebra_and_the_laplacian_is_there_when_called() -> None:
+    code = (
+        "import sys; import odscen.lanegraph.shortest_paths as s; import numpy as np;"
+        "print('scipy.linalg' in sys.modules);"
+        "print(s.csgraph.laplacian(np.array([[0.0, 1.0], [1.0, 0.0]])).tolist());"
+        "print('scipy.sparse.linalg' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["False", "[[1.0, -1.0], [-1.0, 1.0]]", "True"]

@@ -20,7 +20,6 @@ _GROUPS: dict[str, tuple[str, dict[str, str]]] = {
     "maps": (
         "map_commands:app",
         {
-            "pull": "pull_command:pull",
             "network": "network_commands:network",
             "compare": "network_commands:compare_networks",
             "diff": "difference_commands:diff_maps",
