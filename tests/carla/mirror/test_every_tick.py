@@ -12,7 +12,6 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import polars as pl
 import pytest
 
@@ -147,15 +146,11 @@ def compare(judge: Judge, steps: list[dict[str, Any]], number: int, frame: Frame
         judge.look(name, frame.users[name], state)
 
 
-def assert_exact(off: dict[str, list[float]], frames: int, *, level: bool = True) -> None:
+def assert_exact(off: dict[str, list[float]], frames: int) -> None:
     assert frames > 0.9 * SECONDS / STEP * TICKS
     for kind, limit in LIMITS.items():
         assert len(off[kind]) > 100, kind
-        # On slopes and over kerbs feet go straight on between two steps, and the server is asked
-        # for the ground at places only: there all but the last hundredth.
-        most = 100 if level or kind != "feet" else 99
-        assert np.percentile(off[kind], most) <= limit, kind
-    assert max(off["feet"]) <= 0.07
+        assert max(off[kind]) <= limit, kind
 
 
 def test_a_level_town_is_shown_exactly_in_every_tick(
@@ -171,5 +166,4 @@ def test_towns_with_slopes_and_bridges_are_shown_exactly_in_every_tick(
     workspace: Workspace, sample: Sample, shared_maps: Path, tmp_path: Path, name: str
 ) -> None:
     xodr = shared_maps / f"{name}.xodr"
-    off, frames = judged(workspace, sample(xodr, seed=5, fill=0.1, segments=30), xodr, tmp_path)
-    assert_exact(off, frames, level=name == "carla-2019/Town05")
+    assert_exact(*judged(workspace, sample(xodr, seed=5, fill=0.1, segments=30), xodr, tmp_path))

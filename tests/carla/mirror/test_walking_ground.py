@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from odscen.carla.mirror.lane_surface import LaneSurface
 from odscen.carla.mirror.walking_ground import AGAIN, MOST_CALLS, WalkingGround
 from tests.carla.mirror.test_wheels import step_of
+
+ROOT = Path(__file__).parents[3]
+LANES = (ROOT / "maps" / "signal_crossing.xodr").read_bytes()
+FAR = 10_000.0
+"""Metres of x where the map has no lanes, so that each place is asked for by itself."""
 
 
 class Kerbs:
@@ -25,12 +32,13 @@ class Kerbs:
 
 
 def heights(ground: WalkingGround, time: float, *places: float) -> list[float]:
-    step = replace(step_of([(x, 0.0, 0.0) for x in places]), time=time)
+    step = replace(step_of([(FAR + x, 0.0, 0.0) for x in places]), time=time)
     return list(ground.under(step).z.tolist())
 
 
 def made(server: Kerbs, count: int) -> WalkingGround:
-    return WalkingGround(cast("Any", server), np.ones(count, dtype=np.bool_))
+    walks = np.ones(count, dtype=np.bool_)
+    return WalkingGround(cast("Any", server), walks, lambda: LaneSurface.of(LANES))
 
 
 def test_a_place_without_ground_is_asked_for_again_a_second_later() -> None:
