@@ -215,7 +215,7 @@ def paths_of_elements_are_different(root: _Element) -> bool:
 
 
 def nobody_has_a_route(root: _Element) -> bool:
-    """atomics since 2022, ChangeActorWaypoints: ``len(self._times)`` of a route is a TypeError."""
+    """atomics 0.9.16, ChangeActorWaypoints: ``len(self._times)`` of a route is a TypeError."""
     return not list(root.iter("AcquirePositionAction", "AssignRouteAction"))
 
 
@@ -246,7 +246,7 @@ def distances_between_actors_are_of_a_known_kind(root: _Element) -> bool:
 
 
 def signal_controllers_have_phases_with_states(root: _Element) -> bool:
-    """parser since 2022, set_traffic_signal_controller: reads the first of each."""
+    """parser later, set_traffic_signal_controller: reads the first of each."""
     controllers = list(root.iter("TrafficSignalController"))
     return all(one.find("Phase/TrafficSignalState") is not None for one in controllers)
 
