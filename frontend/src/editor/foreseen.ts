@@ -105,7 +105,7 @@ function changed<K extends "actors" | "flows">(
   return old ? { ...document, [list]: document[list].with(row, { ...old, ...fields } as never) } : null;
 }
 
-/** As the server names what has no name: the first of `car-1`, `car-2`, … that nobody has. */
+/** As the server names what has no name: `car-1`, or the first number after it that is free. */
 function freeId(document: ScenarioDocument, stem: string): string {
   const taken = new Set(everyone(document).map(({ id }) => id));
   let number = 1;
