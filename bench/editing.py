@@ -6,12 +6,14 @@ Aims: 50 frames a second while the map is panned, zoomed or a road user is dragg
 
 from __future__ import annotations
 
+import itertools
 import statistics
 import tempfile
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 from playwright.sync_api import expect
 
 from bench.canvas import TOWN
@@ -25,7 +27,7 @@ from tests.browser.pages import OdscenPage
 from tools import page as tool
 
 ACTORS = 2000
-CHANGES = 9
+CHANGES = 10
 STEPS = 90
 
 _PROBE = """
@@ -33,9 +35,12 @@ window.odscenFrames = [];
 const tick = now => { window.odscenFrames.push(now); requestAnimationFrame(tick); };
 requestAnimationFrame(tick);
 window.odscenChange = {};
-addEventListener('keydown', () => {
+const watch = () => {
   const begun = performance.now();
-  const rows = () => document.querySelector('table[aria-rowcount]')?.getAttribute('aria-rowcount');
+  const rows = () => {
+    const table = document.querySelector('table[aria-rowcount]');
+    return table && table.getAttribute('aria-rowcount') + table.textContent;
+  };
   const before = rows();
   const change = window.odscenChange = {};
   let asked = false;
@@ -48,9 +53,11 @@ addEventListener('keydown', () => {
     else requestAnimationFrame(look);
   };
   look();
-}, true);
+};
+addEventListener('keydown', watch, true);
+addEventListener('pointerdown', watch, true);
 """
-"""Notes each frame, and how long after a key the change that it asks for is shown, and is saved."""
+"""Notes each frame, and how long after a key or a click its change is shown, and is saved."""
 
 
 def main() -> None:
@@ -147,23 +154,66 @@ def _frames(user: OdscenPage, what: str, move: Callable[[], None]) -> None:
 
 
 def _changes(user: OdscenPage) -> None:
-    """Milliseconds from the key that takes a removal back, or makes it again, to the picture."""
+    """Milliseconds from a key or a click that asks for a change to its picture, by what it does."""
+    page = user.page
+    keys = itertools.cycle(("Control+z", "Control+y"))
+    _timed(user, "removal undone, redone", lambda: page.keyboard.press(next(keys)))
+    user.names.nth(5).click()
+    page.wait_for_timeout(1500)
+    steps = itertools.cycle(".,")
+    _timed(user, "moved by a key", lambda: page.keyboard.press(next(steps)))
+    page.keyboard.press("Escape")
+    page.keyboard.press("1")
+    point = user.map.at(*_free(user))
+
+    def take_back() -> None:
+        with user.changing():
+            page.keyboard.press("Control+z")
+
+    _timed(user, "placed by a click", lambda: page.mouse.click(*point), take_back)
+
+
+def _free(user: OdscenPage) -> tuple[float, float]:
+    """A start in sight on which a car may be put, with room around it."""
+    document, graph = user.document(), user.graph
+    middle_x, middle_y, scale = user.map.view()
+    taken = np.array([graph.place(actor["spawn"]) for actor in document["actors"]])
+    columns = graph.columns
+    inside = {row for row, one in enumerate(columns["segments"]) if one["id"] in document["roi"]}
+    return next(
+        (x, y)
+        for row, (x, y) in enumerate(zip(columns["x"], columns["y"], strict=True))
+        if columns["spawnable"][row]
+        and columns["segment"][row] in inside
+        and columns["lane_types"][columns["lane"][row]] == "driving"
+        and max(abs(x - middle_x), abs(y - middle_y)) * scale < 200
+        and np.hypot(*(taken - (x, y)).T).min() > 6
+    )
+
+
+def _timed(
+    user: OdscenPage,
+    what: str,
+    change: Callable[[], object],
+    take_back: Callable[[], object] = lambda: None,
+) -> None:
     page = user.page
     times: list[tuple[float, float, float]] = []
-    for number in range(CHANGES):
+    for _ in range(CHANGES):
         page.evaluate("performance.clearResourceTimings()")
         page.evaluate("window.odscenChange = {}")
-        page.keyboard.press("Control+z" if number % 2 == 0 else "Control+y")
+        change()
         page.wait_for_function("odscenChange.shown && odscenChange.saved")
         shown, saved = page.evaluate("[odscenChange.shown, odscenChange.saved]")
         served = page.evaluate(
-            "performance.getEntriesByType('resource')"
-            ".filter(one => /(undo|redo)\\?/.test(one.name)).map(one => one.duration)[0] ?? NaN"
+            "performance.getEntriesByType('resource').filter("
+            "one => /(undo|redo|edits)\\?/.test(one.name)).map(one => one.duration)[0] ?? NaN"
         )
         times.append((shown, saved, served))
+        take_back()
         page.wait_for_timeout(1000)  # for the problems
     shown, saved, served = (statistics.median(each) for each in zip(*times, strict=True))
     print(
-        f"  a change shown after {shown:.0f} ms, worst {max(each[0] for each in times):.0f} ms"
+        f"  {what:22} shown after {shown:.0f} ms, worst {max(each[0] for each in times):.0f} ms"
         f" (aim 100), saved after {saved:.0f} ms, of which the server's answer {served:.0f} ms"
     )

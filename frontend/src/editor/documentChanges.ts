@@ -37,19 +37,34 @@ function inList(
   return list.with(row, changed(list[row], below, change));
 }
 
-/** `next` with the objects of `old` wherever they say the same. */
+/**
+ * `next` with the objects of `old` wherever they say the same. Parts of lists are known by their
+ * `id`, so that all who come after one that is new or gone stay the same objects.
+ */
 export function reused<T>(old: T, next: T): T {
   if (Object.is(old, next)) return old;
-  if (Array.isArray(old) && Array.isArray(next)) {
-    const made = next.map((one: unknown, row) => reused(old[row] as unknown, one));
-    return made.length === old.length && made.every((one, row) => one === old[row]) ? old : (made as T);
-  }
+  if (Array.isArray(old) && Array.isArray(next)) return inOldList(old, next) as T;
   if (!isTable(old) || !isTable(next) || Array.isArray(old) || Array.isArray(next)) return next;
   const made = Object.entries(next).map(([key, one]) => [key, reused(old[key], one)] as const);
   const same =
     made.length === Object.keys(old).length && made.every(([key, one]) => key in old && one === old[key]);
   return same ? old : (Object.fromEntries(made) as T);
 }
+
+function inOldList(old: readonly unknown[], next: readonly unknown[]): readonly unknown[] {
+  let byId: Map<unknown, unknown> | undefined;
+  const counterpart = (one: unknown, row: number): unknown => {
+    const here = old[row];
+    const id = idOf(one);
+    if (here === one || id === undefined || idOf(here) === id) return here;
+    byId ??= new Map(old.map((each) => [idOf(each), each]));
+    return byId.get(id);
+  };
+  const made = next.map((one, row) => reused(counterpart(one, row), one));
+  return made.length === old.length && made.every((one, row) => one === old[row]) ? old : made;
+}
+
+const idOf = (value: unknown): unknown => (isTable(value) ? value.id : undefined);
 
 const isTable = (value: unknown): value is Record<string, unknown> =>
   typeof value === "object" && value !== null;

@@ -1,8 +1,14 @@
-import type { Actor, Edit, ScenarioDocument } from "../api/types";
+import type { Actor, Edit, EditOf, Flow, ScenarioDocument } from "../api/types";
+import newParts from "./newParts.json";
+import { everyone } from "./placing";
+
+/** What is not said of a new road user or flow; a test holds it against the server's own defaults. */
+const NEW_ACTOR: Omit<Actor, "id" | "category" | "spawn"> = newParts.actor;
+const NEW_FLOW: Omit<Flow, "id" | "spawn" | "per_hour"> = newParts.flow;
 
 /**
  * What edits will make of a document as far as the page can tell, to be shown until the server has
- * answered; null where only the server knows, as with new ids and regions.
+ * answered; null where only the server knows, as with regions and whatever hangs together.
  */
 export function foreseen(document: ScenarioDocument, edits: readonly Edit[]): ScenarioDocument | null {
   let made: ScenarioDocument | null = document;
@@ -15,40 +21,97 @@ export function foreseen(document: ScenarioDocument, edits: readonly Edit[]): Sc
 
 function afterOne(document: ScenarioDocument, edit: Edit): ScenarioDocument | null {
   switch (edit.kind) {
+    case "add_actor":
+      return withNewActor(document, edit);
+    case "copy_actors":
+      return withCopies(document, edit);
+    case "add_flow": {
+      const id = edit.id ?? freeId(document, "flow");
+      const flow: Flow = { ...NEW_FLOW, ...without(edit, "kind"), id };
+      return { ...document, flows: [...document.flows, flow] };
+    }
+    case "change_flow": {
+      // A new id is in other places, too.
+      if ("id" in edit) return null;
+      return changed(document, "flows", edit.flow, without(edit, "kind", "flow") as Partial<Flow>);
+    }
     case "move_actor":
-      return withActor(document, edit.actor, { spawn: edit.spawn });
+      return changed(document, "actors", edit.actor, { spawn: edit.spawn });
     case "set_goal":
-      return withActor(document, edit.actor, { goal: edit.goal });
+      return changed(document, "actors", edit.actor, { goal: edit.goal });
     case "change_actor": {
-      const { actor } = edit;
-      const fields = Object.entries(edit).filter(([name]) => name !== "kind" && name !== "actor");
-      // A new id is in other places, too, and another category may need another model.
+      // Another category may need another model.
       if ("id" in edit || "category" in edit) return null;
-      return withActor(document, actor, Object.fromEntries(fields) as Partial<Actor>);
+      return changed(document, "actors", edit.actor, without(edit, "kind", "actor") as Partial<Actor>);
     }
-    case "set_ego": {
-      const { actor } = edit;
-      if (actor !== null && !document.actors.some(({ id }) => id === actor)) return null;
-      return {
-        ...document,
-        actors: document.actors.map((one) =>
-          one.ego === (one.id === actor) ? one : { ...one, ego: one.id === actor },
-        ),
-      };
-    }
+    case "set_ego":
+      return withEgo(document, edit.actor);
     case "remove_actors": {
       const gone = new Set(edit.actors);
       return { ...document, actors: document.actors.filter(({ id }) => !gone.has(id)) };
     }
     case "remove_flow":
       return { ...document, flows: document.flows.filter(({ id }) => id !== edit.flow) };
+    case "set_seed":
+      return { ...document, seed: edit.seed };
+    case "set_simulation": {
+      const simulation = { ...document.simulation, ...without(edit, "kind") };
+      return { ...document, simulation: simulation as ScenarioDocument["simulation"] };
+    }
+    case "remove_measure":
+      return { ...document, measures: document.measures.filter(({ id }) => id !== edit.measure) };
+    case "remove_rule":
+      return { ...document, rules: document.rules.filter(({ id }) => id !== edit.rule) };
     default:
       return null;
   }
 }
 
-function withActor(document: ScenarioDocument, id: string, fields: Partial<Actor>): ScenarioDocument | null {
-  const row = document.actors.findIndex((one) => one.id === id);
-  const old = document.actors[row];
-  return old ? { ...document, actors: document.actors.with(row, { ...old, ...fields }) } : null;
+function withNewActor(document: ScenarioDocument, edit: EditOf<"add_actor">): ScenarioDocument {
+  const id = edit.id ?? freeId(document, edit.category);
+  const actor: Actor = { ...NEW_ACTOR, ...without(edit, "kind"), id };
+  const grown = { ...document, actors: [...document.actors, actor] };
+  return actor.ego ? (withEgo(grown, actor.id) ?? grown) : grown;
 }
+
+/** Copies at their new starts; those that cannot reach the goal from there lose it by the answer. */
+function withCopies(document: ScenarioDocument, edit: EditOf<"copy_actors">): ScenarioDocument | null {
+  let made = document;
+  for (const [spawn, actor] of Object.entries(edit.copies)) {
+    const original = made.actors.find(({ id }) => id === actor);
+    if (!original) return null;
+    const copy: Actor = { ...original, id: freeId(made, original.category), ego: false, spawn };
+    made = { ...made, actors: [...made.actors, copy] };
+  }
+  return made;
+}
+
+function withEgo(document: ScenarioDocument, actor: string | null): ScenarioDocument | null {
+  if (actor !== null && !document.actors.some(({ id }) => id === actor)) return null;
+  const actors = document.actors.map((one) =>
+    one.ego === (one.id === actor) ? one : { ...one, ego: one.id === actor },
+  );
+  return { ...document, actors };
+}
+
+function changed<K extends "actors" | "flows">(
+  document: ScenarioDocument,
+  list: K,
+  id: string,
+  fields: Partial<ScenarioDocument[K][number]>,
+): ScenarioDocument | null {
+  const row = document[list].findIndex((one) => one.id === id);
+  const old = document[list][row];
+  return old ? { ...document, [list]: document[list].with(row, { ...old, ...fields } as never) } : null;
+}
+
+/** As the server names what has no name: `car-1`, or the first number after it that is free. */
+function freeId(document: ScenarioDocument, stem: string): string {
+  const taken = new Set(everyone(document).map(({ id }) => id));
+  let number = 1;
+  while (taken.has(`${stem}-${number}`)) number += 1;
+  return `${stem}-${number}`;
+}
+
+const without = <T extends object, K extends keyof T>(table: T, ...names: readonly K[]): Omit<T, K> =>
+  Object.fromEntries(Object.entries(table).filter(([name]) => !names.includes(name as K))) as Omit<T, K>;

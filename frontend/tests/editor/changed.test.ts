@@ -54,7 +54,42 @@ test("what says the same is the same object", () => {
   expect(reused([1, 2, 3], [1, 2])).toEqual([1, 2]);
 });
 
-test("moves, goals, fields, the ego and removals are foreseen; what the server names is not", () => {
+test("of lists with one more or one less, all others are the same objects", () => {
+  const lead = structuredClone(patched(document, [change("remove", "/actors/0")]));
+  const less = reused(document, lead);
+  expect(less.actors).toEqual(lead.actors);
+  expect(less.actors[0]).toBe(document.actors[1]);
+  expect(less.actors[1]).toBe(document.actors[2]);
+  const more = structuredClone(patched(document, [change("add", "/actors/1", actor("new"))]));
+  const made = reused(document, more);
+  expect(made).toEqual(more);
+  expect([made.actors[0], ...made.actors.slice(2)]).toEqual(document.actors);
+  expect(made.actors[2]).toBe(document.actors[1]);
+  expect(reused(document, { ...document, actors: document.actors.toReversed() }).actors).toEqual(
+    document.actors.toReversed(),
+  );
+});
+
+test("new road users and flows are foreseen with the names that the server will give", () => {
+  const made = foreseen(document, [
+    { kind: "add_actor", category: "car", spawn: "n1" },
+    { kind: "add_actor", category: "car", spawn: "n2", ego: true, depart: 3 },
+    { kind: "add_flow", spawn: "n3", per_hour: 60, mix: { van: 1 } },
+    { kind: "copy_actors", copies: { n4: "a", n5: "car-2" } },
+    { kind: "change_flow", flow: "flow-1", per_hour: 70 },
+  ]);
+  const fresh = { ...actor("car-1", "n1"), lateral_offset: 0 };
+  expect(made?.actors.slice(3)).toEqual([
+    fresh,
+    { ...fresh, id: "car-2", spawn: "n2", ego: true, depart: 3 },
+    { ...actor("car-3", "n4") },
+    { ...fresh, id: "car-4", spawn: "n5", depart: 3 },
+  ]);
+  expect(made?.flows[1]).toEqual({ ...flow("flow-1", "n3"), per_hour: 70, mix: { van: 1 } });
+  expect(document.actors).toHaveLength(3);
+});
+
+test("moves, goals, fields, the ego and removals are foreseen; what only the server knows is not", () => {
   const made = foreseen(document, [
     { kind: "move_actor", actor: "a", spawn: "n1" },
     { kind: "set_goal", actor: "a", goal: "n2" },
@@ -69,7 +104,9 @@ test("moves, goals, fields, the ego and removals are foreseen; what the server n
   ]);
   expect(made?.flows).toEqual([]);
   const unknown: Edit[] = [
-    { kind: "add_actor", category: "car", spawn: "n" },
+    { kind: "copy_actors", copies: { n: "nobody" } },
+    { kind: "grow_roi", segment: "r2" },
+    { kind: "change_flow", flow: "f", id: "z" },
     { kind: "change_actor", actor: "a", category: "van" },
     { kind: "change_actor", actor: "a", id: "z" },
     { kind: "move_actor", actor: "nobody", spawn: "n" },
@@ -201,20 +238,20 @@ test("an edit without a server is taken back, said, and can be made again", asyn
 test("undo and redo show at once what this page has seen, and the versions go on growing", async () => {
   const [server, store] = await opened();
   const { edit, undo, redo } = store.getState();
-  const done = edit({ kind: "set_seed", seed: 7 });
-  const seed = () => store.getState().scenario?.document.seed;
-  expect(seed()).toBe(0); // only the server knows that
-  await server.answer(told(1, change("replace", "/seed", 7)));
+  const done = edit({ kind: "set_clock", clock: 7 });
+  const clock = () => store.getState().scenario?.document.demand.clock;
+  expect(clock()).toBe(0); // only the server knows that
+  await server.answer(told(1, change("replace", "/demand/clock", 7)));
   await done;
-  expect(seed()).toBe(7);
+  expect(clock()).toBe(7);
   const steps = [undo(), redo(), undo()];
-  expect(seed()).toBe(0);
+  expect(clock()).toBe(0);
   for (const [before, made] of [
     [2, 0],
     [3, 7],
     [4, 0],
   ] as const)
-    await server.answer(told(before, change("replace", "/seed", made)));
+    await server.answer(told(before, change("replace", "/demand/clock", made)));
   await Promise.all(steps);
   expect(store.getState()).toMatchObject({ saving: "saved", scenario: { version: 5, document } });
 });
