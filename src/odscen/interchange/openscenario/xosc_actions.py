@@ -45,7 +45,7 @@ _SAME: Final = 0.05
 _STILL: Final = 1e-6
 """m/s² below which nothing moves."""
 IGNORES: Final = "left out, for only rules are obeyed there"
-UNSAID_GOAL: Final = "a goal, for which ScenarioRunner 0.9.16 refuses the whole file"
+UNSAID_GOAL: Final = "a goal, for which ScenarioRunner refuses the whole file"
 
 
 @dataclass(frozen=True, slots=True)
