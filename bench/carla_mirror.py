@@ -26,7 +26,7 @@ from odscen.carla.server.client import Address, import_carla
 from odscen.results.records.run_records import Plan, PlannedActor
 from odscen.sumo.runner.in_step import Step
 from odscen.sumo.worker.protocol import ForeignUser
-from odscen.sumo.worker.session import open_session
+from odscen.sumo.worker.simulation.session import open_session
 from odscen.workspace.asset_catalogue import shipped_assets
 from odscen.workspace.store import Workspace
 from tests.carla_standin.process import StandIn

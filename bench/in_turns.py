@@ -25,7 +25,7 @@ from odscen.results.records.run_records import Plan
 from odscen.sumo.folder.layout import CONFIG_FILE
 from odscen.sumo.outputs.output_tables import outputs_to
 from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
-from odscen.sumo.worker.session import open_session
+from odscen.sumo.worker.simulation.session import open_session
 from odscen.sumo.worker.stepping import Stepper
 from odscen.sumo.worker.story.story_run import StoryRun
 

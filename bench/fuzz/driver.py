@@ -33,7 +33,7 @@ from bench.fuzz.verdicts import Finding, Tried, Verdict
 MINUTES = 60.0
 KEPT = OUT / "fuzz"
 REQUESTS = {"requests by hand": (handmade_trial, 1.0), "requests by schema": (schema_trial, 1.0)}
-_SKIPPED_IMPORTS = ("odscen.__main__", "odscen.carla", "odscen.sumo.worker.session")
+_SKIPPED_IMPORTS = ("odscen.__main__", "odscen.carla", "odscen.sumo.worker.simulation.session")
 """What a command imports only in a process of its own."""
 
 

@@ -19,7 +19,7 @@ from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
-from odscen.sumo.worker.observed import VehicleSignal
+from odscen.sumo.worker.simulation.observed import VehicleSignal
 from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS
 from tests.carla.mirror.test_wheels import plan_of, step_of

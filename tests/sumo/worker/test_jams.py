@@ -12,14 +12,14 @@ from odscen.results.records.run_records import EventKind, events_from_json
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.worker import jams
-from odscen.sumo.worker.observed import Ahead
+from odscen.sumo.worker.simulation.observed import Ahead
 from tests.sumo.conftest import TYPES, Prepare
 
 FREE = Ahead(True, "M", True, None, people=False)
 
 
 class Street:
-    """Stands in for a session: what each vehicle has ahead."""
+    """What each vehicle has ahead."""
 
     def __init__(self, **ahead: Ahead) -> None:
         self._ahead = ahead

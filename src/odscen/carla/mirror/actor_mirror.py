@@ -32,7 +32,7 @@ from odscen.carla.server.batch import (
 )
 from odscen.carla.server.blueprints import Shape
 from odscen.sumo.runner.in_step import Step
-from odscen.sumo.worker.observed import VehicleSignal
+from odscen.sumo.worker.simulation.observed import VehicleSignal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

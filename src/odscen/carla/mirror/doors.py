@@ -13,7 +13,7 @@ import numpy as np
 
 from odscen.carla.mirror.wheels import NEAR
 from odscen.carla.server.batch import DoorMove
-from odscen.sumo.worker.observed import VehicleSignal
+from odscen.sumo.worker.simulation.observed import VehicleSignal
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

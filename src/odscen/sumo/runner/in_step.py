@@ -50,7 +50,7 @@ class Step:
     speed
         m/s.
     signals
-        SUMO's bits, see :class:`~odscen.sumo.worker.observed.VehicleSignal`.
+        SUMO's bits, see :class:`~odscen.sumo.worker.simulation.observed.VehicleSignal`.
     lights
         State of every traffic light by SUMO id.
     departed, arrived

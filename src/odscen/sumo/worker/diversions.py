@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.detours import Pairs
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.session import Session
 
 
 class Diversions:
@@ -50,7 +50,7 @@ class Diversions:
         changed = index < len(self._moments) and self._moments[index] < begin + length
         events = self._begun_and_ended(begin, begin + length) if changed else []
         if self._closed and self._detours is None:  # as long as no lane is closed
-            self._detours = Detours(session.road_links())
+            self._detours = Detours(session.lanes.links())
         if changed or not self._begun:
             self._close(begin + length)
         events += self._strand_departed(session, begin)

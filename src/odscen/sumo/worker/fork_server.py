@@ -59,7 +59,8 @@ def _import_all() -> None:
     import lxml.etree
 
     from odscen.sumo.outputs import output_tables
-    from odscen.sumo.worker import session, simulate
+    from odscen.sumo.worker import simulate
+    from odscen.sumo.worker.simulation import session
 
     del lxml, output_tables, simulate
     session.import_libsumo()

@@ -17,8 +17,9 @@ from odscen.results.records.run_records import Event, EventKind
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.sumo.worker.observed import Ahead, StoppedVehicle
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.observed import Ahead, StoppedVehicle
+    from odscen.sumo.worker.simulation.session import Session
+    from odscen.sumo.worker.simulation.stopped_vehicles import StoppedVehicles
 
 PERIOD = 15.0
 """Simulated seconds between two looks."""
@@ -87,7 +88,7 @@ class JamWatch:
         """Jams that have begun or ended since the last look."""
         self.due = time + PERIOD
         queues: dict[str, list[StoppedVehicle]] = {}
-        for one in session.stopped(WATCHED):
+        for one in session.stopped.longer_than(WATCHED):
             queues.setdefault(one.lane, []).append(one)
         jammed = {lane for lane, queue in queues.items() if max(q.waited for q in queue) >= JAMMED}
         self._seen.update((lane, time) for lane in self._since.keys() & queues.keys())
@@ -97,7 +98,7 @@ class JamWatch:
         for lane, queue in sorted(queues.items()):
             first = max(queue, key=lambda one: (one.pos, one.vehicle))
             reason: StopReason | str
-            reason, head = explain(session, first.vehicle)
+            reason, head = explain(session.stopped, first.vehicle)
             if reason in (StopReason.RED, StopReason.UNKNOWN) and first.vehicle in before:
                 reason = before[first.vehicle].reason
             for one in queue:
@@ -141,15 +142,15 @@ class JamWatch:
         return Event(time, EventKind.JAM_END, "", lane=lane, waited=lasted)
 
 
-def explain(session: Session, vehicle: str) -> tuple[StopReason, str]:
+def explain(stopped: StoppedVehicles, vehicle: str) -> tuple[StopReason, str]:
     """Why a vehicle is stopped, and the vehicle at the head of its queue."""
     seen = [vehicle]
-    ahead = session.ahead(vehicle)
+    ahead = stopped.ahead(vehicle)
     while ahead is not None and _own_reason(ahead) is None and ahead.leader:
         if ahead.leader in seen or len(seen) >= _HOPS:
             return StopReason.CIRCLE if ahead.leader in seen else StopReason.NO_ROOM, seen[-1]
         seen.append(ahead.leader)
-        ahead = session.ahead(ahead.leader)
+        ahead = stopped.ahead(ahead.leader)
     if ahead is None:
         return StopReason.UNKNOWN, seen[-1]
     return _own_reason(ahead) or StopReason.UNKNOWN, seen[-1]

@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from odscen.results.records.run_records import Plan
-    from odscen.sumo.worker.observed import Poses
     from odscen.sumo.worker.protocol import Lockstep, Message
     from odscen.sumo.worker.recorder import Recorder
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.observed import Poses
+    from odscen.sumo.worker.simulation.session import Session
 
 COLUMNS = 8
 

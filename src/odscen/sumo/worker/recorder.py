@@ -17,8 +17,8 @@ from odscen.sumo.worker.jams import JamWatch
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.sumo.worker.observed import Collision, Front, StepLists
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.observed import Collision, Front, StepLists
+    from odscen.sumo.worker.simulation.session import Session
 
 
 class _EventfulStep(NamedTuple):

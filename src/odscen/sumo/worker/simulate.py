@@ -59,7 +59,7 @@ from odscen.sumo.worker.protocol import (
     decode,
     encode,
 )
-from odscen.sumo.worker.session import open_session
+from odscen.sumo.worker.simulation.session import open_session
 from odscen.sumo.worker.slices import run_slice
 from odscen.sumo.worker.steering import Steering
 from odscen.sumo.worker.stepping import Stepper
@@ -185,7 +185,7 @@ def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper, *, raw: bool) -> D
     arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(folder, sumo)]
     with open_session(arguments) as session:
         now = stepper.run(session, plan.until)
-        lengths = session.lane_lengths()
+        lengths = session.lanes.lengths()
     left = lengths if raw and are_small(folder) else None
     if left is None:
         make_tables(folder, plan, lengths)

@@ -33,13 +33,13 @@ from odscen.sumo.worker.completer import Written
 from odscen.sumo.worker.completion import Completion
 from odscen.sumo.worker.protocol import Done
 from odscen.sumo.worker.route_slices import RouteSlices
-from odscen.sumo.worker.session import open_session
+from odscen.sumo.worker.simulation.session import open_session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from odscen.results.records.run_records import Plan
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.session import Session
     from odscen.sumo.worker.stepping import Stepper
 
 _SAVING = (
@@ -109,7 +109,7 @@ class _RunningSlice:
             last = self._is_last(session, stepper, now, more=more)
             present = session.present()
             running = session.running()
-            lanes, lengths = session.vehicles_by_lane(), session.lane_lengths()
+            lanes, lengths = session.vehicles_by_lane(), session.lanes.lengths()
             if not last:
                 # SUMO puts a state where it puts outputs, relative to the folder that it is given.
                 session.save(self._run / layout.SUMO_FOLDER / STATE_FILE)

@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.frames import SumoPose, sumo_to_xodr
-from odscen.sumo.worker.observed import VehicleSignal
+from odscen.sumo.worker.simulation.observed import VehicleSignal
 
 if TYPE_CHECKING:
     from odscen.results.records.run_records import Plan
-    from odscen.sumo.worker.observed import Poses
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.observed import Poses
+    from odscen.sumo.worker.simulation.session import Session
 
 HEADER = 5
 COLUMNS = 6

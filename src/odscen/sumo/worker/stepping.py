@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
     from odscen.sumo.worker.protocol import Message
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.session import Session
     from odscen.sumo.worker.story.story_run import StoryRun
     from odscen.sumo.worker.watch import Watch
 

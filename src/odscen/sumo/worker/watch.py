@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.recorder import Recorder
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.session import Session
     from odscen.sumo.worker.steering import Steering
 
 SHARE = 0.06

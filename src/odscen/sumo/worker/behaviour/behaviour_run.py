@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from odscen.learning.behaviour.behaviour_model import BehaviourModel
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.behaviour.lazy_observation import LazyObservation
-    from odscen.sumo.worker.driven_vehicles import DrivenVehicles
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
+    from odscen.sumo.worker.simulation.session import Session
 
 
 class BehaviourRun:

@@ -11,7 +11,7 @@ from odscen.learning.behaviour.behaviour_model import LightAhead
 
 if TYPE_CHECKING:
     from odscen.base.arrays import Int32Array, IntArray
-    from odscen.sumo.worker.driven_vehicles import DrivenVehicles
+    from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
 
 _SHOWN = np.full(256, LightAhead.NONE, dtype=np.int32)
 """What letters of SUMO's lights mean, by their codes; off and blinking are no light."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import PlannedActor
     from odscen.scenario.story.channels import WantedMove
     from odscen.scenario.story.road_view import ActorView
-    from odscen.sumo.worker.moved_actors import MovedActors
+    from odscen.sumo.worker.simulation.moved_actors import MovedActors
     from odscen.sumo.worker.story.story_view import StoryView
 
 BODIES = "bodies"

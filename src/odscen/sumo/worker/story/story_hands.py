@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.frames import angle_deg_from_hdg
 from odscen.results.records.run_records import Event, EventKind
 from odscen.scenario.story.asked_actions import WantedActor
-from odscen.sumo.worker.moved_actors import DARK, SavedWalk
+from odscen.sumo.worker.simulation.moved_actors import DARK, SavedWalk
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import PlannedActor
     from odscen.scenario.story.asked_actions import Wanted, WantedSignal
     from odscen.sumo.realize.rules.story_files import StoryPlan
-    from odscen.sumo.worker.moved_actors import MovedActors
     from odscen.sumo.worker.recorder import Recorder
+    from odscen.sumo.worker.simulation.moved_actors import MovedActors
 
 
 class StoryHands:

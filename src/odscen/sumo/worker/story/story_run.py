@@ -13,7 +13,7 @@ from odscen.scenario.story.channels import Pose, WantedMove
 from odscen.scenario.story.story_engine import StoryEngine
 from odscen.sumo.folder.layout import STORY_FILE, SUMO_FOLDER
 from odscen.sumo.realize.rules.story_files import StoryPlan
-from odscen.sumo.worker.moved_actors import SavedWalk
+from odscen.sumo.worker.simulation.moved_actors import SavedWalk
 from odscen.sumo.worker.story.body_contacts import BodyContacts
 from odscen.sumo.worker.story.saved_walks import mend_walks
 from odscen.sumo.worker.story.story_hands import StoryHands
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
     from odscen.results.records.run_records import Plan
     from odscen.scenario.story.story_engine import StoryEvent
-    from odscen.sumo.worker.moved_actors import MovedActors
     from odscen.sumo.worker.recorder import Recorder
-    from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.simulation.moved_actors import MovedActors
+    from odscen.sumo.worker.simulation.session import Session
 
 _FREE = WantedMove()
 _ANY_SPEED = 200.0

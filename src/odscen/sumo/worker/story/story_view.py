@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import PlannedActor
     from odscen.scenario.story.road_view import Point
     from odscen.sumo.realize.rules.story_files import StoryPlan
-    from odscen.sumo.worker.moved_actors import MovedActors
+    from odscen.sumo.worker.simulation.moved_actors import MovedActors
 
 _STANDING = 0.1
 """m/s below which a road user stands."""

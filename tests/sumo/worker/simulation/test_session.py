@@ -12,7 +12,7 @@ import sumo
 from lxml import etree
 
 from odscen.sumo.worker.protocol import EgoPose
-from odscen.sumo.worker.session import Session
+from odscen.sumo.worker.simulation.session import Session
 
 # libsumo is one global simulation, so each of these runs in a process of its own.
 PRELUDE = """
@@ -20,7 +20,7 @@ import json, sys
 from pathlib import Path
 from odscen.base.errors import SimulationError
 from odscen.sumo.worker.output_capture import captured_output
-from odscen.sumo.worker.session import open_session
+from odscen.sumo.worker.simulation.session import open_session
 net = sys.argv[1]
 """
 
@@ -116,7 +116,7 @@ def test_importing_libsumo_prints_nothing_to_stdout_even_where_it_would(tmp_path
     result = run_script(
         """
 sys.path.insert(0, sys.argv[1])
-from odscen.sumo.worker.session import import_libsumo
+from odscen.sumo.worker.simulation.session import import_libsumo
 import_libsumo()
 print("clean")
 """,
@@ -166,7 +166,7 @@ with open_session(["-n", net, "-r", sys.argv[2], "--xml-validation", "never"]) a
     while session.time < 60:
         session.step()
     ((lane, _),) = session.vehicle_places(["one"])
-    print(json.dumps([lane, *session.ahead("one")]))
+    print(json.dumps([lane, *session.stopped.ahead("one")]))
 """,
         str(tmp_path / "net.xml"),
         str(tmp_path / "r.rou.xml"),
@@ -196,7 +196,8 @@ with open_session(["-n", net, "-r", sys.argv[2], "--xml-validation", "never"]) a
         if not stopped and session.vehicle_front("foe").y > 119.0:  # the middle of B1 is at 120
             libsumo.vehicle.setSpeed("foe", 0.0)
             stopped = True
-    print(json.dumps([stopped, session.ahead("one").leader, session.ahead("foe").onwards]))
+    ahead = session.stopped.ahead
+    print(json.dumps([stopped, ahead("one").leader, ahead("foe").onwards]))
 """,
         str(grid),
         str(tmp_path / "r.rou.xml"),
@@ -211,7 +212,7 @@ def test_lanes_for_vehicles_are_told_by_edge_and_those_inside_junctions_are_know
     result = run_script(
         """
 with open_session(["-n", net, "--xml-validation", "never"]) as session:
-    print(json.dumps([session.lane_lengths(), sorted(session._internal_lanes)]))
+    print(json.dumps([session.lanes.lengths(), sorted(session.lanes.internal)]))
 """,
         str(grid),
     )

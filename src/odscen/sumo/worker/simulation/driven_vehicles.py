@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from odscen.base.arrays import FloatArray
+    from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
 _ALL_CHECKS, _NO_CHECKS = 31, 96
 """``setSpeedMode``: SUMO's own; what is set and nothing else."""
@@ -50,11 +51,11 @@ class DrivenVehicles:
         sumo: Any,
         errors: tuple[type[Exception], ...],
         native: Callable[[str, str], Callable[..., Any]],
-        lanes_of_edge: Mapping[str, Sequence[str]],
+        lanes: RoadLanes,
     ) -> None:
         self._sumo = sumo
         self.errors = errors
-        self._lanes_of_edge = lanes_of_edge
+        self._lanes = lanes
         self._ids, self._count = (native("vehicle", f"getID{what}") for what in ("List", "Count"))
         self._place, self._lane = native("vehicle", "getPosition"), native("vehicle", "getLaneID")
         self._numbers = {name: native("vehicle", f"get{name}") for name in NUMBERS}
@@ -93,7 +94,7 @@ class DrivenVehicles:
         """Lanes that vehicles may use, inside junctions as well."""
         lane = self._sumo.lane
         found = []
-        for edge, names in sorted(self._lanes_of_edge.items()):
+        for edge, names in sorted(self._lanes.of_edge.items()):
             for name in sorted(names, key=lambda one: (len(one), one)):
                 allowed = frozenset(lane.getAllowed(name))
                 if allowed == {"pedestrian"}:

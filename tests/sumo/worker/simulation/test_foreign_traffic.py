@@ -9,13 +9,13 @@ from pathlib import Path
 
 from odscen.workspace.store import Workspace
 
-CROSSING = Path(__file__).parents[3] / "maps" / "signal_crossing.xodr"
+CROSSING = Path(__file__).parents[4] / "maps" / "signal_crossing.xodr"
 
 # libsumo is one global simulation, so this runs in a process of its own.
 SCRIPT = """
 import json, math, sys
 from odscen.sumo.worker.protocol import ForeignUser
-from odscen.sumo.worker.session import open_session, import_libsumo
+from odscen.sumo.worker.simulation.session import open_session, import_libsumo
 with open_session(["-n", sys.argv[1], "--step-length", "0.1", "--no-step-log"]) as session:
     sumo = import_libsumo()
     sumo.route.add("r", [sys.argv[2]])

@@ -8,10 +8,9 @@ process's file descriptors 1 and 2, see :mod:`odscen.sumo.worker.output_capture`
 
 from __future__ import annotations
 
-import math
 import os
 import sys
-from collections import Counter, defaultdict
+from collections import Counter
 from contextlib import contextmanager, suppress
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, cast
@@ -19,48 +18,24 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from odscen.base.errors import SimulationError
-from odscen.sumo.worker.detours import LaneLink
-from odscen.sumo.worker.driven_vehicles import DrivenVehicles
-from odscen.sumo.worker.foreign_traffic import ForeignLights, ForeignTraffic, is_foreign
-from odscen.sumo.worker.moved_actors import MovedActors
-from odscen.sumo.worker.observed import (
-    Ahead,
+from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
+from odscen.sumo.worker.simulation.foreign_traffic import ForeignLights, ForeignTraffic, is_foreign
+from odscen.sumo.worker.simulation.moved_actors import MovedActors
+from odscen.sumo.worker.simulation.observed import (
     Front,
     Poses,
     RouteAhead,
     StepLists,
-    StoppedVehicle,
 )
-from odscen.sumo.worker.stop_doors import StopDoors
+from odscen.sumo.worker.simulation.placed_vehicles import Placing
+from odscen.sumo.worker.simulation.road_lanes import RoadLanes
+from odscen.sumo.worker.simulation.stop_doors import StopDoors
+from odscen.sumo.worker.simulation.stopped_vehicles import StoppedVehicles
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
     from types import ModuleType
-
-    from odscen.sumo.worker.protocol import EgoPose
-
-
-_UNCHECKED = 0
-"""``setSpeedMode``: the speed that is set, whatever is safe, possible or permitted."""
-_FAST = 200.0
-"""m/s; no limit of a model, for a vehicle whose speed is set."""
-_EDGES_AHEAD = 3
-"""Edges that the route of a vehicle driven from outside has at least, its own included."""
-
-
-_CLASSES = ("passenger", "delivery", "truck", "bus", "motorcycle", "bicycle")
-"""SUMO's classes of our categories of vehicles."""
-_NEAR_LANE = 10.0
-"""Metres around a place in which SUMO looks for its lane; its own 100 m cost thrice as much."""
-_CLOSE = 5.0
-"""Metres that a stopped vehicle ahead may be away and be the reason for stopping."""
-_BLOCKING = 10.0
-"""Metres from the front to the middle of another body in a junction that may be the reason."""
-_RED = ("r", "u")
-"""States of a traffic light's link at which no vehicle goes."""
-_STOPPED = 0.1
-"""Speed, m/s, below which SUMO counts a vehicle as waiting."""
 
 
 _HAPPENINGS = (
@@ -146,6 +121,21 @@ class Session:
         """Traffic lights that other programs switch."""
         return ForeignLights(self._sumo)
 
+    @cached_property
+    def lanes(self) -> RoadLanes:
+        """Lanes of the network."""
+        return RoadLanes(self._sumo)
+
+    @cached_property
+    def stopped(self) -> StoppedVehicles:
+        """Vehicles that are stopped, and why."""
+        return StoppedVehicles(self._sumo, self._errors, self.lanes)
+
+    @cached_property
+    def place(self) -> Placing:
+        """Puts a vehicle where another program has driven it."""
+        return Placing(self._sumo, self._errors, self.lanes)
+
     def _strangers(self) -> int:
         return 0 if self._foreign is None else len(self._foreign)
 
@@ -191,8 +181,8 @@ class Session:
         """Route of a vehicle from its edge on, or whole if it is still to depart."""
         vehicles = self._sumo.vehicle
         edges = tuple(vehicles.getRoute(vehicle))[max(0, vehicles.getRouteIndex(vehicle)) :]
-        inside = vehicles.getLaneID(vehicle) in self._internal_lanes
-        in_junction = self._lanes_of_edge[edges[0]][0] in self._internal_lanes
+        inside = vehicles.getLaneID(vehicle) in self.lanes.internal
+        in_junction = self.lanes.of_edge[edges[0]][0] in self.lanes.internal
         return RouteAhead(edges[:in_junction], edges[in_junction:], inside)
 
     def has_departed(self, vehicle: str) -> bool:
@@ -217,25 +207,6 @@ class Session:
         with suppress(*self._errors):
             self._sumo.vehicle.remove(vehicle, self._sumo.REMOVE_VAPORIZED)
 
-    def road_links(self) -> list[LaneLink]:
-        """Return ways from edge to edge for vehicles, with the time that they take in free flow."""
-        lane, everyone = self._sumo.lane, frozenset(_CLASSES)
-        allowed = {
-            name: frozenset(lane.getAllowed(name)) or everyone - {*lane.getDisallowed(name)}
-            for name in lane.getIDList()
-        }
-        links = []
-        for edge, own in self._lanes_of_edge.items():
-            for name in own:
-                if name in self._internal_lanes:
-                    continue
-                for link in lane.getLinks(name):
-                    passed = [part for part in (link[4], link[0]) if part]
-                    who = allowed[name].intersection(*(allowed[part] for part in passed))
-                    time = sum(lane.getLength(part) / lane.getMaxSpeed(part) for part in passed)
-                    links.append(LaneLink(edge, lane.getEdgeID(link[0]), time, who))
-        return links
-
     def vehicle_poses(self) -> Poses:
         """Poses of all vehicles; 1.5 microseconds each, a fifth of what subscriptions cost."""
         return self._poses(self._sumo.vehicle, self._sumo.vehicle.getSignals)
@@ -257,89 +228,12 @@ class Session:
     def moved_actors(self) -> MovedActors:
         """Hand of rules on single road users."""
         native = partial(_native, self._sumo)
-        lanes = self._lanes_of_edge
-        return MovedActors(self._sumo, self._errors, lanes, self._admits, native, self.knows)
+        return MovedActors(self._sumo, self._errors, self.lanes, native, self.knows)
 
     def driven_vehicles(self) -> DrivenVehicles:
         """Hand of behaviour models on all vehicles."""
         native = partial(_native, self._sumo)
-        return DrivenVehicles(self._sumo, self._errors, native, self._lanes_of_edge)
-
-    def place(self, vehicle: str, at: EgoPose, *, again: bool = False) -> bool:
-        """Put a vehicle where another program has driven it; false if SUMO cannot.
-
-        The place is taken exactly, on or off the road, and so is the speed, whatever limits,
-        lights and right of way say: nothing of SUMO's drives it. ``keepRoute=2`` lets the vehicle
-        leave its route; its new one would end with the edge that it is on, so it is led on a
-        little: others must know where it may be going. ``again`` says that it was put somewhere
-        before: how it obeys need not be said twice.
-        """
-        vehicles = self._sumo.vehicle
-        try:
-            if not again:
-                vehicles.setSpeedMode(vehicle, _UNCHECKED)
-                vehicles.setMaxSpeed(vehicle, _FAST)
-            vehicles.setSpeed(vehicle, at.speed)
-            vehicles.moveToXY(vehicle, "", -1, at.x, at.y, at.angle_deg, 2, _NEAR_LANE)
-            route, index = vehicles.getRoute(vehicle), vehicles.getRouteIndex(vehicle)
-            if index >= 0 and len(route) - index < _EDGES_AHEAD:
-                self._lead_on(vehicle, route[index:])
-        except self._errors:
-            return False
-        return True
-
-    def _lead_on(self, vehicle: str, route: Sequence[str]) -> None:
-        edges = list(route)
-        lanes = self._lanes_of_edge
-        if lanes[edges[0]][0] in self._internal_lanes:  # a route cannot be changed in a junction
-            return
-        links, lane_edge = self._sumo.lane.getLinks, self._sumo.lane.getEdgeID
-        kind = self._sumo.vehicle.getVehicleClass(vehicle)
-        while len(edges) < _EDGES_AHEAD:
-            onward = [
-                lane_edge(link[0])
-                for lane in lanes[edges[-1]]
-                for link in links(lane)
-                if self._admits(link[0], kind)
-            ]
-            if not onward:
-                break
-            edges.append(onward[0])
-        if len(edges) > len(route):
-            self._sumo.vehicle.setRoute(vehicle, edges)
-
-    def _admits(self, lane: str, kind: str) -> bool:
-        allowed = self._sumo.lane.getAllowed(lane)
-        return not allowed or kind in allowed
-
-    def lane_lengths(self) -> dict[str, dict[str, float]]:
-        """Lanes that vehicles may use, by edge, and their lengths in metres; junctions as well."""
-        lane = self._sumo.lane
-        on_foot = ("pedestrian",)
-        lengths = {
-            edge: {
-                name: lane.getLength(name)
-                for name in lanes
-                if tuple(lane.getAllowed(name)) != on_foot
-            }
-            for edge, lanes in self._lanes_of_edge.items()
-        }
-        return {edge: own for edge, own in lengths.items() if own}
-
-    @cached_property
-    def _lanes_of_edge(self) -> dict[str, list[str]]:
-        """Lanes of each edge, as SUMO lists them."""
-        edge_of, lanes = self._sumo.lane.getEdgeID, defaultdict(list)
-        for name in self._sumo.lane.getIDList():
-            lanes[edge_of(name)].append(name)
-        return dict(lanes)
-
-    @cached_property
-    def _internal_lanes(self) -> frozenset[str]:
-        """Lanes for vehicles inside junctions: those that connections lead over."""
-        lane = self._sumo.lane
-        links = (link for name in lane.getIDList() for link in lane.getLinks(name))
-        return frozenset(link[4] for link in links if link[4])
+        return DrivenVehicles(self._sumo, self._errors, native, self.lanes)
 
     def vehicles_by_lane(self) -> dict[str, int]:
         """How many vehicles have their front on each lane, of those that have any."""
@@ -402,101 +296,6 @@ class Session:
         except self._errors as error:
             msg = f"SUMO could not save its state at {self.time:g} s: {error}"
             raise SimulationError(msg) from error
-
-    def stopped(self, seconds: float) -> list[StoppedVehicle]:
-        """Vehicles that have been stopped for so long; a microsecond for each on the road."""
-        vehicle = self._sumo.vehicle
-        found = []
-        for name in vehicle.getIDList():
-            waited = 0.0 if is_foreign(name) else vehicle.getWaitingTime(name)
-            if waited >= seconds and (lane := vehicle.getLaneID(name)):
-                found.append(StoppedVehicle(name, lane, vehicle.getLanePosition(name), waited))
-        return found
-
-    def ahead(self, name: str) -> Ahead | None:
-        """What a vehicle has before it; ``None`` if it is not on the road."""
-        vehicle = self._sumo.vehicle
-        try:
-            links = vehicle.getNextLinks(name)
-            leader = self._stopped_leader(name, float(links[0][7]) if links else 0.0)
-            at_end = vehicle.getRouteIndex(name) >= len(vehicle.getRoute(name)) - 1
-            lane = str(vehicle.getLaneID(name))
-            if leader is None and not at_end and (wrong := self._leads_astray(name)) is not None:
-                return Ahead(False, "", False, None, people=False, beside=wrong)
-            inside = lane in self._internal_lanes
-            goes = bool(links) and links[0][5] not in _RED  # else that is the reason
-            through = lane if inside else str(links[0][4]) if goes else ""
-            if leader is None and through:
-                leader = self._blocking_vehicle(name, through)
-        except self._errors:
-            return None
-        if not links:  # inside a junction the link out of it is not among them
-            onwards = at_end or inside
-            return Ahead(onwards, "", onwards, leader, people=False)
-        link = links[0]
-        # approachedLane, hasPrio, isOpen, hasFoe, approachedInternal, state, direction, length
-        people = bool(link[3]) and self._people_cross(link[4])
-        return Ahead(True, str(link[5]), bool(link[2]), leader, people)
-
-    def _leads_astray(self, name: str) -> bool | None:
-        """Whether another lane continues along a vehicle's route; ``None`` if its own lane does."""
-        vehicle, lanes = self._sumo.vehicle, self._sumo.lane
-        lane, index = vehicle.getLaneID(name), vehicle.getRouteIndex(name)
-        if not lane or lane in self._internal_lanes:
-            return None
-        own = self._lanes_of_edge[lanes.getEdgeID(lane)]
-        following = vehicle.getRoute(name)[index + 1]
-        leading = {
-            one
-            for one in own
-            if any(lanes.getEdgeID(link[0]) == following for link in lanes.getLinks(one))
-        }
-        if lane not in leading:
-            return bool(leading)
-        # It may lead on there and no further: SUMO wants another lane, so many to the left.
-        wants = next((one[3] for one in vehicle.getBestLanes(name) if one[0] == lane), 0)
-        return True if wants else None
-
-    def _stopped_leader(self, name: str, junction: float) -> str | None:
-        """Return the vehicle that leaves no room behind ``junction`` metres of junction."""
-        vehicle = self._sumo.vehicle
-        lane = vehicle.getLaneID(name)
-        rest = self._sumo.lane.getLength(lane) - vehicle.getLanePosition(name) if lane else 0.0
-        gap = vehicle.getMinGap(name)
-        needed = max(_CLOSE, rest + junction + vehicle.getLength(name) + 2.0 * gap)
-        leader = vehicle.getLeader(name, needed)
-        if not leader or not leader[0] or leader[1] > needed:
-            return None
-        return str(leader[0]) if vehicle.getSpeed(leader[0]) < _STOPPED else None
-
-    def _blocking_vehicle(self, name: str, internal: str) -> str | None:
-        """Return the nearest vehicle stopped ahead on another connection of the junction."""
-        vehicle, lanes = self._sumo.vehicle, self._sumo.lane
-        x, y = vehicle.getPosition(name)
-        angle = math.radians(vehicle.getAngle(name))
-        nearest, found = _BLOCKING, None
-        for foe in sorted(lanes.getInternalFoes(internal)):
-            for other in lanes.getLastStepVehicleIDs(foe):
-                if vehicle.getSpeed(other) >= _STOPPED:
-                    continue
-                (fx, fy), turned = vehicle.getPosition(other), math.radians(vehicle.getAngle(other))
-                half = vehicle.getLength(other) / 2.0
-                dx = fx - half * math.sin(turned) - x
-                dy = fy - half * math.cos(turned) - y
-                away = math.hypot(dx, dy)
-                if away < nearest and dx * math.sin(angle) + dy * math.cos(angle) > 0.0:
-                    nearest, found = away, str(other)
-        return found
-
-    def _people_cross(self, internal: str) -> bool:
-        if not internal:
-            return False
-        lane, edge = self._sumo.lane, self._sumo.edge
-        return any(
-            lane.getAllowed(foe) == ("pedestrian",)
-            and edge.getLastStepPersonIDs(lane.getEdgeID(foe))
-            for foe in lane.getInternalFoes(internal)
-        )
 
     def _poses(self, domain: Any, signals: Callable[[str], int] | None) -> Poses:
         ids = domain.getIDList()

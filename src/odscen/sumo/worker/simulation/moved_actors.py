@@ -6,9 +6,10 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from odscen.sumo.realize.routes_file import HeldActor
+    from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
 _ALL_CHECKS, _SAFE, _NO_CHECKS = 31, 95, 96
 """``setSpeedMode``: SUMO's own; safe, but faster than the limit; what is set and nothing else."""
@@ -86,8 +87,7 @@ class MovedActors:
         self,
         sumo: Any,
         errors: tuple[type[Exception], ...],
-        lanes_of_edge: Mapping[str, Sequence[str]],
-        admits: Callable[[str, str], bool],
+        lanes: RoadLanes,
         native: Callable[[str, str], Callable[[str], Any]],
         knows: Callable[[str], bool],
     ) -> None:
@@ -97,8 +97,7 @@ class MovedActors:
         self._more = tuple(native("vehicle", getter) for getter in _MORE)
         self._sumo = sumo
         self._errors = errors
-        self._lanes_of_edge = lanes_of_edge
-        self._admits = admits
+        self._lanes = lanes
 
     def motion(self, name: str) -> tuple[float, float, float, float] | None:
         """X, y, angle (degrees) and speed of a vehicle, ``None`` if it is not on the road."""
@@ -215,7 +214,7 @@ class MovedActors:
         return True
 
     def _walkable(self, edge: str) -> bool:
-        return any(self._admits(lane, "pedestrian") for lane in self._lanes_of_edge[edge])
+        return any(self._lanes.admits(lane, "pedestrian") for lane in self._lanes.of_edge[edge])
 
     def goal_edge(self, vehicle: str) -> str:
         """Edge on which the route of a vehicle ends."""
@@ -231,9 +230,9 @@ class MovedActors:
         beyond = next(
             (
                 self._sumo.lane.getEdgeID(link[0])
-                for lane in self._lanes_of_edge.get(edge, ())
-                for link in (links(lane) if through and self._admits(lane, kind) else ())
-                if self._admits(link[0], kind)
+                for lane in self._lanes.of_edge.get(edge, ())
+                for link in (links(lane) if through and self._lanes.admits(lane, kind) else ())
+                if self._lanes.admits(link[0], kind)
             ),
             None,
         )
@@ -364,7 +363,7 @@ class MovedActors:
         return tuple(
             self._line(vehicle, lanes[n], kind)
             for n in sorted(rows)
-            if 0 <= n < len(lanes) and self._admits(lanes[n], kind)
+            if 0 <= n < len(lanes) and self._lanes.admits(lanes[n], kind)
         )
 
     def lines(self, vehicle: str) -> tuple[Shape, ...]:
@@ -375,7 +374,9 @@ class MovedActors:
             return ()
         kind = one.getVehicleClass(vehicle)
         lanes = self._in_order(self._sumo.lane.getEdgeID(own))
-        return tuple(self._line(vehicle, lane, kind) for lane in lanes if self._admits(lane, kind))
+        return tuple(
+            self._line(vehicle, lane, kind) for lane in lanes if self._lanes.admits(lane, kind)
+        )
 
     def bodies_near(self, lane: str) -> list[tuple[str, bool]]:
         """Vehicles and persons on the edge of a lane, with whether each is a person."""
@@ -391,7 +392,7 @@ class MovedActors:
 
     def _in_order(self, edge: str) -> list[str]:
         """Lanes of an edge from the outermost on; SUMO numbers them so."""
-        return sorted(self._lanes_of_edge[edge], key=lambda lane: (len(lane), lane))
+        return sorted(self._lanes.of_edge[edge], key=lambda lane: (len(lane), lane))
 
     def _line(self, vehicle: str, lane: str, kind: str) -> Shape:
         """Centre line of a lane and of those that it leads to, along the route if it does."""
@@ -399,7 +400,7 @@ class MovedActors:
         route = set(one.getRoute(vehicle)[max(one.getRouteIndex(vehicle), 0) :])
         line, metres = list(lanes.getShape(lane)), lanes.getLength(lane)
         while metres < _AHEAD:
-            links = [link for link in lanes.getLinks(lane) if self._admits(link[0], kind)]
+            links = [link for link in lanes.getLinks(lane) if self._lanes.admits(link[0], kind)]
             if not links:
                 break
             onward = [link for link in links if lanes.getEdgeID(link[0]) in route]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.sumo.worker.observed import VehicleSignal
+from odscen.sumo.worker.simulation.observed import VehicleSignal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -15,8 +15,8 @@ from odscen.sumo.runner.elevation import ElevationLookup
 from odscen.sumo.runner.in_step import InStep, Step
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.sumo.worker.observed import VehicleSignal
-from odscen.sumo.worker.stop_doors import GETTING_OUT, StopDoors
+from odscen.sumo.worker.simulation.observed import VehicleSignal
+from odscen.sumo.worker.simulation.stop_doors import GETTING_OUT, StopDoors
 from tests.parking_case import parking_scenario, parking_town
 
 LEFT, RIGHT = VehicleSignal.DOOR_OPEN_LEFT, VehicleSignal.DOOR_OPEN_RIGHT

@@ -54,7 +54,7 @@ class ForeignTraffic:
     sumo, errors
         libsumo, and what it raises.
     place
-        Puts a vehicle somewhere, as :meth:`odscen.sumo.worker.session.Session.place`.
+        Puts a vehicle somewhere, as :meth:`odscen.sumo.worker.simulation.session.Session.place`.
     """
 
     def __init__(self, sumo: Any, errors: tuple[type[Exception], ...], place: PlaceVehicle) -> None:

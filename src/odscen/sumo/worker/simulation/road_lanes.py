@@ -1,0 +1,72 @@
+"""Lanes of the network as the running SUMO has them: of which edge, who may use them, where to."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from functools import cached_property
+from typing import Any
+
+from odscen.sumo.worker.detours import LaneLink
+
+_CLASSES = ("passenger", "delivery", "truck", "bus", "motorcycle", "bicycle")
+"""SUMO's classes of our categories of vehicles."""
+
+
+class RoadLanes:
+    """What never changes in a run, asked once."""
+
+    def __init__(self, sumo: Any) -> None:
+        self._sumo = sumo
+
+    @cached_property
+    def of_edge(self) -> dict[str, list[str]]:
+        """Lanes of each edge, as SUMO lists them."""
+        edge_of, lanes = self._sumo.lane.getEdgeID, defaultdict(list)
+        for name in self._sumo.lane.getIDList():
+            lanes[edge_of(name)].append(name)
+        return dict(lanes)
+
+    @cached_property
+    def internal(self) -> frozenset[str]:
+        """Lanes for vehicles inside junctions: those that connections lead over."""
+        lane = self._sumo.lane
+        links = (link for name in lane.getIDList() for link in lane.getLinks(name))
+        return frozenset(link[4] for link in links if link[4])
+
+    def admits(self, lane: str, kind: str) -> bool:
+        """Whether vehicles of a class of SUMO's may use a lane."""
+        allowed = self._sumo.lane.getAllowed(lane)
+        return not allowed or kind in allowed
+
+    def lengths(self) -> dict[str, dict[str, float]]:
+        """Lanes that vehicles may use, by edge, and their lengths in metres; junctions as well."""
+        lane = self._sumo.lane
+        on_foot = ("pedestrian",)
+        lengths = {
+            edge: {
+                name: lane.getLength(name)
+                for name in lanes
+                if tuple(lane.getAllowed(name)) != on_foot
+            }
+            for edge, lanes in self.of_edge.items()
+        }
+        return {edge: own for edge, own in lengths.items() if own}
+
+    def links(self) -> list[LaneLink]:
+        """Return ways from edge to edge for vehicles, with the time that they take in free flow."""
+        lane, everyone = self._sumo.lane, frozenset(_CLASSES)
+        allowed = {
+            name: frozenset(lane.getAllowed(name)) or everyone - {*lane.getDisallowed(name)}
+            for name in lane.getIDList()
+        }
+        links = []
+        for edge, own in self.of_edge.items():
+            for name in own:
+                if name in self.internal:
+                    continue
+                for link in lane.getLinks(name):
+                    passed = [part for part in (link[4], link[0]) if part]
+                    who = allowed[name].intersection(*(allowed[part] for part in passed))
+                    time = sum(lane.getLength(part) / lane.getMaxSpeed(part) for part in passed)
+                    links.append(LaneLink(edge, lane.getEdgeID(link[0]), time, who))
+        return links
