@@ -136,6 +136,10 @@ def run_worker(
     ):
         timer = _kill_after(process, time_limit, late)
         try:
+            if tables is not None:
+                import polars as pl  # its import takes longer than a short simulation
+
+                del pl
             last = _follow(process, progress, live)
         except BaseException:  # an interrupt, or the caller's progress function
             _kill(process)
