@@ -96,6 +96,7 @@ class StandIn:
             await asyncio.sleep(ASYNC_DELTA)
             if not self.world.synchronous:
                 self.world.tick()
+                await self.methods.catch_up()
 
     async def obey(self) -> None:
         """Answer the test until it closes standard input."""

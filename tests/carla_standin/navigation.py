@@ -35,8 +35,9 @@ def navigation_mesh(road_map: RoadMap, kerb: float) -> bytes:
     Parameters
     ----------
     kerb
-        Metres by which sidewalks stand above the map's surface.
+        Metres by which sidewalks stand above the map's surface, if it was not made with them.
     """
+    kerb = road_map.kerb(kerb)
     odr = parse(road_map.text.encode(), file=road_map.name)
     table = RoadTable.of(odr)
     if not _walkable(table):

@@ -18,7 +18,8 @@ from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import signal_kind
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import OpenDrive, Signal
-from tests.carla_standin.lane_mesh import FINE, LaneMesh
+from tests.carla_standin.generated import SIDEWALK_LIFT, Generation, flattened, strips_of
+from tests.carla_standin.lane_mesh import LaneMesh
 from tests.carla_standin.wire import Pose
 
 _SPAWN_EVERY = 25.0
@@ -30,9 +31,9 @@ _GROUND_EVERY = 1.0
 _GROUND_NEAR = 2.5
 """Metres from such a point at which its height is still that of the ground for what is made."""
 _BESIDE = 1.5
-"""Metres beside the lanes where the ground goes on as at their border."""
-_WALL = 0.2
-"""Metres of a wall's thickness, at the edge of the ground."""
+"""Metres beside the lanes where the ground of a world made by hand goes on as at their border."""
+_GAP = 0.01
+"""Metres beside the lanes of a generated world that still carry: joints have no gaps."""
 _SIGNS = {"stop": "traffic.stop", "yield": "traffic.yield"}
 
 
@@ -64,10 +65,8 @@ class RoadMap:
     """Which of them are on sidewalks, shape ``(N,)``."""
     mesh: LaneMesh
     """What bodies stand on."""
-    wall_height: float = 0.0
-    additional_width: float = 0.0
-    """Of a generated world: metres of the walls that stand along its edges, and by which its roads
-    are wider than the file's (pull request 8975 of carla-simulator/carla)."""
+    made: Generation | None = None
+    """How a generated world was made; ``None`` for one that was made by hand."""
 
     @cached_property
     def _tree(self) -> cKDTree | None:
@@ -75,10 +74,11 @@ class RoadMap:
 
     def ground_at(self, x: float, y: float) -> np.ndarray:
         """Heights of the ground below and above a place; several where roads cross, or none."""
+        if self.made is not None:
+            return self.mesh.around(x, y, _GAP)[1]
         if self._tree is None:
             return np.empty(0)
-        reach = _GROUND_NEAR + self.additional_width / 2.0
-        near = self._tree.query_ball_point((x, y), reach, return_sorted=True)
+        near = self._tree.query_ball_point((x, y), _GROUND_NEAR, return_sorted=True)
         heights: np.ndarray = self.ground[near, 2]
         return heights
 
@@ -86,13 +86,12 @@ class RoadMap:
         """Height of what is below a place, and whether that is a sidewalk, ``kerb`` metres high.
 
         Sidewalks stand above the file's surface (pull request 2491 of carla-simulator/carla), from
-        their border on; of lanes that overlap the uppermost counts.
+        their border on; those of a generated world are as high as they were made. Of lanes that
+        overlap the uppermost counts.
         """
-        reach = _BESIDE + self.additional_width / 2.0
-        away, height, rows = self.mesh.around(x, y, reach)
+        away, height, rows = self.mesh.around(x, y, _BESIDE if self.made is None else _GAP)
         walks = self.mesh.walks[rows]
-        height = height + np.where(walks, kerb, 0.0)
-        height = height + np.where(away > reach - _WALL, self.wall_height, 0.0)
+        height = height + np.where(walks, self.kerb(kerb), 0.0)
         fits = height <= z
         if not fits.any():
             return None
@@ -100,6 +99,10 @@ class RoadMap:
         nearest = away <= away.min() + 1e-9
         best = int(np.flatnonzero(nearest)[np.argmax(height[nearest])])
         return float(height[best]), bool(walks[best])
+
+    def kerb(self, metres: float) -> float:
+        """By how much sidewalks are higher than the ground is known here: not if it was made so."""
+        return metres if self.made is None else 0.0
 
     @cached_property
     def _walk_tree(self) -> cKDTree:
@@ -127,33 +130,21 @@ class RoadMap:
         return cls.of(file.read_text(encoding="utf-8"), name)
 
     @classmethod
-    def of(
-        cls,
-        text: str,
-        name: str,
-        *,
-        wall_height: float = 0.0,
-        additional_width: float = 0.0,
-        every: float = FINE,
-        smooth: bool = False,
-    ) -> RoadMap:
-        """Map of an OpenDRIVE text; of a generated world with how it was made.
-
-        Parameters
-        ----------
-        every, smooth
-            Metres between vertices of the ground, and whether that of junctions is smoothed.
-        """
+    def of(cls, text: str, name: str, made: Generation | None = None) -> RoadMap:
+        """Map of an OpenDRIVE text; of a generated world with how it was made."""
         odr = parse(text.encode(), file=name)
         table = RoadTable.of(odr)
         signs = tuple(_signs(odr, table))
         lights = {sign.id for sign in signs if sign.type_id == "traffic.traffic_light"}
         points = tuple(_spawn_points(odr, table))
-        groups, (ground, walks) = _groups(odr, lights), _ground(table)
-        mesh = LaneMesh.of(odr, table, every=every, smooth=smooth)
-        return cls(
-            name, text, points, signs, groups, ground, walks, mesh, wall_height, additional_width
-        )
+        groups = _groups(odr, lights)
+        if made is None:
+            return cls(name, text, points, signs, groups, *_ground(table), LaneMesh.of(table))
+        table = flattened(table)
+        ground, walks = _ground(table)
+        ground[walks, 2] += SIDEWALK_LIFT
+        mesh = LaneMesh.join(*strips_of(odr, table, made))
+        return cls(name, text, points, signs, groups, ground, walks, mesh, made)
 
 
 def _ground(table: RoadTable) -> tuple[np.ndarray, np.ndarray]:

@@ -68,10 +68,14 @@ class MethodTable:
             return None, wire.void()
         answer = await self._do(name, params)
         if when == "call" or name == "tick_cue":
-            late, self._late = self._late, []
-            for call in late:
-                await self._do(*call)
+            await self.catch_up()
         return answer
+
+    async def catch_up(self) -> None:
+        """Do what nobody waits for and was put off."""
+        late, self._late = self._late, []
+        for call in late:
+            await self._do(*call)
 
     async def _do(self, name: str, params: list[Any]) -> tuple[Any, Any]:
         if name not in self._methods:

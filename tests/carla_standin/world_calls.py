@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from tests.carla_standin import wire
+from tests.carla_standin.generated import Generation
 from tests.carla_standin.navigation import navigation_mesh
 from tests.carla_standin.road_map import RoadMap
 from tests.carla_standin.rpc import Returns, rpc
@@ -70,15 +71,8 @@ class WorldCalls:
         if not name:
             road_map = world.map
         elif short == _OPENDRIVE_MAP and self._copied:
-            every, _longest, wall_height, additional_width, smooth, *_ = self.generation
-            road_map = RoadMap.of(
-                self._copied,
-                f"{_FOLDER}/{_OPENDRIVE_MAP}",
-                wall_height=wall_height,
-                additional_width=additional_width,
-                every=every,
-                smooth=smooth,
-            )
+            made = Generation.of(self.generation)
+            road_map = RoadMap.of(self._copied, f"{_FOLDER}/{_OPENDRIVE_MAP}", made)
         elif short in self._maps:
             road_map = RoadMap.read(self._maps[short], f"{_FOLDER}/{short}")
         else:

@@ -23,6 +23,7 @@ from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample
 from tests.carla.mirror.test_mirror_on_maps import Oracle, ego_of
 from tests.carla.observer import Frame, Observer
+from tests.carla_standin.generated import Generation
 from tests.carla_standin.process import StandIn
 from tests.carla_standin.road_map import RoadMap
 
@@ -33,6 +34,8 @@ LIMITS = {"place": 0.05, "heading": 0.5, "speed": 0.1, "height": 0.05, "feet": 0
 """Metres, degrees and m/s."""
 KERB = 0.1
 """Metres by which the server's sidewalks are higher than the map's."""
+
+OTHER = MAPS / "t_junction_signs.xodr"
 
 State = dict[str, float]
 
@@ -76,13 +79,20 @@ def jumped(last: State, now: State) -> bool:
 class Judge:
     """Differences of what is seen from what is so, by kind."""
 
-    def __init__(self, folder: Path, observer: Observer, workspace: Workspace, name: str) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        observer: Observer,
+        workspace: Workspace,
+        name: str,
+        made: Generation | None,
+    ) -> None:
         actors = json.loads((folder / "plan.json").read_text())["actors"]
         self.walks = {a["id"] for a in actors if a["category"] == "pedestrian"}
         self.boxes = observer.boxes
         self.oracle = Oracle(workspace, name)
         text = workspace.map(name).path("xodr").read_text(encoding="utf-8")
-        self.server_map = RoadMap.of(text, name)
+        self.server_map = RoadMap.of(text, name, made)
         self.off: dict[str, list[float]] = defaultdict(list)
 
     def look(self, name: str, seen: list[float], state: State) -> None:
@@ -109,10 +119,14 @@ class Judge:
 
 
 def judged(
-    workspace: Workspace, path: Path, xodr: Path, tmp_path: Path
+    workspace: Workspace, path: Path, xodr: Path, tmp_path: Path, *, generated: bool = False
 ) -> tuple[dict[str, list[float]], int]:
-    """Differences in all ticks, and how many ticks there were."""
-    with StandIn(xodr, map_name=xodr.stem, kerb=KERB) as server:
+    """Differences in all ticks, and how many ticks there were.
+
+    The server has the map, or else makes a world of it.
+    """
+    there = OTHER if generated else xodr
+    with StandIn(there, map_name=there.stem, kerb=KERB) as server:
         with Observer(server, tmp_path / "seen.json", ego=ego_of(path)) as observer:
             result, report = cosim(
                 workspace,
@@ -124,8 +138,9 @@ def judged(
                 settings=RunSettings(until=SECONDS, step_length=STEP),
             )
         assert (result.status, report.error, report.refused) == ("completed", None, [])
+        made = Generation.of(server.generation()) if generated else None
     steps = recorded(result.folder)
-    judge = Judge(result.folder, observer, workspace, xodr.stem)
+    judge = Judge(result.folder, observer, workspace, xodr.stem, made)
     first = next(number for number, frame in enumerate(observer.frames) if frame.users)
     frames = observer.frames[first : first + (len(steps) - 1) * TICKS + 1]
     for number, frame in enumerate(frames):
@@ -167,3 +182,12 @@ def test_towns_with_slopes_and_bridges_are_shown_exactly_in_every_tick(
 ) -> None:
     xodr = shared_maps / f"{name}.xodr"
     assert_exact(*judged(workspace, sample(xodr, seed=5, fill=0.1, segments=30), xodr, tmp_path))
+
+
+@pytest.mark.slow
+def test_a_world_made_of_a_town_with_slopes_is_shown_exactly_in_every_tick(
+    workspace: Workspace, sample: Sample, shared_maps: Path, tmp_path: Path
+) -> None:
+    xodr = shared_maps / "carla-2020/Town04.xodr"
+    path = sample(xodr, seed=5, fill=0.1, segments=30)
+    assert_exact(*judged(workspace, path, xodr, tmp_path, generated=True))

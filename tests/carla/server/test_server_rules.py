@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,15 +16,17 @@ from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
 from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample, scenario_of
+from tests.carla_standin.bumps import HALF, HIGH, LANE, bumps
+from tests.carla_standin.generated import SIDEWALK_LIFT
 from tests.carla_standin.process import StandIn
 from tests.sumo.story_case import node_at, walk_node_at
 
 carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
 
 CROSSING, TOWN = MAPS / "signal_crossing.xodr", MAPS / "town_5x5.xodr"
-EDGE, HEIGHT = (60.0, 9.125 + 1.5), 0.12
-"""Where the stand-in's ground ends beside a sidewalk of the crossing, and how high that is."""
-_WALL_HEIGHT, _ADDITIONAL_WIDTH = 2, 3
+EDGE = (60.0, 9.125)
+"""Where a sidewalk of the crossing ends."""
+_WALL_HEIGHT, _ADDITIONAL_WIDTH, _SMOOTH = 2, 3, 4
 """Of the parameters by which a world is made."""
 
 
@@ -46,20 +49,40 @@ def test_lights_that_change_alone_are_shown_by_the_next_tick_of_a_server_with_se
 
 
 def test_a_generated_world_has_no_walls_and_roads_of_the_maps_width() -> None:
-    with StandIn(TOWN) as stand_in, Server(address_of(stand_in)) as server:
+    with (
+        StandIn(MAPS / "t_junction_signs.xodr") as stand_in,
+        Server(address_of(stand_in)) as server,
+    ):
         server.load_opendrive(CROSSING.read_text(encoding="utf-8"))
         sent = stand_in.generation()
         assert (sent[_WALL_HEIGHT], sent[_ADDITIONAL_WIDTH]) == (0.0, 0.0)
         x, y = EDGE
-        assert server.ground_below(x, y - 0.05, 3.0, 5.0) == pytest.approx(HEIGHT)
-        assert server.ground_below(x, y + 0.2, 3.0, 5.0) is None
-        client = carla.Client(stand_in.host, stand_in.port)
-        client.set_timeout(10.0)
-        world = client.generate_opendrive_world(
-            CROSSING.read_text(encoding="utf-8"), carla.OpendriveGenerationParameters()
-        )
-        wall = world.ground_projection(carla.Location(x, y + 0.2, 3.0), 5.0)
-        assert wall.location.z == pytest.approx(HEIGHT + 1.0), "by default, on a road that is wider"
+        assert server.ground_below(x, y - 0.05, 3.0, 5.0) == pytest.approx(SIDEWALK_LIFT)
+        assert server.ground_below(x, y + 0.1, 3.0, 5.0) is None
+        world = world_by_default(stand_in, CROSSING.read_text(encoding="utf-8"))
+        wall = world.ground_projection(carla.Location(x, y + 0.1, 3.0), 5.0)
+        assert wall.location.z == pytest.approx(SIDEWALK_LIFT + 1.0), "by default"
+
+
+def world_by_default(stand_in: StandIn, xodr: str) -> Any:
+    client = carla.Client(stand_in.host, stand_in.port)
+    client.set_timeout(10.0)
+    return client.generate_opendrive_world(xodr, carla.OpendriveGenerationParameters())
+
+
+def test_the_ground_in_junctions_of_a_generated_world_is_the_maps() -> None:
+    xs = [-6.0, -2.0, 1.0, 3.0, 6.0]
+    with StandIn(CROSSING) as stand_in, Server(address_of(stand_in)) as server:
+        server.load_opendrive(bumps())
+        assert stand_in.generation()[_SMOOTH] is False
+        ours = [server.ground_below(x, LANE / 2, 3.0, 5.0) for x in xs]
+        world = world_by_default(stand_in, bumps())
+        assert stand_in.generation()[_SMOOTH] is True
+        theirs = [world.ground_projection(carla.Location(x, LANE / 2, 3.0), 5.0) for x in xs]
+    height = [HIGH * (1.0 - (x / HALF) ** 2) for x in xs]
+    assert ours == pytest.approx(height, abs=0.002), "cross-sections are two metres apart"
+    sunk = [a - b.location.z for a, b in zip(height, theirs, strict=True)]
+    assert max(sunk) > 0.1, "where the other lane is lower the smoothed ground is not the map's"
 
 
 def sleep_beyond(stand_in: StandIn, metres: float, *, tiles: float = 3000.0) -> None:

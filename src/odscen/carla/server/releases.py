@@ -63,8 +63,9 @@ class ReleaseAdapter:
     def generation(self, carla: Any) -> Any:
         """Parameters by which a world is made of an OpenDRIVE text: as the text says, no more.
 
-        By default a generated world has walls of a metre and roads 0.6 m wider (pull request 8975
-        of carla-simulator/carla).
+        By default a generated world has walls of a metre, driving lanes 0.6 m wider on each side
+        (pull request 8975 of carla-simulator/carla), and in junctions, where lanes overlap, heights
+        that are evened out (``MeshFactory::MergeAndSmooth``), so that the ground is not the map's.
 
         Raises
         ------
@@ -77,7 +78,9 @@ class ReleaseAdapter:
                 "server that is the scenario's"
             )
             raise CarlaError(msg)
-        return carla.OpendriveGenerationParameters(wall_height=0.0, additional_width=0.0)
+        return carla.OpendriveGenerationParameters(
+            wall_height=0.0, additional_width=0.0, smooth_junctions=False
+        )
 
     def is_ground(self, label: object) -> bool:
         """Whether one may stand on what has a label of CARLA's."""
