@@ -194,16 +194,20 @@ def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: f
 
 
 def _start_lane(read: ActionReader, element: _Element, actor: str) -> tuple[str, int, int]:
-    """Road and lane id where an actor starts, and 1 if ids grow to its left, -1 otherwise."""
+    """Road and lane id where an actor starts, and 1 if ids grow to its left, -1 otherwise.
+
+    Who starts in an opposite lane looks along its own ones.
+    """
     positions, entities = read.conditions.positions, read.conditions.entities
     names = [name for name, one in entities.items() if one.id == actor]
     start = positions.starts.get(names[0]) if names else None
     if start is None:
         raise RefusedError(element, f"a lane that counts from {actor!r}, which has no place")
     lanes = positions.graph.lanes
-    row = int(lanes.lane[positions.node_near(start) if start.node is None else start.node])
+    near = positions.node_near(start)
+    row, own = (int(lanes.lane[near if one is None else one]) for one in (start.node, near))
     key = lanes.lanes.keys[row]
-    return key.road, key.lane, 1 if bool(lanes.lanes.forward[row]) else -1
+    return key.road, key.lane, 1 if bool(lanes.lanes.forward[own]) else -1
 
 
 def _offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
