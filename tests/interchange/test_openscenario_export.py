@@ -71,7 +71,17 @@ def scenario() -> Scenario:
         "acceleration": [{"path": {"points": [[300.0, 103.4], [320.0, 104.0]], "speed": 6.0}}],
         "stopped": [{"path": {"points": [[300.0, 103.4], [320.0, 104.0]], "times": [1.0, 3.0]}}],
         "reaches": [{"replay": {"rows": [[0.0, 250.0, 103.4, 0.0], [2.0, 262.0, 103.4, 0.0]]}}],
-        "travelled": [{"arrive": {"at": [280.0, 103.4], "to": "ego", "when_at": [290.0, 103.4]}}],
+        "travelled": [
+            {
+                "arrive": {
+                    "at": [280.0, 103.4],
+                    "to": "ego",
+                    "when_at": [290.0, 103.4],
+                    "speed": 7.0,
+                    "steady": 5.0,
+                }
+            }
+        ],
         "rule": [{"goal": {"to": goal}}],
         "touched": [{"vanish": {}}],
         "off_road": [{"release": {}}],

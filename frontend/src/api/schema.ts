@@ -1751,7 +1751,7 @@ export interface components {
             goal?: components["schemas"]["NewGoal"] | null;
             path?: components["schemas"]["PathFollowing-Input"] | null;
             replay?: components["schemas"]["Replaying"] | null;
-            arrive?: components["schemas"]["Arriving"] | null;
+            arrive?: components["schemas"]["Arriving-Input"] | null;
             appear?: components["schemas"]["Appearing-Input"] | null;
             vanish?: components["schemas"]["Vanishing"] | null;
             signal?: components["schemas"]["SignalSwitch-Input"] | null;
@@ -1780,7 +1780,7 @@ export interface components {
             goal: components["schemas"]["NewGoal"] | null;
             path: components["schemas"]["PathFollowing-Output"] | null;
             replay: components["schemas"]["Replaying"] | null;
-            arrive: components["schemas"]["Arriving"] | null;
+            arrive: components["schemas"]["Arriving-Output"] | null;
             appear: components["schemas"]["Appearing-Output"] | null;
             vanish: components["schemas"]["Vanishing"] | null;
             signal: components["schemas"]["SignalSwitch-Output"] | null;
@@ -2027,9 +2027,10 @@ export interface components {
          * Arriving
          * @description Be at a place at the instant at which ``to`` is at another one.
          *
-         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
+         *     it arrives at that, which it has already reached ``steady`` metres before.
          */
-        Arriving: {
+        "Arriving-Input": {
             /** At */
             at: string | [
                 number,
@@ -2042,6 +2043,41 @@ export interface components {
                 number,
                 number
             ];
+            /** Speed */
+            speed?: number | null;
+            /**
+             * Steady
+             * @default 0
+             */
+            steady?: number;
+        };
+        /**
+         * Arriving
+         * @description Be at a place at the instant at which ``to`` is at another one.
+         *
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
+         *     it arrives at that, which it has already reached ``steady`` metres before.
+         */
+        "Arriving-Output": {
+            /** At */
+            at: string | [
+                number,
+                number
+            ];
+            /** To */
+            to: string;
+            /** When At */
+            when_at: string | [
+                number,
+                number
+            ];
+            /** Speed */
+            speed: number | null;
+            /**
+             * Steady
+             * @default 0
+             */
+            steady: number;
         };
         /**
          * AssetsInfo
@@ -8635,7 +8671,8 @@ export interface components {
          * Arriving
          * @description Be at a place at the instant at which ``to`` is at another one.
          *
-         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
+         *     it arrives at that, which it has already reached ``steady`` metres before.
          */
         "Arriving-File": {
             /** At */
@@ -8650,6 +8687,16 @@ export interface components {
                 number,
                 number
             ];
+            /**
+             * Speed
+             * @default null
+             */
+            speed?: number | null;
+            /**
+             * Steady
+             * @default 0
+             */
+            steady?: number;
         };
         /**
          * Background

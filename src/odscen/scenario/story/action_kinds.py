@@ -311,7 +311,8 @@ ACTIONS = {
         ),
         ActionKind(
             "arrive", "be `at` a place at the instant at which `to` is `when_at` another; the "
-            "speed is settled once that of `to` is steady", "",
+            "speed is settled once that of `to` is steady; with `speed` it changes evenly to that, "
+            "which is reached `steady` metres before the place", "m/s, m",
             "`setSpeed` or `person.moveToXY`", "SynchronizeAction", _MIRRORED, arrive,
             synchronise, end_of_arrival,
         ),

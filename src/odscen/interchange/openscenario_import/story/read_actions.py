@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.story.read_arrivals import arriving
 from odscen.interchange.openscenario_import.story.read_motions import (
     JUMP,
     followed,
@@ -346,25 +347,6 @@ def _goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
     return {"goal": {"to": str(node_id(positions.graph, node))}}
 
 
-def _arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
-    report = read.conditions.report
-    name = kind.get("masterEntityRef", "")
-    if name not in read.conditions.entities:
-        raise RefusedError(kind, f"entity {name!r} is not among the actors")
-    found = {}
-    for field_name, tag, who in (
-        ("when_at", "TargetPositionMaster", read.conditions.entities[name]),
-        ("at", "TargetPosition", entity),
-    ):
-        place = report.child(kind, tag)
-        if place is None:
-            raise RefusedError(kind, f"{kind.tag} without {tag}")
-        found[field_name] = read.conditions.point_or_node(place, ahead=who.ahead)
-    if kind.find("FinalSpeed") is not None:
-        report.mark(kind, "approximated", "the speed on arrival is not settled")
-    return {"arrive": {**found, "to": read.conditions.entities[name].id}}
-
-
 _MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]]] = {
     "SpeedAction": _speed,
     "LaneChangeAction": _lane,
@@ -375,6 +357,6 @@ _MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]
     "AcquirePositionAction": _goal,
     "SpeedProfileAction": _profile,
     "TeleportAction": _teleport,
-    "SynchronizeAction": _arrive,
+    "SynchronizeAction": arriving,
     "LateralDistanceAction": _abreast,
 }
