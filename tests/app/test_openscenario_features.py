@@ -18,6 +18,7 @@ from odscen.workspace.store import Workspace
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 EVENT = """<Event name="{name}" priority="override"><Action name="x">{action}</Action>
@@ -262,6 +263,12 @@ def meeting(road_user: str) -> str:
     return text.replace("<RoadNetwork>", f"{places}</CatalogLocations><RoadNetwork>")
 
 
+def at_once(text: str) -> str:
+    """The same without the trigger of the synchronization."""
+    before, name, rest = text.partition('<Event name="meet"')
+    return before + name + re.sub(r"(?s)<StartTrigger>.*?</StartTrigger>", "", rest, count=1)
+
+
 def test_places_on_trajectories_of_catalogs_are_found(workspace: Workspace, tmp_path: Path) -> None:
     found = read(workspace, tmp_path, meeting(WALKER), lines=CATALOG)
     arrive = rule(found, "meet")["then"][0]["arrive"]
@@ -277,13 +284,28 @@ def test_places_on_trajectories_of_catalogs_are_found(workspace: Workspace, tmp_
     assert found.lists["refused"] == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("body", [WALKER, WALKER.replace("Pedestrian", "Vehicle").replace(
-    "pedestrianCategory", "vehicleCategory").replace('="pedestrian"', '="bicycle"')])  # fmt: skip
-def test_who_follows_a_trajectory_meets_the_ego_on_it(
-    workspace: Workspace, tmp_path: Path, body: str
+BICYCLE = WALKER.replace("Pedestrian", "Vehicle").replace("pedestrianC", "vehicleC").replace(
+    '="pedestrian"', '="bicycle"')  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("body", "when"),
+    [(WALKER, {"appeared": {"of": "VRU"}}), (BICYCLE, {"time": {"after": 0.1}})],
+)
+def test_what_begins_at_once_begins_where_the_actor_starts(
+    workspace: Workspace, tmp_path: Path, body: str, when: dict[str, Any]
 ) -> None:
-    found = read(workspace, tmp_path, meeting(body), lines=CATALOG)
+    found = read(workspace, tmp_path, at_once(meeting(body)), lines=CATALOG)
+    assert rule(found, "meet")["when"] == when
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("begins", [str, at_once])
+@pytest.mark.parametrize("body", [WALKER, BICYCLE])
+def test_who_follows_a_trajectory_meets_the_ego_on_it(
+    workspace: Workspace, tmp_path: Path, body: str, begins: Callable[[str], str]
+) -> None:
+    found = read(workspace, tmp_path, begins(meeting(body)), lines=CATALOG)
     settings = RunSettings(until=8.0)
     done = run(workspace, found.scenario, settings=settings, name="meet", out=tmp_path)
     rows = {str(key): one for (key,), one in done.trajectories().group_by("id")}
