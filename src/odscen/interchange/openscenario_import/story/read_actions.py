@@ -347,6 +347,10 @@ def _goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
     return {"goal": {"to": str(node_id(positions.graph, node))}}
 
 
+def _arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    return arriving(read.conditions, kind, entity, read.speeds)
+
+
 _MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]]] = {
     "SpeedAction": _speed,
     "LaneChangeAction": _lane,
@@ -357,6 +361,6 @@ _MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]
     "AcquirePositionAction": _goal,
     "SpeedProfileAction": _profile,
     "TeleportAction": _teleport,
-    "SynchronizeAction": arriving,
+    "SynchronizeAction": _arrive,
     "LateralDistanceAction": _abreast,
 }
