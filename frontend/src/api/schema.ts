@@ -1754,6 +1754,7 @@ export interface components {
             arrive?: components["schemas"]["Arriving-Input"] | null;
             appear?: components["schemas"]["Appearing-Input"] | null;
             vanish?: components["schemas"]["Vanishing"] | null;
+            end?: components["schemas"]["Ending"] | null;
             signal?: components["schemas"]["SignalSwitch-Input"] | null;
             lights?: components["schemas"]["VehicleLights-Input"] | null;
             horn?: components["schemas"]["Honking"] | null;
@@ -1783,6 +1784,7 @@ export interface components {
             arrive: components["schemas"]["Arriving-Output"] | null;
             appear: components["schemas"]["Appearing-Output"] | null;
             vanish: components["schemas"]["Vanishing"] | null;
+            end: components["schemas"]["Ending"] | null;
             signal: components["schemas"]["SignalSwitch-Output"] | null;
             lights: components["schemas"]["VehicleLights-Output"] | null;
             horn: components["schemas"]["Honking"] | null;
@@ -3340,6 +3342,11 @@ export interface components {
          * @enum {string}
          */
         ElementOutcome: "kept" | "repaired" | "guessed" | "lost";
+        /**
+         * Ending
+         * @description End the run: it is complete with the step in which that is asked for.
+         */
+        Ending: Record<string, never>;
         /**
          * EntryPlace
          * @description Where vehicles can drive into the region: lanes are OpenDRIVE ids, the outermost first.
@@ -8531,6 +8538,8 @@ export interface components {
             /** @default null */
             vanish?: components["schemas"]["Vanishing-File"] | null;
             /** @default null */
+            end?: components["schemas"]["Ending-File"] | null;
+            /** @default null */
             signal?: components["schemas"]["SignalSwitch-File"] | null;
             /** @default null */
             lights?: components["schemas"]["VehicleLights-File"] | null;
@@ -9199,6 +9208,11 @@ export interface components {
                 [key: string]: number;
             };
         };
+        /**
+         * Ending
+         * @description End the run: it is complete with the step in which that is asked for.
+         */
+        "Ending-File": Record<string, never>;
         /**
          * Environment
          * @description Weather and time of day: a preset of the asset catalogue and single values that differ.

@@ -222,6 +222,7 @@ export const ACTION_KINDS: Record<ActionKind, Kind> = {
     words: (v) =>
       `appear${Array.isArray(v.at) ? ` at ${text(v.at.slice(0, 2))}` : ""}${maybe(v.speed, " at", "km/h", 3.6)}`,
   },
+  end: { label: "End the run", fields: [], words: () => "end the run" },
   vanish: { label: "Leave the simulation", fields: [], words: () => "leave the simulation" },
   signal: {
     label: "Switch a traffic light",

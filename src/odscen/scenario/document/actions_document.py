@@ -270,6 +270,10 @@ class Vanishing(Part):
     """Leave the simulation."""
 
 
+class Ending(Part):
+    """End the run: it is complete with the step in which that is asked for."""
+
+
 class Ignoring(Part):
     """Heed neither red lights nor right of way, or one of the two."""
 
@@ -303,6 +307,7 @@ class Action(Part):
     arrive: Arriving | None = None
     appear: Appearing | None = None
     vanish: Vanishing | None = None
+    end: Ending | None = None
     signal: SignalSwitch | None = None
     lights: VehicleLights | None = None
     horn: Honking | None = None
