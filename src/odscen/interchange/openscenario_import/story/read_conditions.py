@@ -78,13 +78,14 @@ class ConditionReader:
         """
         if trigger is None:
             return ALWAYS
-        groups = [
-            joined("all", [self._condition(one) for one in self.report.children(group)])
-            for group in self.report.children(trigger, "ConditionGroup")
-        ]
+        groups = [self.group(group) for group in self.report.children(trigger, "ConditionGroup")]
         if self.own:
             groups = without_repeats(groups)
         return joined("any", groups) if groups else ALWAYS
+
+    def group(self, group: _Element) -> Made:
+        """Condition that holds while all of a ``ConditionGroup`` do."""
+        return joined("all", [self._condition(one) for one in self.report.children(group)])
 
     def _condition(self, element: _Element) -> Made:
         content = self.report.child(element, "ByValueCondition", "ByEntityCondition")
