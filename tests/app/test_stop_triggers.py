@@ -29,6 +29,7 @@ ACT = (
 )
 TRAFFIC = '<ByValueCondition><UserDefinedValueCondition name="x" value="1" rule="equalTo"/>'
 TRAFFIC += "</ByValueCondition>"
+STEADY = entity_condition('<SpeedCondition value="5" rule="equalTo"/>')
 DRIVEN = {"travelled": {"of": "Ego", "above": 30.0}}
 OVER = {"all": [{"rule": {"id": "cut-in"}}, {"rule": {"id": "later"}}]}
 
@@ -89,7 +90,13 @@ def test_a_run_ends_when_the_file_says_so(workspace: Workspace, tmp_path: Path) 
 
 
 def test_the_end_of_a_run_comes_back_from_an_export(workspace: Workspace, tmp_path: Path) -> None:
-    found = read(workspace, tmp_path, stopping(when(TIME.format(20)), when(DROVE)))
+    equal = when(STEADY).replace('"none"', '"rising"')
+    found = read(workspace, tmp_path, stopping(when(TIME.format(20)), when(DROVE), equal))
+    whens = ends(found)
+    assert whens[1] == {
+        "all": [{"speed": {"of": "Ego", "above": 4.9}}, {"speed": {"of": "Ego", "below": 5.1}}],
+        "edge": "rising",
+    }
     for version in ("1.0", "1.2"):
         files = export(
             workspace, found.scenario, tmp_path / version, to="openscenario",
@@ -98,4 +105,4 @@ def test_the_end_of_a_run_comes_back_from_an_export(workspace: Workspace, tmp_pa
         (file,) = (path for path in files if path.suffix == ".xosc")
         again = import_scenario(workspace, file)
         assert again.scenario.simulation.duration == 20.0
-        assert ends(again) == [DRIVEN]
+        assert ends(again) == whens == [DRIVEN, whens[1]]

@@ -205,7 +205,7 @@ export const ACTION_KINDS: Record<ActionKind, Kind> = {
       number("speed", "Speed on arrival", " km/h", undefined, { max: 360, scale: 3.6 }),
       {
         ...number("steady", "Reached before the place", " m"),
-        without: (v) => !given(v.speed) && !given(v.steady),
+        without: (v) => !given(v.speed) && !v.steady,
       },
     ],
     words: (v) =>
