@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
 from odscen.interchange.openscenario_import.story.read_arrivals import arriving
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
+    from odscen.interchange.openscenario_import.places.map_points import MapPoint
     from odscen.interchange.openscenario_import.story.read_conditions import ConditionReader
     from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
 
@@ -173,17 +176,52 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
             raise RefusedError(lane, f"the lane {value:+d} beside {other!r}, of another road")
         by = value + side * (its - own)
         words = f"{by:+d} lanes from that in which it starts; {other!r} is taken to stay in its own"
+        aim = own + side * by
+        aim += 0 if aim * own > 0 else side * by  # there is no lane 0
     else:
-        _, own, side = _start_lane(read, lane, entity.id)
-        own = read.lanes.get(entity.id, own)
+        road, own, side = _start_lane(read, lane, entity.id)
+        own, aim = read.lanes.get(entity.id, own), value
         read.lanes[entity.id] = value
         by = side * (value - own - ((value > 0) - (own > 0)))  # there is no lane 0
         words = f"{by:+d} lanes from the last one that the file names for it"
     if by == 0:
         report.mark(lane, "approximated", "by none, in the lane in which it is")
         return _within_lane(read, kind, entity, over)
+    if abs(by) == 1 and (metres := _to_opposite(read, entity, road, own, aim)) is not None:
+        words = f"{metres:.2f} m beside its own lane, in the opposite one"
+        report.mark(lane, "approximated", words)
+        read.offsets[entity.id] = by * metres
+        return {"offset": {"to": by * metres, "over": over}}
     report.mark(lane, "approximated", words)
     return {"lane": {"by": by, "over": over}}
+
+
+def _to_opposite(
+    read: ActionReader, entity: ReadEntity, road: str, own: int, aim: int
+) -> float | None:
+    """Metres between the middles of an actor's lane and of a lane beside it that is opposite.
+
+    ``None`` if that is no lane, or leads the actor's own way.
+    """
+    positions, lanes = read.conditions.positions, read.conditions.positions.graph.lanes
+    start = _start(read, entity.id)
+    if start is None:
+        return None
+    near = positions.node_near(start)
+    ahead = bool(lanes.lanes.forward[int(lanes.lane[near])])
+    widths: list[float] = []
+    for lane, forward in ((own, ahead), (aim, not ahead)):
+        rows = [
+            row
+            for row, key in enumerate(lanes.lanes.keys)
+            if (key.road, key.lane) == (road, lane) and bool(lanes.lanes.forward[row]) == forward
+        ]
+        nodes = np.flatnonzero(np.isin(lanes.lane, rows))
+        if not nodes.size:
+            return None
+        away = np.hypot(lanes.x[nodes] - lanes.x[near], lanes.y[nodes] - lanes.y[near])
+        widths.append(float(lanes.width[nodes[int(np.argmin(away))]]))
+    return round(sum(widths) / 2.0, 3)
 
 
 def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: float) -> Made:
@@ -194,14 +232,18 @@ def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: f
     return {"offset": {"to": metres, "over": max(over, 0.1)}}
 
 
+def _start(read: ActionReader, actor: str) -> MapPoint | None:
+    """Where an actor starts, as the file has it."""
+    entities, starts = read.conditions.entities, read.conditions.positions.starts
+    return next((starts.get(name) for name, one in entities.items() if one.id == actor), None)
+
+
 def _start_lane(read: ActionReader, element: _Element, actor: str) -> tuple[str, int, int]:
     """Road and lane id where an actor starts, and 1 if ids grow to its left, -1 otherwise.
 
     Who starts in an opposite lane looks along its own ones.
     """
-    positions, entities = read.conditions.positions, read.conditions.entities
-    names = [name for name, one in entities.items() if one.id == actor]
-    start = positions.starts.get(names[0]) if names else None
+    positions, start = read.conditions.positions, _start(read, actor)
     if start is None:
         raise RefusedError(element, f"a lane that counts from {actor!r}, which has no place")
     lanes = positions.graph.lanes
@@ -238,8 +280,7 @@ def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     """Keep beside another: an offset from the own lane, where both start."""
     report, positions = read.conditions.report, read.conditions.positions
     other = positions.of_entity(kind)
-    names = [name for name, one in read.conditions.entities.items() if one.id == entity.id]
-    own = positions.starts.get(names[0]) if names else None
+    own = _start(read, entity.id)
     if own is None:
         raise RefusedError(kind, "it has no place yet")
     left = (own.y - other.y) * math.cos(own.hdg) - (own.x - other.x) * math.sin(own.hdg)
@@ -259,15 +300,11 @@ def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, flo
     positions = read.conditions.positions
     if entity.own is not None:  # of which the lane is that of its node, wherever it appears
         return 0.0, float(entity.own.get("lateral_offset", 0.0))
-    starts = [
-        positions.starts[name]
-        for name, one in read.conditions.entities.items()
-        if one.id == entity.id and name in positions.starts
-    ]
-    if not starts:
+    start = _start(read, entity.id)
+    if start is None:
         return 0.0, 0.0
-    own, lanes = starts[0].moved(entity.ahead), positions.graph.lanes
-    placed, named = positions.node_near(own), starts[0].node
+    own, lanes = start.moved(entity.ahead), positions.graph.lanes
+    placed, named = positions.node_near(own), start.node
     left = float(positions.left_of(placed, own))
     if named is None or int(lanes.lane[placed]) == int(lanes.lane[named]):
         return 0.0, left
