@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
 from odscen.interchange.openscenario_import.story.read_arrivals import arriving
@@ -18,6 +16,11 @@ from odscen.interchange.openscenario_import.story.read_motions import (
     stays,
     teleported,
 )
+from odscen.interchange.openscenario_import.story.start_lanes import (
+    start_lane,
+    start_of,
+    to_opposite,
+)
 from odscen.lanegraph.query import node_id
 
 if TYPE_CHECKING:
@@ -25,7 +28,6 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
-    from odscen.interchange.openscenario_import.places.map_points import MapPoint
     from odscen.interchange.openscenario_import.story.read_conditions import ConditionReader
     from odscen.interchange.openscenario_import.world.read_entities import ReadEntity
 
@@ -170,8 +172,8 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
             return {"cut_in": {"to": other, "over": over}}
         if other == entity.id:
             return _within_lane(read, kind, entity, over)
-        road, own, side = _start_lane(read, lane, entity.id)
-        beside, its, _ = _start_lane(read, lane, other)
+        road, own, side = start_lane(read.conditions, lane, entity.id)
+        beside, its, _ = start_lane(read.conditions, lane, other)
         if road != beside:
             raise RefusedError(lane, f"the lane {value:+d} beside {other!r}, of another road")
         by = value + side * (its - own)
@@ -179,7 +181,7 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         aim = own + side * by
         aim += 0 if aim * own > 0 else side * by  # there is no lane 0
     else:
-        road, own, side = _start_lane(read, lane, entity.id)
+        road, own, side = start_lane(read.conditions, lane, entity.id)
         own, aim = read.lanes.get(entity.id, own), value
         read.lanes[entity.id] = value
         by = side * (value - own - ((value > 0) - (own > 0)))  # there is no lane 0
@@ -187,7 +189,10 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     if by == 0:
         report.mark(lane, "approximated", "by none, in the lane in which it is")
         return _within_lane(read, kind, entity, over)
-    if abs(by) == 1 and (metres := _to_opposite(read, entity, road, own, aim)) is not None:
+    if (
+        abs(by) == 1
+        and (metres := to_opposite(read.conditions, entity.id, road, own, aim)) is not None
+    ):
         words = f"{metres:.2f} m beside its own lane, in the opposite one"
         report.mark(lane, "approximated", words)
         read.offsets[entity.id] = by * metres
@@ -196,61 +201,12 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     return {"lane": {"by": by, "over": over}}
 
 
-def _to_opposite(
-    read: ActionReader, entity: ReadEntity, road: str, own: int, aim: int
-) -> float | None:
-    """Metres between the middles of an actor's lane and of a lane beside it that is opposite.
-
-    ``None`` if that is no lane, or leads the actor's own way.
-    """
-    positions, lanes = read.conditions.positions, read.conditions.positions.graph.lanes
-    start = _start(read, entity.id)
-    if start is None:
-        return None
-    near = positions.node_near(start)
-    ahead = bool(lanes.lanes.forward[int(lanes.lane[near])])
-    widths: list[float] = []
-    for lane, forward in ((own, ahead), (aim, not ahead)):
-        rows = [
-            row
-            for row, key in enumerate(lanes.lanes.keys)
-            if (key.road, key.lane) == (road, lane) and bool(lanes.lanes.forward[row]) == forward
-        ]
-        nodes = np.flatnonzero(np.isin(lanes.lane, rows))
-        if not nodes.size:
-            return None
-        away = np.hypot(lanes.x[nodes] - lanes.x[near], lanes.y[nodes] - lanes.y[near])
-        widths.append(float(lanes.width[nodes[int(np.argmin(away))]]))
-    return round(sum(widths) / 2.0, 3)
-
-
 def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: float) -> Made:
     """Change of no lanes: to the middle of its own, or beside it."""
     metres = read.conditions.report.number(kind, "targetLaneOffset", 0.0)
     metres += _beside_at_first(read, entity)[0]
     read.offsets[entity.id] = metres
     return {"offset": {"to": metres, "over": max(over, 0.1)}}
-
-
-def _start(read: ActionReader, actor: str) -> MapPoint | None:
-    """Where an actor starts, as the file has it."""
-    entities, starts = read.conditions.entities, read.conditions.positions.starts
-    return next((starts.get(name) for name, one in entities.items() if one.id == actor), None)
-
-
-def _start_lane(read: ActionReader, element: _Element, actor: str) -> tuple[str, int, int]:
-    """Road and lane id where an actor starts, and 1 if ids grow to its left, -1 otherwise.
-
-    Who starts in an opposite lane looks along its own ones.
-    """
-    positions, start = read.conditions.positions, _start(read, actor)
-    if start is None:
-        raise RefusedError(element, f"a lane that counts from {actor!r}, which has no place")
-    lanes = positions.graph.lanes
-    near = positions.node_near(start)
-    row, own = (int(lanes.lane[near if one is None else one]) for one in (start.node, near))
-    key = lanes.lanes.keys[row]
-    return key.road, key.lane, 1 if bool(lanes.lanes.forward[own]) else -1
 
 
 def _offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
@@ -280,7 +236,7 @@ def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     """Keep beside another: an offset from the own lane, where both start."""
     report, positions = read.conditions.report, read.conditions.positions
     other = positions.of_entity(kind)
-    own = _start(read, entity.id)
+    own = start_of(read.conditions, entity.id)
     if own is None:
         raise RefusedError(kind, "it has no place yet")
     left = (own.y - other.y) * math.cos(own.hdg) - (own.x - other.x) * math.sin(own.hdg)
@@ -300,7 +256,7 @@ def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, flo
     positions = read.conditions.positions
     if entity.own is not None:  # of which the lane is that of its node, wherever it appears
         return 0.0, float(entity.own.get("lateral_offset", 0.0))
-    start = _start(read, entity.id)
+    start = start_of(read.conditions, entity.id)
     if start is None:
         return 0.0, 0.0
     own, lanes = start.moved(entity.ahead), positions.graph.lanes
