@@ -43,6 +43,7 @@ SECTIONS: Final = {
 PASSED: Final = frozenset({
     "OpenSCENARIO", "LongitudinalAction", "LateralAction", "RoutingAction", "Condition",
     "AbsoluteTargetSpeed", "AbsoluteTargetLaneOffset", "TimeToCollisionConditionTarget",
+    "AbsoluteSpeed", "TargetDistanceSteadyState",
     "DeterministicSingleParameterDistribution",
     *(f"{kind}Catalog" for kind in ("Vehicle", "Controller", "Pedestrian", "MiscObject",
                                     "Environment", "Maneuver", "Trajectory", "Route")),
@@ -76,6 +77,7 @@ REMARKS: Final = {
     "FromCurrentEntity": ("approximated", "where that entity starts"),
     "LaneChangeActionDynamics": ("approximated", "the line is a half-cosine"),
     "LaneOffsetAction": ("approximated", "a half-cosine by `maxLateralAcc`"),
+    "RelativeSpeedToMaster": ("approximated", "relative to the last speed that the file gives"),
     "RelativeTargetSpeed": ("approximated", "relative to the last speed that the file gives"),
     "AbsoluteTargetLane": ("approximated", "from the last lane that the file names"),
     "FollowTrajectoryAction": ("approximated", "followed by the front, from where the actor is"),
@@ -83,7 +85,6 @@ REMARKS: Final = {
     "RouteRef": ("approximated", "along the lane of the first waypoint"),
     "Waypoint": ("approximated", "the last one is the goal"),
     "Route": ("approximated", "its last place is the goal"),
-    "FinalSpeed": ("ignored", "the speed on arrival is not settled"),
     "ParameterCondition": ("approximated", "the declared value, and what actions set"),
     "VariableCondition": ("approximated", "the declared value, and what actions set"),
     "MiscObject": ("approximated", "a stationary car"),

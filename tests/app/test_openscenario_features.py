@@ -5,6 +5,7 @@ Shapes of conditions and actions are those of Euro NCAP's, esmini's and Scenario
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from odscen.workspace.store import Workspace
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 EVENT = """<Event name="{name}" priority="override"><Action name="x">{action}</Action>
@@ -261,12 +263,19 @@ def meeting(road_user: str) -> str:
     return text.replace("<RoadNetwork>", f"{places}</CatalogLocations><RoadNetwork>")
 
 
+def at_once(text: str) -> str:
+    """The same without the trigger of the synchronization."""
+    before, name, rest = text.partition('<Event name="meet"')
+    return before + name + re.sub(r"(?s)<StartTrigger>.*?</StartTrigger>", "", rest, count=1)
+
+
 def test_places_on_trajectories_of_catalogs_are_found(workspace: Workspace, tmp_path: Path) -> None:
     found = read(workspace, tmp_path, meeting(WALKER), lines=CATALOG)
     arrive = rule(found, "meet")["then"][0]["arrive"]
     # 4 m along a line that begins 4 m to the right of the middle of the lane, at y = -1.75 m
     assert arrive["at"] == pytest.approx([120, -1.75])
     assert arrive["when_at"] == pytest.approx([116 + 1.4, -1.75])  # centre of the body
+    assert (arrive["speed"], arrive["steady"]) == (1.4, 2.0)
     places = [
         one.then[0].appear.at for one in found.scenario.rules
         if one.actor == "VRU" and one.then[0].appear is not None
@@ -275,13 +284,25 @@ def test_places_on_trajectories_of_catalogs_are_found(workspace: Workspace, tmp_
     assert found.lists["refused"] == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("body", [WALKER, WALKER.replace("Pedestrian", "Vehicle").replace(
-    "pedestrianCategory", "vehicleCategory").replace('="pedestrian"', '="bicycle"')])  # fmt: skip
-def test_who_follows_a_trajectory_meets_the_ego_on_it(
+BICYCLE = WALKER.replace("Pedestrian", "Vehicle").replace("pedestrianC", "vehicleC").replace(
+    '="pedestrian"', '="bicycle"')  # fmt: skip
+
+
+@pytest.mark.parametrize("body", [WALKER, BICYCLE])
+def test_what_begins_at_once_begins_where_the_actor_starts(
     workspace: Workspace, tmp_path: Path, body: str
 ) -> None:
-    found = read(workspace, tmp_path, meeting(body), lines=CATALOG)
+    found = read(workspace, tmp_path, at_once(meeting(body)), lines=CATALOG)
+    assert rule(found, "meet")["when"] == {"time": {"after": 0.1}}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("begins", [str, at_once])
+@pytest.mark.parametrize("body", [WALKER, BICYCLE])
+def test_who_follows_a_trajectory_meets_the_ego_on_it(
+    workspace: Workspace, tmp_path: Path, body: str, begins: Callable[[str], str]
+) -> None:
+    found = read(workspace, tmp_path, begins(meeting(body)), lines=CATALOG)
     settings = RunSettings(until=8.0)
     done = run(workspace, found.scenario, settings=settings, name="meet", out=tmp_path)
     rows = {str(key): one for (key,), one in done.trajectories().group_by("id")}
@@ -291,6 +312,25 @@ def test_who_follows_a_trajectory_meets_the_ego_on_it(
     assert passes == pytest.approx((116 - (51 - 1.4)) / 10, abs=0.05)
     assert other["x"].to_numpy() == pytest.approx(np.full(other.height, 120.0), abs=0.05)
     assert other["y"][-1] > -1.75 + 0.3  # and goes on
+
+
+@pytest.mark.parametrize(
+    ("final", "speed", "steady"),
+    [
+        ('<AbsoluteSpeed value="3"/>', 3.0, None),
+        ('<AbsoluteSpeed value="3"><TargetTimeSteadyState time="2"/></AbsoluteSpeed>', 3.0, 6.0),
+        ('<RelativeSpeedToMaster value="0.2" speedTargetValueType="factor"/>', 2.0, None),
+        ('<RelativeSpeedToMaster value="-8" speedTargetValueType="delta"/>', 2.0, None),
+    ],
+)
+def test_the_speed_on_arrival_is_that_of_the_file(
+    workspace: Workspace, tmp_path: Path, final: str, speed: float, steady: float | None
+) -> None:
+    text = re.sub("<AbsoluteSpeed.*</AbsoluteSpeed>", final, meeting(WALKER))
+    found = read(workspace, tmp_path, text, lines=CATALOG)
+    arrive = rule(found, "meet")["then"][0]["arrive"]
+    assert (arrive["speed"], arrive.get("steady")) == (speed, steady)
+    assert any("/FinalSpeed" in row.xpath for row in found.lists["taken"])
 
 
 ROUTE = """<RoutePosition><RouteRef><Route name="r" closed="false"><Waypoint

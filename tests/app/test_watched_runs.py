@@ -171,3 +171,18 @@ def test_what_is_wrong_with_an_action_is_said_at_once(
             steps.act("own", brake={"hard": True})
         with pytest.raises(ScenarioError, match="for pedestrians"):
             steps.act("own", walk={"to": [0.0, 0.0]})
+
+
+def test_a_program_ends_the_run_by_a_rule(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    times = []
+    with watch(workspace, sampled, settings=SETTINGS, out=tmp_path) as steps:
+        for step in steps:
+            times.append(step.time)
+            if step.time == 5.0:
+                steps.act(str(step.ids[0]), end={})
+    assert times[-1] == 5.0
+    assert (steps.run.status, steps.run.summary["stopped"]) == ("completed", False)
+    assert steps.run.trajectories()["time"].max() == 5.0
+    assert "rule_acted" in steps.run.events()["kind"].to_list()

@@ -71,7 +71,17 @@ def scenario() -> Scenario:
         "acceleration": [{"path": {"points": [[300.0, 103.4], [320.0, 104.0]], "speed": 6.0}}],
         "stopped": [{"path": {"points": [[300.0, 103.4], [320.0, 104.0]], "times": [1.0, 3.0]}}],
         "reaches": [{"replay": {"rows": [[0.0, 250.0, 103.4, 0.0], [2.0, 262.0, 103.4, 0.0]]}}],
-        "travelled": [{"arrive": {"at": [280.0, 103.4], "to": "ego", "when_at": [290.0, 103.4]}}],
+        "travelled": [
+            {
+                "arrive": {
+                    "at": [280.0, 103.4],
+                    "to": "ego",
+                    "when_at": [290.0, 103.4],
+                    "speed": 7.0,
+                    "steady": 5.0,
+                }
+            }
+        ],
         "rule": [{"goal": {"to": goal}}],
         "touched": [{"vanish": {}}],
         "off_road": [{"release": {}}],
@@ -89,6 +99,14 @@ def scenario() -> Scenario:
     rules.append(
         {"id": "after", "actor": "van", "when": {"rule": {"id": "horn"}}, "then": [{"go": {}}]}
     )
+    rules.append(
+        {"id": "end", "actor": "van", "when": {"stopped": {"of": "ego", "seconds": 3.0}},
+         "then": [{"end": {}}]}
+    )  # fmt: skip
+    rules.append(
+        {"id": "gone", "actor": "van", "when": {"time": {"after": 9.0}},
+         "then": [{"vanish": {}}, {"end": {}}]}
+    )  # fmt: skip
     return document(TOWN, actors, rules, flows=[], environment={"preset": "HardRainNoon"})
 
 
@@ -222,12 +240,34 @@ def test_what_is_written_is_what_the_table_of_rules_names(folder: Path) -> None:
         if rule.id in ("horn", "after"):
             continue
         for index, item in enumerate(rule.then):
+            if item.end is not None:  # the stop trigger, see below
+                continue
             tags = {one.tag for one in event(latest, f"{rule.id}.then[{index}]").iter()}
             for part in item.parts:
                 assert tags & set(re.findall(r"[A-Z]\w+", ACTIONS[part.kind].openscenario))
-        if (kind := rule.when.kind) in CONDITIONS:
+        if (kind := rule.when.kind) in CONDITIONS and rule.id != "end":
             tags = {one.tag for one in event(latest, f"{rule.id}.then[0]").iter()}
             assert tags & set(re.findall(r"[A-Z]\w+", CONDITIONS[kind].openscenario))
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.2"])
+def test_rules_that_end_the_run_are_stop_triggers(folder: Path, version: str) -> None:
+    tree = etree.parse(written(version, folder)[0])
+    assert not tree.xpath('//Event[starts-with(@name, "end.")]')
+    # ScenarioRunner asks the act when it is over, and not the storyboard
+    for stop in ["Storyboard/StopTrigger", *(["//Act/StopTrigger"] * (version == "1.0"))]:
+        groups = the(tree, stop).findall("ConditionGroup")
+        kinds = [[one.tag for one in group.xpath(".//*[@value or @duration or @state]")
+                  if one.tag.endswith("Condition")] for group in groups]  # fmt: skip
+        assert kinds == [
+            ["SimulationTimeCondition"],
+            ["StandStillCondition"],
+            ["StoryboardElementStateCondition"],
+        ]  # fmt: skip
+        last = groups[2].find(".//StoryboardElementStateCondition")
+        assert (last.get("storyboardElementRef"), last.get("state")) == (
+            "gone.then[0]", "completeState"
+        )  # fmt: skip
 
 
 def test_what_cannot_be_said_is_listed_with_its_place_and_what_waits_for_it(folder: Path) -> None:

@@ -1751,9 +1751,10 @@ export interface components {
             goal?: components["schemas"]["NewGoal"] | null;
             path?: components["schemas"]["PathFollowing-Input"] | null;
             replay?: components["schemas"]["Replaying"] | null;
-            arrive?: components["schemas"]["Arriving"] | null;
+            arrive?: components["schemas"]["Arriving-Input"] | null;
             appear?: components["schemas"]["Appearing-Input"] | null;
             vanish?: components["schemas"]["Vanishing"] | null;
+            end?: components["schemas"]["Ending"] | null;
             signal?: components["schemas"]["SignalSwitch-Input"] | null;
             lights?: components["schemas"]["VehicleLights-Input"] | null;
             horn?: components["schemas"]["Honking"] | null;
@@ -1780,9 +1781,10 @@ export interface components {
             goal: components["schemas"]["NewGoal"] | null;
             path: components["schemas"]["PathFollowing-Output"] | null;
             replay: components["schemas"]["Replaying"] | null;
-            arrive: components["schemas"]["Arriving"] | null;
+            arrive: components["schemas"]["Arriving-Output"] | null;
             appear: components["schemas"]["Appearing-Output"] | null;
             vanish: components["schemas"]["Vanishing"] | null;
+            end: components["schemas"]["Ending"] | null;
             signal: components["schemas"]["SignalSwitch-Output"] | null;
             lights: components["schemas"]["VehicleLights-Output"] | null;
             horn: components["schemas"]["Honking"] | null;
@@ -2027,9 +2029,10 @@ export interface components {
          * Arriving
          * @description Be at a place at the instant at which ``to`` is at another one.
          *
-         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
+         *     it arrives at that, which it has already reached ``steady`` metres before.
          */
-        Arriving: {
+        "Arriving-Input": {
             /** At */
             at: string | [
                 number,
@@ -2042,6 +2045,41 @@ export interface components {
                 number,
                 number
             ];
+            /** Speed */
+            speed?: number | null;
+            /**
+             * Steady
+             * @default 0
+             */
+            steady?: number;
+        };
+        /**
+         * Arriving
+         * @description Be at a place at the instant at which ``to`` is at another one.
+         *
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
+         *     it arrives at that, which it has already reached ``steady`` metres before.
+         */
+        "Arriving-Output": {
+            /** At */
+            at: string | [
+                number,
+                number
+            ];
+            /** To */
+            to: string;
+            /** When At */
+            when_at: string | [
+                number,
+                number
+            ];
+            /** Speed */
+            speed: number | null;
+            /**
+             * Steady
+             * @default 0
+             */
+            steady: number;
         };
         /**
          * AssetsInfo
@@ -3304,6 +3342,11 @@ export interface components {
          * @enum {string}
          */
         ElementOutcome: "kept" | "repaired" | "guessed" | "lost";
+        /**
+         * Ending
+         * @description End the run: it is complete with the step in which that is asked for.
+         */
+        Ending: Record<string, never>;
         /**
          * EntryPlace
          * @description Where vehicles can drive into the region: lanes are OpenDRIVE ids, the outermost first.
@@ -8495,6 +8538,8 @@ export interface components {
             /** @default null */
             vanish?: components["schemas"]["Vanishing-File"] | null;
             /** @default null */
+            end?: components["schemas"]["Ending-File"] | null;
+            /** @default null */
             signal?: components["schemas"]["SignalSwitch-File"] | null;
             /** @default null */
             lights?: components["schemas"]["VehicleLights-File"] | null;
@@ -8635,7 +8680,8 @@ export interface components {
          * Arriving
          * @description Be at a place at the instant at which ``to`` is at another one.
          *
-         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
+         *     it arrives at that, which it has already reached ``steady`` metres before.
          */
         "Arriving-File": {
             /** At */
@@ -8650,6 +8696,16 @@ export interface components {
                 number,
                 number
             ];
+            /**
+             * Speed
+             * @default null
+             */
+            speed?: number | null;
+            /**
+             * Steady
+             * @default 0
+             */
+            steady?: number;
         };
         /**
          * Background
@@ -9152,6 +9208,11 @@ export interface components {
                 [key: string]: number;
             };
         };
+        /**
+         * Ending
+         * @description End the run: it is complete with the step in which that is asked for.
+         */
+        "Ending-File": Record<string, never>;
         /**
          * Environment
          * @description Weather and time of day: a preset of the asset catalogue and single values that differ.

@@ -109,6 +109,7 @@ def scenario() -> Scenario:
               {"signal": {"light": LIGHT, "shows": "off"}}),
         _rule("light", "taxi", {"all": [{"rule": {"id": "dark"}}, _after(13.0)]},
               {"signal": {"light": LIGHT, "shows": "program"}}, {"signal": green}),
+        _rule("end", "taxi", _after(UNTIL - 0.4), {"end": {}}),
     ]  # fmt: skip
     return document(TOWN, actors, rules, until=UNTIL)
 

@@ -198,8 +198,20 @@ export const ACTION_KINDS: Record<ActionKind, Kind> = {
   },
   arrive: {
     label: "Arrive together",
-    fields: [place("at", "Arrives at"), TO, place("when_at", "When the other one is at")],
-    words: (v) => `arrive at ${text(v.at)} when ${text(v.to)} is at ${text(v.when_at)}`,
+    fields: [
+      place("at", "Arrives at"),
+      TO,
+      place("when_at", "When the other one is at"),
+      number("speed", "Speed on arrival", " km/h", undefined, { max: 360, scale: 3.6 }),
+      {
+        ...number("steady", "Reached before the place", " m"),
+        without: (v) => !given(v.speed) && !v.steady,
+      },
+    ],
+    words: (v) =>
+      `arrive at ${text(v.at)} when ${text(v.to)} is at ${text(v.when_at)}` +
+      maybe(v.speed, ", at", "km/h", 3.6) +
+      (v.steady === 0 ? "" : maybe(v.steady, " for the last", "m")),
   },
   appear: {
     label: "Appear",
@@ -210,6 +222,7 @@ export const ACTION_KINDS: Record<ActionKind, Kind> = {
     words: (v) =>
       `appear${Array.isArray(v.at) ? ` at ${text(v.at.slice(0, 2))}` : ""}${maybe(v.speed, " at", "km/h", 3.6)}`,
   },
+  end: { label: "End the run", fields: [], words: () => "end the run" },
   vanish: { label: "Leave the simulation", fields: [], words: () => "leave the simulation" },
   signal: {
     label: "Switch a traffic light",

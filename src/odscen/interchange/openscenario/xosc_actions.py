@@ -233,11 +233,17 @@ def acquire(places: Places, node: str) -> _Element:
 def _arrive(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     master, own = (made.places.spot(place).element() for place in (part.when_at, part.at))
     master.tag, own.tag = "TargetPositionMaster", "TargetPosition"
-    final = None
-    if made.dialect.for_scenario_runner:  # which refuses one without
+    speed, steady = part.speed, None
+    if made.dialect.for_scenario_runner and part.steady:
+        made.notes.approximated.append((where, "only arrives at its speed in 1.0"))
+    elif part.steady:
+        steady = xml("TargetDistanceSteadyState", distance=part.steady)
+    if made.dialect.for_scenario_runner and speed is None:  # which refuses one without
         speed = made.actors[actor].speed or made.actors[actor].initial_speed or _USUAL_SPEED
         made.notes.approximated.append((where, f"arrives at {speed:g} m/s"))
-        final = xml("FinalSpeed", xml("AbsoluteSpeed", value=float(speed)))
+    final = None
+    if speed is not None:
+        final = xml("FinalSpeed", xml("AbsoluteSpeed", steady, value=float(speed)))
     return [private(xml("SynchronizeAction", master, own, final, masterEntityRef=part.to))]
 
 

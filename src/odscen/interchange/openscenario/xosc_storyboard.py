@@ -53,7 +53,8 @@ class Story:
         groups = [
             group for actor in self.scenario.actors if (group := self._later(actor)) is not None
         ]
-        groups += self._rules(actors)
+        rules, events = self._rules(actors)
+        groups, ends = groups + rules, self._ends(events)
         duration = self.scenario.simulation.duration
         triggers = Triggers(self.places, self.dialect, self.notes, {})
         return xml(
@@ -62,10 +63,10 @@ class Story:
             xml(
                 "Story",
                 xml("ParameterDeclarations"),
-                act("rules", groups, triggers, until=duration, sky=self.environment),
+                act("rules", groups, triggers, until=duration, ends=ends, sky=self.environment),
                 name=self.scenario.name,
             ),
-            xml("StopTrigger", triggers.at_time(duration, _END)),
+            xml("StopTrigger", triggers.at_time(duration, _END), *ends),
         )
 
     def _init(self, actors: Sequence[Actor]) -> Iterable[_Element]:
@@ -118,9 +119,12 @@ class Story:
         name = f"{actor.id} departs"
         return maneuver_group(name, actor.id, [event(name, actions, trigger, 1)])
 
-    def _rules(self, actors: dict[str, Actor]) -> list[_Element]:
-        """Maneuver groups of rules; those that cannot be said are left out, and whom they free."""
-        left: dict[str, StoryRule] = {rule.id: rule for rule in self.scenario.rules}
+    def _rules(self, actors: dict[str, Actor]) -> tuple[list[_Element], dict[str, tuple[str, str]]]:
+        """Maneuver groups of rules, and the first and last event of each.
+
+        Those that cannot be said are left out, and whom they free.
+        """
+        left = {rule.id: rule for rule in self.scenario.rules if _end(rule) != 0}
         while True:
             events = {name: _names(rule) for name, rule in left.items()}
             found, refused = [], {}
@@ -132,10 +136,30 @@ class Story:
                 except CannotSayError as error:
                     refused[rule.id] = (f"rules[{index}]", str(error))
             if not refused:
-                return found
+                return found, events
             for name, words in refused.items():
                 self.notes.left_out.append(words)
                 del left[name]
+
+    def _ends(self, events: dict[str, tuple[str, str]]) -> list[_Element]:
+        """Groups of conditions on which rules end the run."""
+        triggers = Triggers(self.places, self.dialect, self.notes, events)
+        found: list[_Element] = []
+        for index, rule in enumerate(self.scenario.rules):
+            where, last = f"rules[{index}]", _end(rule)
+            if last is None or (last and rule.id not in events):
+                continue
+            try:
+                if last:
+                    found += triggers.after(events[rule.id][1])
+                else:
+                    found += triggers.trigger(rule.when, rule.actor, where)
+            except CannotSayError as error:
+                self.notes.left_out.append((where, str(error)))
+                continue
+            words = "the end of the run is a stop trigger, which has no name and no actor"
+            self.notes.approximated.append((where, words))
+        return found
 
     def _rule(
         self,
@@ -184,6 +208,7 @@ def act(
     *,
     until: float,
     sky: _Element | None,
+    ends: Sequence[_Element] = (),
 ) -> _Element:
     """``Act`` with all maneuver groups, from the start of the run on.
 
@@ -199,7 +224,8 @@ def act(
         weather = xml("GlobalAction", xml("EnvironmentAction", deepcopy(sky)))
         last = event(f"weather at the {_END}", [weather], end, 1)
         groups = [*groups, maneuver_group(_END, None, [last])]
-        stop = xml("StopTrigger", triggers.at_time(until, f"{_END}, of the act"))
+        early = deepcopy(list(ends))
+        stop = xml("StopTrigger", triggers.at_time(until, f"{_END}, of the act"), *early)
     if not groups:  # a story needs one
         nobody = xml("Actors", selectTriggeringEntities=False)
         groups = [xml("ManeuverGroup", nobody, name="none", maximumExecutionCount=1)]
@@ -237,8 +263,14 @@ def _names(rule: StoryRule) -> tuple[str, str]:
 
 def _said(rule: StoryRule) -> list[int]:
     """Items of a rule that do something there; all of them if none does."""
-    found = [n for n, one in enumerate(rule.then) if {p.kind for p in one.parts} != {"ignore"}]
-    return found or list(range(len(rule.then)))
+    items = range(len(rule.then) if _end(rule) is None else _end(rule) or 0)
+    found = [n for n in items if {part.kind for part in rule.then[n].parts} != {"ignore"}]
+    return found or list(items)
+
+
+def _end(rule: StoryRule) -> int | None:
+    """Item of a rule that ends the run: the stop trigger, and no event."""
+    return next((n for n, one in enumerate(rule.then) if one.kind == "end"), None)
 
 
 def _event_name(rule: StoryRule, index: int) -> str:

@@ -18,8 +18,13 @@ if TYPE_CHECKING:
     from odscen.interchange.openscenario.xosc_places import Places
     from odscen.scenario.document.conditions_document import Condition
 
+_SAME: Final = 1e-6
 MOST_GROUPS: Final = 64
 """Groups of a trigger: conditions nested further are left out with a note."""
+
+
+EQUAL: Final = 0.1
+"""What counts as equal, in the unit of the value: a player compares numbers as they are."""
 
 
 class CannotSayError(Exception):
@@ -28,7 +33,10 @@ class CannotSayError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A condition that is not a combination, perhaps negated, with its delay and edge."""
+    """A condition that is not a combination, perhaps negated, with its delay and edge.
+
+    ``equal`` is a value that it is within :data:`EQUAL` of, in place of its bound.
+    """
 
     kind: str
     part: Any
@@ -38,6 +46,7 @@ class Leaf:
     place: str
     state: str = ""
     name: str = ""
+    equal: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +73,10 @@ class Triggers:
             If a part of it cannot be said.
         """
         groups = _groups(condition, f"{where}.when", negated=False, delay=0.0)
+        for place in dict.fromkeys(
+            one.place for row in groups for one in row if one.equal is not None
+        ):
+            self.notes.approximated.append((place, f"equal, which here is within {EQUAL:g}"))
         if len(groups) > MOST_GROUPS:
             msg = f"the condition needs {len(groups)} groups of conditions"
             raise CannotSayError(msg)
@@ -124,6 +137,8 @@ class Triggers:
 
     def bound(self, leaf: Leaf) -> dict[str, object]:
         """Attributes ``value`` and ``rule`` of a bounded value."""
+        if leaf.equal is not None:
+            return {"value": leaf.equal, "rule": "equalTo"}
         above = leaf.part.above is not None
         value = leaf.part.above if above else leaf.part.below
         return {"value": float(value), "rule": self.dialect.rule(above=above != leaf.negated)}
@@ -137,6 +152,8 @@ def _groups(
     kind = condition.kind
     rising = condition.edge == "rising"
     if kind in ("all", "any", "not_"):
+        if rising and not negated and (equal := _equal(condition, place, delay)) is not None:
+            return [(equal,)]
         if rising:
             msg = "the rising edge of a combination of conditions"
             raise CannotSayError(msg)
@@ -156,6 +173,25 @@ def _groups(
         )
         return [(replace(leaf, state=state),) for state in states]
     return [(leaf,)]
+
+
+def _equal(condition: Condition, place: str, delay: float) -> Leaf | None:
+    """A value that becomes equal to another, as far as two bounds say that."""
+    if len(condition.all or ()) != 2:
+        return None
+    least, most = condition.all or ()
+    kind = least.kind
+    one, other = getattr(least, kind), getattr(most, kind, None)
+    above, below = getattr(one, "above", None), getattr(other, "below", None)
+    if above is None or below is None or least.delay or most.delay:
+        return None
+    if "rising" in (least.edge, most.edge):
+        return None
+    if one.model_copy(update={"above": None, "below": below}) != other:
+        return None
+    if abs(below - above - 2.0 * EQUAL) > _SAME:
+        return None
+    return Leaf(kind, one, False, delay, True, place, equal=round((above + below) / 2.0, 9))
 
 
 def _numbered(leaf: Leaf, group: int) -> Leaf:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.interchange.openscenario_import.places.read_positions import Nowhere, PositionReader
@@ -15,6 +15,7 @@ from odscen.interchange.openscenario_import.start.read_init import InitReader
 from odscen.interchange.openscenario_import.story.read_actions import ActionReader
 from odscen.interchange.openscenario_import.story.read_conditions import ConditionReader
 from odscen.interchange.openscenario_import.story.read_signals import SignalReader
+from odscen.interchange.openscenario_import.story.read_stop import read_stop
 from odscen.interchange.openscenario_import.story.read_storyboard import StoryReader
 from odscen.interchange.openscenario_import.story.value_changes import first_values
 from odscen.interchange.openscenario_import.world.read_entities import read_entities
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
     from odscen.lanegraph.graphs import MapGraph
 
 EgoDriver = Literal["sumo", "story"]
-_USUAL_DURATION: Final = 60.0
-"""Seconds of a file that does not end at a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +110,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
     positions.moving.update(entities)
     positions.begin_story()
     story.read(board)
+    duration = read_stop(report, board, story)
     data = {
         "name": name,
         "description": "" if story.own and _title(root) == name else _title(root),
@@ -119,7 +119,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
         "roi": list(largest_part(source.graph.segments)),
         "drivers": {"sets": [STEADY_DRIVER] if _steady(actors) else []},
         "actors": actors,
-        "simulation": {"duration": _duration(report, board)},
+        "simulation": {"duration": duration},
         "environment": found.environment,
         "demand": {"clock": found.clock or 0.0},
         "rules": [rule for rule in story.rules if rule["actor"] in init.placed],
@@ -140,7 +140,7 @@ def report_without_map(source: MaplessSource, why: str, *, ego: EgoDriver = "sto
     positions = Nowhere(report, side=_side(root), why=why)
     story, _, board, _ = _begun(source, positions, entities, ego)
     story.read(board)
-    _duration(report, board)
+    read_stop(report, board, story)
     for tag in ("RoadNetwork", "LogicFile"):
         for element in root.iter(tag):
             report.mark(element, "refused", why)
@@ -203,25 +203,6 @@ def _on_wheels(report: ImportReport, entities: Iterable[ReadEntity]) -> None:
 
 def _steady(actors: list[dict[str, Any]]) -> bool:
     return any(one.get("style") == STEADY for one in actors)
-
-
-def _duration(report: ImportReport, board: _Element) -> float:
-    """Seconds after which the storyboard ends, as far as it says so."""
-    stop = report.child(board, "StopTrigger")
-    found = []
-    for condition in () if stop is None else stop.iter("SimulationTimeCondition"):
-        above: _Element | None = condition
-        while above is not None and above is not board:
-            report.mark(above, "taken")
-            above = above.getparent()
-        found.append(report.number(condition, "value"))
-    for trigger in () if stop is None else stop.iter("ConditionGroup"):
-        others = len(trigger) - len(trigger.findall(".//SimulationTimeCondition"))
-        if found and others:
-            report.mark(trigger, "approximated", "the run ends by time alone")
-    if not found and stop is not None:
-        report.mark(stop, "approximated", f"the run ends after {_USUAL_DURATION:g} s")
-    return min((one for one in found if one > 0), default=_USUAL_DURATION)
 
 
 def _title(root: _Element) -> str:

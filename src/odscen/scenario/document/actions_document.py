@@ -203,12 +203,22 @@ class Replaying(Part):
 class Arriving(Part):
     """Be at a place at the instant at which ``to`` is at another one.
 
-    ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+    ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
+    it arrives at that, which it has already reached ``steady`` metres before.
     """
 
     at: RulePlace
     to: Identifier
     when_at: RulePlace
+    speed: RuleSpeed | None = None
+    steady: Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)] = 0.0
+
+    @model_validator(mode="after")
+    def _steady_speed(self) -> Self:
+        if self.steady and not self.speed:
+            msg = f"steady for {self.steady:g} m wants a speed above 0"
+            raise ValueError(msg)
+        return self
 
 
 class Appearing(Part):
@@ -260,6 +270,10 @@ class Vanishing(Part):
     """Leave the simulation."""
 
 
+class Ending(Part):
+    """End the run: it is complete with the step in which that is asked for."""
+
+
 class Ignoring(Part):
     """Heed neither red lights nor right of way, or one of the two."""
 
@@ -293,6 +307,7 @@ class Action(Part):
     arrive: Arriving | None = None
     appear: Appearing | None = None
     vanish: Vanishing | None = None
+    end: Ending | None = None
     signal: SignalSwitch | None = None
     lights: VehicleLights | None = None
     horn: Honking | None = None

@@ -15,8 +15,10 @@ from odscen.scenario.story.arrivals import arrive, end_of_arrival, synchronise
 from odscen.scenario.story.asked_actions import (
     Wanted,
     ask_to_appear,
+    ask_to_end,
     ask_to_switch,
     has_appeared,
+    said_of_end,
     said_of_goal,
     said_of_horn,
     said_of_lights,
@@ -311,7 +313,8 @@ ACTIONS = {
         ),
         ActionKind(
             "arrive", "be `at` a place at the instant at which `to` is `when_at` another; the "
-            "speed is settled once that of `to` is steady", "",
+            "speed is settled once that of `to` is steady; with `speed` it changes evenly to that, "
+            "which is reached `steady` metres before the place", "m/s, m",
             "`setSpeed` or `person.moveToXY`", "SynchronizeAction", _MIRRORED, arrive,
             synchronise, end_of_arrival,
         ),
@@ -324,6 +327,11 @@ ACTIONS = {
         ActionKind(
             "vanish", "leave the simulation", "", "`remove`", "DeleteEntityAction", _MIRRORED,
             _vanish,
+        ),
+        ActionKind(
+            "end", "end the run, which is then complete; nothing moves after that step", "",
+            "no further step", "StopTrigger of the storyboard", _MIRRORED, ask=ask_to_end,
+            says=said_of_end,
         ),
         ActionKind(
             "ignore", "heed no `red`, or no `right_of_way`", "", "`setSpeedMode`",

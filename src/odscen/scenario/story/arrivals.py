@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from odscen.scenario.story.acting_actor import CannotAct
 from odscen.scenario.story.path_actions import stay
 from odscen.scenario.story.side_motion import beside, line_length
-from odscen.scenario.story.speed_laws import steady
+from odscen.scenario.story.speed_laws import SpeedTable, steady
 
 if TYPE_CHECKING:
     from odscen.scenario.document.actions_document import Arriving
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from odscen.scenario.story.acting_actor import ActingActor
     from odscen.scenario.story.channels import Channel
     from odscen.scenario.story.road_view import ActorView, RoadView
+    from odscen.scenario.story.speed_laws import AnyLaw
 
 FASTEST_VEHICLE, FASTEST_WALKER = 70.0, 10.0
 """m/s; who would have to be faster cannot arrive in time."""
@@ -70,14 +71,37 @@ def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
         channel.take_speed(steady(one.instant, 0.0), one.owner)
         return math.inf
     left = theirs / other.speed - done
-    needed = mine / left if left > 0.0 else math.inf
+    law = arrival_law(part, one.instant, mine, left)
+    needed = law.speed(one.instant) if left > 0.0 else math.inf
     fastest = FASTEST_WALKER if one.actor.person else FASTEST_VEHICLE
     if needed > fastest:
         msg = f"it would have to go at {needed:.1f} m/s to be there in time"
         raise CannotAct(msg)
-    channel.take_speed(steady(one.instant, needed), one.owner)
+    channel.take_speed(law, one.owner)
     settled = abs(other.acceleration) < _STEADY or left <= one.step
     return one.instant + left if settled else math.inf
+
+
+def arrival_law(part: Arriving, instant: float, rest: float, left: float) -> AnyLaw:
+    """Speed that covers ``rest`` metres in ``left`` seconds, even or to the speed on arrival.
+
+        D = rest - steady, T = left - steady/u, u the speed on arrival: v = 2 D/T - u
+
+    From v it changes evenly to u, within T. Where v would be negative the actor first stands; where
+    there is no time left for a change its speed is even.
+    """
+    last = part.speed
+    even = steady(instant, rest / left if left > 0.0 else math.inf)
+    if last is None:
+        return even
+    metres, seconds = rest - part.steady, left - (part.steady / last if last else 0.0)
+    if metres <= 0.0 or seconds <= _SAME:
+        return even
+    first = 2.0 * metres / seconds - last
+    if first >= 0.0:
+        return SpeedTable(instant, ((0.0, first), (seconds, last)))
+    waits = seconds - 2.0 * metres / last
+    return SpeedTable(instant, ((0.0, 0.0), (waits, 0.0), (seconds, last)))
 
 
 def _own_rest(part: Arriving, one: ActingActor) -> float:

@@ -36,7 +36,11 @@ class WantedSignal(NamedTuple):
     movement: str | None
 
 
-Wanted = WantedActor | WantedSignal
+class WantedEnd(NamedTuple):
+    """The run is to end."""
+
+
+Wanted = WantedActor | WantedSignal | WantedEnd
 
 
 def ask_to_appear(part: Appearing, actor: str, view: RoadView) -> Wanted:
@@ -56,6 +60,16 @@ def ask_to_appear(part: Appearing, actor: str, view: RoadView) -> Wanted:
 def ask_to_switch(part: SignalSwitch, _: str, __: RoadView) -> Wanted:
     """Ask for a traffic light."""
     return WantedSignal(part.light, part.shows, part.movement)
+
+
+def ask_to_end(_: object, __: str, ___: RoadView) -> Wanted:
+    """Ask for the end of the run."""
+    return WantedEnd()
+
+
+def said_of_end(_: object) -> str:
+    """What is reported."""
+    return "ends the run"
 
 
 def said_of_signal(part: SignalSwitch) -> str:

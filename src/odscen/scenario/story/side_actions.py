@@ -33,12 +33,30 @@ def change_lane(part: LaneChange, one: ActingActor) -> float:
         missing = "none of the lanes beside it leads to the place"
     else:
         by = part.by or 0
-        line = one.view.lane_line(one.actor.id, by)
+        line = _back_in_lane(by, one) or one.view.lane_line(one.actor.id, by)
         missing = f"there is no lane {abs(by)} to the {'left' if by > 0 else 'right'} for it"
-    if line is None:
+    if line is None or not _leads_on(line, _front(one), one.actor.hdg):
         raise CannotAct(missing)
     _beside_lane(line, 0.0, part.over, one)
     return one.instant + part.over
+
+
+def _back_in_lane(by: int, one: ActingActor) -> tuple[Point, ...] | None:
+    """The lane beside which a vehicle is led, if that is the next one that way.
+
+    Beside all lanes and in an opposite lane, SUMO does not know which lane it came from.
+    """
+    line, side = one.channel.line, one.channel.side
+    if line is None or side is None or by != -math.copysign(1, side.e1) or abs(side.e1) < _ON_LANE:
+        return None
+    under = one.view.lane_line(one.actor.id, 0)
+    own_way = under is not None and _leads_on(under, _front(one), one.actor.hdg)
+    return None if own_way else line
+
+
+def _leads_on(line: tuple[Point, ...], point: Point, hdg: float) -> bool:
+    """Whether a line leads by a point in about a direction."""
+    return math.cos(point_on(line, beside(line, point).along).hdg - hdg) > 0.0
 
 
 def move_aside(part: LateralMove, one: ActingActor) -> float:
@@ -119,15 +137,21 @@ def lane_lasts(_: object, one: ActingActor, end: float) -> float:
 
 
 def leave_aside(part: LateralMove, one: ActingActor) -> None:
-    """Leave the line with this step; where no lane is, it is followed on, beside the lane."""
+    """Leave the line with this step if it ends on a lane that leads the same way.
+
+    Elsewhere the line is followed on: beside all lanes, or in an opposite lane, where SUMO would
+    turn the vehicle round.
+    """
     line = one.channel.line
     if line is None or abs(part.to) < _ON_LANE:
         one.channel.leaves = True
         return
-    x, y, _ = point_on(line, one.channel.along, left=part.to)
+    x, y, hdg = point_on(line, one.channel.along, left=part.to)
     for by in (0, 1 if part.to > 0 else -1):
         lane = one.view.lane_line(one.actor.id, by)
-        if lane is not None and abs(beside(lane, (x, y)).left) < _ON_LANE:
+        if lane is None or abs(beside(lane, (x, y)).left) >= _ON_LANE:
+            continue
+        if _leads_on(lane, (x, y), hdg):
             one.channel.leaves = True
 
 

@@ -160,7 +160,7 @@ class _RunningSlice:
 
     def _is_last(self, session: Session, stepper: Stepper, now: float, *, more: bool) -> bool:
         empty = not more and session.expected() == 0 and not stepper.waits
-        return now >= self._plan.until or empty or stepper.stopped
+        return now >= self._plan.until or empty or stepper.stopped or stepper.over
 
 
 @contextmanager

@@ -79,6 +79,11 @@ class Stepper:
         return self._watch is not None and self._watch.stopped
 
     @property
+    def over(self) -> bool:
+        """Whether a rule has ended the run."""
+        return self.story is not None and self.story.over
+
+    @property
     def waits(self) -> bool:
         """Whether a rule may let an actor appear that is not there yet."""
         return self.story is not None and self.story.waits
@@ -97,13 +102,15 @@ class Stepper:
         if self._start is None:
             self._start = now, self.recorder.departed
         begin, waited = clock(), 0.0
-        while now < until and (more or session.expected() > 0 or self.waits):
+        while now < until and not self.over and (more or session.expected() > 0 or self.waits):
             if watch is not None:
                 asked = clock()
                 if not watch.next_step(session, self.recorder):
                     break
                 waited += clock() - asked
             self._take_rules(session)
+            if self.over:
+                break
             now = self._step(session, now)
             if clock() - self._sent >= MESSAGE_PAUSE:
                 self._sent = clock()
@@ -155,7 +162,7 @@ class Stepper:
         empty = not more and session.expected() == 0 and not self.waits
         if empty:
             self.recorder.road_is_empty(now)
-        if self._diversions is not None and (empty or now >= self._plan.until):
+        if self._diversions is not None and (empty or self.over or now >= self._plan.until):
             self.recorder.add(self._diversions.last_events(now))
         if self._watch is not None:
             self._watch.show_last(session, self.recorder)

@@ -8,12 +8,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
 from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.story.read_arrivals import arriving
 from odscen.interchange.openscenario_import.story.read_motions import (
     JUMP,
     followed,
     lines_up,
     stays,
     teleported,
+)
+from odscen.interchange.openscenario_import.story.start_lanes import (
+    start_lane,
+    start_of,
+    to_opposite,
 )
 from odscen.lanegraph.query import node_id
 
@@ -166,21 +172,31 @@ def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
             return {"cut_in": {"to": other, "over": over}}
         if other == entity.id:
             return _within_lane(read, kind, entity, over)
-        road, own, side = _start_lane(read, lane, entity.id)
-        beside, its, _ = _start_lane(read, lane, other)
+        road, own, side = start_lane(read.conditions, lane, entity.id)
+        beside, its, _ = start_lane(read.conditions, lane, other)
         if road != beside:
             raise RefusedError(lane, f"the lane {value:+d} beside {other!r}, of another road")
         by = value + side * (its - own)
         words = f"{by:+d} lanes from that in which it starts; {other!r} is taken to stay in its own"
+        aim = own + side * by
+        aim += 0 if aim * own > 0 else side * by  # there is no lane 0
     else:
-        _, own, side = _start_lane(read, lane, entity.id)
-        own = read.lanes.get(entity.id, own)
+        road, own, side = start_lane(read.conditions, lane, entity.id)
+        own, aim = read.lanes.get(entity.id, own), value
         read.lanes[entity.id] = value
         by = side * (value - own - ((value > 0) - (own > 0)))  # there is no lane 0
         words = f"{by:+d} lanes from the last one that the file names for it"
     if by == 0:
         report.mark(lane, "approximated", "by none, in the lane in which it is")
         return _within_lane(read, kind, entity, over)
+    if (
+        abs(by) == 1
+        and (metres := to_opposite(read.conditions, entity.id, road, own, aim)) is not None
+    ):
+        words = f"{metres:.2f} m beside its own lane, in the opposite one"
+        report.mark(lane, "approximated", words)
+        read.offsets[entity.id] = by * metres
+        return {"offset": {"to": by * metres, "over": over}}
     report.mark(lane, "approximated", words)
     return {"lane": {"by": by, "over": over}}
 
@@ -191,19 +207,6 @@ def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: f
     metres += _beside_at_first(read, entity)[0]
     read.offsets[entity.id] = metres
     return {"offset": {"to": metres, "over": max(over, 0.1)}}
-
-
-def _start_lane(read: ActionReader, element: _Element, actor: str) -> tuple[str, int, int]:
-    """Road and lane id where an actor starts, and 1 if ids grow to its left, -1 otherwise."""
-    positions, entities = read.conditions.positions, read.conditions.entities
-    names = [name for name, one in entities.items() if one.id == actor]
-    start = positions.starts.get(names[0]) if names else None
-    if start is None:
-        raise RefusedError(element, f"a lane that counts from {actor!r}, which has no place")
-    lanes = positions.graph.lanes
-    row = int(lanes.lane[positions.node_near(start) if start.node is None else start.node])
-    key = lanes.lanes.keys[row]
-    return key.road, key.lane, 1 if bool(lanes.lanes.forward[row]) else -1
 
 
 def _offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
@@ -233,8 +236,7 @@ def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     """Keep beside another: an offset from the own lane, where both start."""
     report, positions = read.conditions.report, read.conditions.positions
     other = positions.of_entity(kind)
-    names = [name for name, one in read.conditions.entities.items() if one.id == entity.id]
-    own = positions.starts.get(names[0]) if names else None
+    own = start_of(read.conditions, entity.id)
     if own is None:
         raise RefusedError(kind, "it has no place yet")
     left = (own.y - other.y) * math.cos(own.hdg) - (own.x - other.x) * math.sin(own.hdg)
@@ -254,15 +256,11 @@ def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, flo
     positions = read.conditions.positions
     if entity.own is not None:  # of which the lane is that of its node, wherever it appears
         return 0.0, float(entity.own.get("lateral_offset", 0.0))
-    starts = [
-        positions.starts[name]
-        for name, one in read.conditions.entities.items()
-        if one.id == entity.id and name in positions.starts
-    ]
-    if not starts:
+    start = start_of(read.conditions, entity.id)
+    if start is None:
         return 0.0, 0.0
-    own, lanes = starts[0].moved(entity.ahead), positions.graph.lanes
-    placed, named = positions.node_near(own), starts[0].node
+    own, lanes = start.moved(entity.ahead), positions.graph.lanes
+    placed, named = positions.node_near(own), start.node
     left = float(positions.left_of(placed, own))
     if named is None or int(lanes.lane[placed]) == int(lanes.lane[named]):
         return 0.0, left
@@ -343,22 +341,7 @@ def _goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
 
 
 def _arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
-    report = read.conditions.report
-    name = kind.get("masterEntityRef", "")
-    if name not in read.conditions.entities:
-        raise RefusedError(kind, f"entity {name!r} is not among the actors")
-    found = {}
-    for field_name, tag, who in (
-        ("when_at", "TargetPositionMaster", read.conditions.entities[name]),
-        ("at", "TargetPosition", entity),
-    ):
-        place = report.child(kind, tag)
-        if place is None:
-            raise RefusedError(kind, f"{kind.tag} without {tag}")
-        found[field_name] = read.conditions.point_or_node(place, ahead=who.ahead)
-    if kind.find("FinalSpeed") is not None:
-        report.mark(kind, "approximated", "the speed on arrival is not settled")
-    return {"arrive": {**found, "to": read.conditions.entities[name].id}}
+    return arriving(read.conditions, kind, entity, read.speeds)
 
 
 _MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]]] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from odscen.interchange.openscenario.xosc_triggers import EQUAL
 from odscen.interchange.openscenario_import.import_report import RefusedError
 from odscen.interchange.openscenario_import.source.own_files import without_repeats
 from odscen.interchange.openscenario_import.world.read_environment import clock_of
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 Made = dict[str, Any]
 ALWAYS: Final[Made] = {"time": {"after": 0.0}}
 NEVER: Final[Made] = {"not": ALWAYS}
-_CLOSE: Final = 0.1
-"""What counts as equal, in the unit of the value."""
 _TRUTH: Final = {"true": "1", "false": "0"}
 _ROAD_END: Final = 10.0
 _FAR: Final = 100_000.0
@@ -78,13 +77,14 @@ class ConditionReader:
         """
         if trigger is None:
             return ALWAYS
-        groups = [
-            joined("all", [self._condition(one) for one in self.report.children(group)])
-            for group in self.report.children(trigger, "ConditionGroup")
-        ]
+        groups = [self.group(group) for group in self.report.children(trigger, "ConditionGroup")]
         if self.own:
             groups = without_repeats(groups)
         return joined("any", groups) if groups else ALWAYS
+
+    def group(self, group: _Element) -> Made:
+        """Condition that holds while all of a ``ConditionGroup`` do."""
+        return joined("all", [self._condition(one) for one in self.report.children(group)])
 
     def _condition(self, element: _Element) -> Made:
         content = self.report.child(element, "ByValueCondition", "ByEntityCondition")
@@ -182,10 +182,10 @@ class ConditionReader:
             return {name: {**part, "below": value}}
         if rule.startswith("greater"):
             return {name: {**part, "above": value}}
-        self.report.mark(kind, "approximated", f"equal is within {_CLOSE} of {value:g}")
+        self.report.mark(kind, "approximated", f"equal is within {EQUAL} of {value:g}")
         near = [
-            {name: {**part, "above": value - _CLOSE}},
-            {name: {**part, "below": value + _CLOSE}},
+            {name: {**part, "above": value - EQUAL}},
+            {name: {**part, "below": value + EQUAL}},
         ]
         return {"not": {"all": near}} if rule == "notEqualTo" else {"all": near}
 

@@ -15,6 +15,7 @@ from odscen.interchange.openscenario_import.story.own_entity_actions import (
 )
 from odscen.interchange.openscenario_import.story.read_actions import FOLLOWING
 from odscen.interchange.openscenario_import.story.read_conditions import ALWAYS, joined
+from odscen.interchange.openscenario_import.story.read_motions import JUMP
 from odscen.interchange.openscenario_import.story.value_changes import new_value, sets_in_story
 from odscen.interchange.openscenario_import.world.read_entities import plain_id
 
@@ -62,6 +63,7 @@ class StoryReader:
     _asked: set[_Element] = field(default_factory=set)
     _waiting: list[tuple[_Element, _Element | None, list[str]]] = field(default_factory=list)
     _last: list[bool] = field(default_factory=list)
+    _placed: set[str] = field(default_factory=set)
 
     def read(self, board: _Element) -> None:
         """Read all events; an event that cannot be taken over is left out."""
@@ -325,16 +327,27 @@ class StoryReader:
 
     def _add(self, event: _Element, actor: str, when: Made, then: list[Made], times: int) -> None:
         rule: Made = {"id": plain_id(event.get("name", "event"), self._ids), "actor": actor}
-        rule["when"] = when or ALWAYS
+        # What happens from the start on does so where the actor starts.
+        begin: Made = {"time": {"after": JUMP}} if actor in self._placed else ALWAYS
+        rule["when"] = begin if when in ({}, ALWAYS) else when
         rule["then"] = then[0].get(FOLLOWING, then) if len(then) == 1 else [{"together": then}]
         if times > 1:
             rule["times"] = min(times, 100_000)
         self.rules.append(rule)
         self._made.setdefault(event, []).append(rule)
 
+    def end(self, when: Made) -> None:
+        """Let the run end on a condition; which actor that is a rule of does not matter."""
+        if self.entities:
+            actor = next(iter(self.entities.values())).id
+            name = plain_id("end", self._ids)
+            self.rules.append({"id": name, "actor": actor, "when": when, "then": [{"end": {}}]})
+
     def at_once(self, actor: str, then: list[Made]) -> None:
         """Add what an actor does from the start, or as soon as it has appeared."""
         first, rest = then[:1], then[1:]
+        if first and {"appear", "replay", "offset"} & first[0].keys():
+            self._placed.add(actor)
         if rest and ("appear" in first[0] or "replay" in first[0]):
             groups = [[*first, *(rest if len(rest) == 1 else [{"together": rest}])]]
         else:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import angle_deg_from_hdg
 from odscen.results.records.run_records import Event, EventKind
-from odscen.scenario.story.asked_actions import WantedActor
+from odscen.scenario.story.asked_actions import WantedActor, WantedEnd
 from odscen.sumo.worker.simulation.moved_actors import DARK, SavedWalk
 
 if TYPE_CHECKING:
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import PlannedActor
     from odscen.scenario.story.asked_actions import Wanted, WantedSignal
     from odscen.sumo.realize.rules.story_files import StoryPlan
-    from odscen.sumo.worker.recorder import Recorder
     from odscen.sumo.worker.simulation.moved_actors import MovedActors
+    from odscen.sumo.worker.recorder import Recorder
 
 
 class StoryHands:
@@ -27,6 +27,8 @@ class StoryHands:
     ----------
     lost
         What could not be done since it was last emptied.
+    over
+        Whether a rule has ended the run.
     """
 
     def __init__(
@@ -37,6 +39,7 @@ class StoryHands:
         net_offset: tuple[float, float],
     ) -> None:
         self.lost: list[Event] = []
+        self.over = False
         self._plan = plan
         self._actors = actors
         self._offset = net_offset
@@ -59,6 +62,8 @@ class StoryHands:
         for one in asked:
             if isinstance(one, WantedActor):
                 self._appear(road, one, time)
+            elif isinstance(one, WantedEnd):
+                self.over = True
             else:
                 self._switch(road, one, time)
 

@@ -118,6 +118,11 @@ class StoryRun:
         )
 
     @property
+    def over(self) -> bool:
+        """Whether a rule has ended the run."""
+        return self._hands.over
+
+    @property
     def moved(self) -> frozenset[str]:
         """Who is moved by rules now."""
         return frozenset(name for name, move in self._moves.items() if move != _FREE)

@@ -1,0 +1,132 @@
+"""Vehicles that start in an opposite lane stay there until the story brings them back."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from odscen.app.runs import run
+from odscen.app.scenario_imports import import_scenario
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+from tests.app.test_scenario_imports import FILE, ROAD, SPEED
+
+if TYPE_CHECKING:
+    import polars as pl
+
+TWO_WAY = ROAD.replace(
+    "</center>",
+    '</center><left><lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
+    "</lane></left>",
+)
+"""A lane against x with its middle at y = 1.75, and two along it, at -1.75 and -5.25."""
+STARTS = """<LanePosition roadId="0" laneId="1" s="20"><Orientation type="relative"
+h="3.14159265"/></LanePosition>"""
+AT_20 = FILE[FILE.index("<PrivateAction><LongitudinalAction>") : FILE.index("</Private>")]
+AT_20 = AT_20.replace("${$kph / 3.6}", "20")
+HEADWAY = re.compile(r"<TimeHeadwayCondition.*?/>", re.DOTALL)
+AHEAD = """<RelativeDistanceCondition entityRef="Other" relativeDistanceType="longitudinal"
+coordinateSystem="entity" freespace="false" value="20" rule="greaterThan"/>"""
+ESMINI = Path(__file__).parents[3] / "shared" / "osc" / "esmini" / "xosc"
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    return Workspace.open(tmp_path_factory.mktemp("opposite"))
+
+
+def overtaking(target: str, condition: str) -> str:
+    """The ego at 10 m/s at s = 48.6 m, another in the opposite lane behind it at 20 m/s."""
+    text = FILE.replace("ACTION", SPEED).replace('delay="0.5"', 'delay="0"')
+    text = re.sub(r"<RelativeLanePosition .*?/>", STARTS, text)
+    text = text.replace("</Private></Actions>", f"{AT_20}</Private></Actions>")
+    text = HEADWAY.sub(condition, text)
+    return text.replace('<RelativeTargetLane entityRef="Other" value="1"/>', target)
+
+
+def play(workspace: Workspace, file: Path, out: Path) -> tuple[Any, dict[str, pl.DataFrame]]:
+    found = import_scenario(workspace, file)
+    assert [one for one in found.problems if one.severity == "error"] == []
+    settings = RunSettings(until=12.0)
+    done = run(workspace, found.scenario, settings=settings, name="run", out=out)
+    assert done.status == "completed"
+    assert "rule_failed" not in done.events()["kind"].to_list()
+    rows = {str(key): one for (key,), one in done.trajectories().group_by("id")}
+    return done, {key: one.sort("time") for key, one in rows.items()}
+
+
+def instant(done: Any, rule: str, what: str) -> float:
+    events = done.events()
+    [found] = events.filter((events["rule"] == rule) & (events["kind"] == f"rule_{what}"))["time"]
+    return float(found)
+
+
+@pytest.mark.parametrize(
+    ("target", "condition"),
+    [
+        (
+            '<RelativeTargetLane entityRef="Ego" value="0"/>',
+            '<TimeHeadwayCondition entityRef="Other" value="1.5" freespace="true" '
+            'rule="greaterThan"/>',
+        ),
+        ('<AbsoluteTargetLane value="-1"/>', AHEAD),
+    ],
+)
+def test_who_overtakes_in_the_opposite_lane_stays_there_until_it_cuts_in(
+    workspace: Workspace, tmp_path: Path, target: str, condition: str
+) -> None:
+    (tmp_path / "road.xodr").write_text(TWO_WAY)
+    file = tmp_path / "scene.xosc"
+    file.write_text(overtaking(target, condition))
+    done, rows = play(workspace, file, tmp_path)
+    begin, end = instant(done, "cut-in", "started"), instant(done, "cut-in", "ended")
+    other = rows["Other"].filter(rows["Other"]["time"] > 0.15)
+    time, x, y = (other[name].to_numpy() for name in ("time", "x", "y"))
+    # 28.6 m behind at first, at 20 m/s until the cut-in is over, when it slows down to 5 m/s.
+    assert 2.0 < begin < end - 2.4
+    assert y[time < begin] == pytest.approx(1.75, abs=0.02)
+    assert x[time < end] == pytest.approx(x[0] + 20.0 * (time[time < end] - time[0]), abs=0.1)
+    assert y[time > end] == pytest.approx(-1.75, abs=0.02)
+    assert np.all(np.diff(x) > 0.0)
+    assert np.cos(other["hdg"].to_numpy()).min() > 0.9
+    assert other["speed"][-1] == pytest.approx(20.0 - 2.0 * (time[-1] - end), abs=0.3)
+
+
+def test_a_change_into_the_opposite_lane_is_one_beside_its_own(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    (tmp_path / "road.xodr").write_text(TWO_WAY)
+    file = tmp_path / "scene.xosc"
+    own = '<LanePosition roadId="0" laneId="-1" s="20"/>'
+    close = AHEAD.replace("greater", "less").replace('"20"', '"25"')
+    file.write_text(overtaking('<AbsoluteTargetLane value="1"/>', close).replace(STARTS, own))
+    done, rows = play(workspace, file, tmp_path)
+    begin, end = instant(done, "cut-in", "started"), instant(done, "cut-in", "ended")
+    other = rows["Other"]
+    time, x, y = (other[name].to_numpy() for name in ("time", "x", "y"))
+    assert y[time < begin] == pytest.approx(-1.75, abs=0.02)
+    assert y[time > end] == pytest.approx(1.75, abs=0.02)
+    assert end == pytest.approx(begin + 2.5)
+    assert np.all(np.diff(x) > 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not ESMINI.is_dir(), reason="../shared/osc is not here")
+@pytest.mark.parametrize(
+    ("name", "who"), [("cut-in_simple", "OverTaker"), ("alks_cut-in", "TargetCutIn")]
+)
+def test_the_cut_ins_of_esmini_from_the_opposite_lane_happen(
+    workspace: Workspace, tmp_path: Path, name: str, who: str
+) -> None:
+    done, rows = play(workspace, ESMINI / f"{name}.xosc", tmp_path)
+    begin, end = instant(done, "CutInEvent", "started"), instant(done, "CutInEvent", "ended")
+    other = rows[who].filter(rows[who]["time"] > 0.15)
+    time, x, y = (other[one].to_numpy() for one in ("time", "x", "y"))
+    lane = float(rows["Ego"]["y"][0])
+    assert y[time < begin] == pytest.approx(lane + 3.1, abs=0.05)
+    assert y[time > end] == pytest.approx(lane, abs=0.05)
+    assert np.all(np.diff(x) > 0.0)

@@ -1,0 +1,97 @@
+"""Arrivals at a speed that is reached before the place: by trajectories, and by the law alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from odscen.scenario.document.actions_document import Arriving
+from odscen.scenario.story.arrivals import arrival_law
+from tests.sumo.story_case import MIDDLE, RIGHT, Track, document, loaded, node_at, run
+from tests.sumo.worker.story.test_story_run import (
+    MOTORWAY,
+    STEPS,
+    TOWN,
+    after,
+    crossing_child,
+    fast,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MEET: dict[str, Any] = {"at": [0.0, 0.0], "to": "ego", "when_at": [1.0, 0.0]}
+
+
+@pytest.mark.parametrize(
+    ("speed", "steady", "rest", "left", "first"),
+    [
+        (10.0, 0.0, 100.0, 8.0, 15.0),
+        (10.0, 20.0, 100.0, 8.0, 50.0 / 3.0),
+        (5.0, 10.0, 100.0, 8.0, 25.0),
+        (10.0, 0.0, 30.0, 8.0, 0.0),  # stands for 2 s first
+        (0.0, 0.0, 30.0, 6.0, 10.0),
+        (2.0, 40.0, 30.0, 6.0, 5.0),  # nearer than the speed should be reached: even
+    ],
+)
+def test_the_speed_on_arrival_is_reached_where_it_should_with_all_metres_in_time(
+    speed: float, steady: float, rest: float, left: float, first: float
+) -> None:
+    part = Arriving.model_validate({**MEET, "speed": speed, "steady": steady})
+    law = arrival_law(part, 3.0, rest, left)
+    assert law.speed(3.0) == pytest.approx(first)
+    assert law.metres(3.0, 3.0 + left) == pytest.approx(rest)
+    if steady < rest:
+        assert law.v1 == speed
+        begin = 3.0 + left - (steady / speed if speed else 0.0)
+        assert law.speed(begin) == pytest.approx(speed)
+
+
+def test_no_place_is_reached_at_a_standstill_that_lasts_for_metres() -> None:
+    with pytest.raises(ValidationError, match="steady for 5 m wants a speed above 0"):
+        Arriving.model_validate({**MEET, "speed": 0.0, "steady": 5.0})
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_who_arrives_drives_the_last_metres_at_the_speed_on_arrival(
+    tmp_path: Path, step: float
+) -> None:
+    places = node_at(MOTORWAY, 640.0, MIDDLE), node_at(MOTORWAY, 600.0, RIGHT)
+    actors = [fast("ego", 370.0, MIDDLE, ego=True), fast("van", 440.0, RIGHT, 10.0)]
+    meet = {"at": places[1], "to": "ego", "when_at": places[0], "speed": 16.0, "steady": 40.0}
+    rules = [after(1.23, {"arrive": meet})]
+    found = run(document(MOTORWAY, actors, rules, step=step), tmp_path / "run")
+    end, van = found.instant("r", "ended"), found.tracks["van"]
+    nodes = loaded(MOTORWAY).sumo.graph.lanes
+    for name, x in (("ego", 640.0), ("van", 600.0)):
+        wanted = float(nodes.x[np.argmin(np.hypot(nodes.x - x, nodes.y - van.y[0]))])
+        place, _ = found.tracks[name].centre(end)
+        assert abs(place - wanted) / 16.0 < 0.1
+    last = _moving(van, end - 40.0 / 16.0 + step, end)
+    assert last == pytest.approx(np.full(len(last), 16.0), abs=0.01)
+    before = _moving(van, 1.5 + step, end - 40.0 / 16.0)
+    assert np.diff(before) == pytest.approx(
+        np.full(len(before) - 1, before[1] - before[0]), abs=0.01
+    )
+
+
+def test_a_walker_waits_and_arrives_at_its_speed(tmp_path: Path) -> None:
+    actors, rules, _ = crossing_child()
+    [ego, _] = actors
+    ego["speed"] = 8.0
+    place = node_at(TOWN, 270.0, 103.4)
+    meet = {"at": [270.6, 101.4], "to": "ego", "when_at": place, "speed": 3.0, "steady": 0.9}
+    rules[1]["then"], rules[1]["when"] = [{"arrive": meet}], {"time": {"after": 3.0}}
+    found = run(document(TOWN, actors, rules, until=12.0), tmp_path / "run")
+    end, child = found.instant("run", "ended"), found.tracks["child"]
+    assert child.centre(end) == pytest.approx((270.6, 101.4), abs=0.05)
+    step = float(child.time[child.time < end - 1e-6][-1])  # it stops within the one after
+    metres = float(np.hypot(*np.subtract(child.centre(step), child.centre(step - 0.1))))
+    assert metres == pytest.approx(0.3, abs=0.02)
+
+
+def _moving(track: Track, begin: float, end: float) -> np.ndarray:
+    return track.speed[(track.time > begin) & (track.time < end)]
