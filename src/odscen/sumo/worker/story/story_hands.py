@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import PlannedActor
     from odscen.scenario.story.asked_actions import Wanted, WantedSignal
     from odscen.sumo.realize.rules.story_files import StoryPlan
-    from odscen.sumo.worker.simulation.moved_actors import MovedActors
     from odscen.sumo.worker.recorder import Recorder
+    from odscen.sumo.worker.simulation.moved_actors import MovedActors
 
 
 class StoryHands:
