@@ -95,6 +95,8 @@ def open_page(
     ) -> OdscenPage:
         if context is None:
             options.setdefault("viewport", {"width": 1360, "height": 850})
+            # A click at what still unfolds can miss it on a busy machine.
+            options.setdefault("reduced_motion", "reduce")
             context = browser.new_context(base_url=url, **options)
             context.set_default_timeout(PATIENCE)
             # Pictures of each step double the time of tests by keyboard.

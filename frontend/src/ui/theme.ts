@@ -7,6 +7,8 @@ export const theme = createTheme({
   defaultRadius: "md",
   autoContrast: true,
   cursorType: "pointer",
+  // Folds and dialogues of the library move by script, which the style sheet cannot stop.
+  respectReducedMotion: true,
   components: {
     Modal: Modal.extend({ defaultProps: { closeButtonProps: { "aria-label": "Close" } } }),
     // A window's head is not a second head of the page.
