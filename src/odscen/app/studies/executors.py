@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
 from odscen.app.studies.study_work import GivenUpError, carry_out_order
@@ -38,6 +39,15 @@ class Executor(Protocol):
         """Outcomes of each order, when it has been carried out."""
 
 
+def _import_what_threads_share() -> None:
+    """Import what is otherwise imported at its first use, by several threads at a time.
+
+    Where two of them wait for each other's imports, Python gives one a module that is half there.
+    """
+    for name in ("numpy.ma", "polars"):
+        import_module(name)
+
+
 @dataclass(frozen=True, slots=True)
 class LocalExecutor:
     """Carries out orders on this machine, one run of SUMO in a process each.
@@ -59,6 +69,7 @@ class LocalExecutor:
 
     def outcomes(self, orders: Orders) -> Iterator[list[Outcome]]:
         """Outcomes of each order, of one run, when it has been carried out."""
+        _import_what_threads_share()
         with ThreadPoolExecutor(max_workers=max(1, self.processes)) as pool:
             running: set[Future[list[Outcome]]] = set()
             try:
