@@ -55,6 +55,11 @@ USUAL_TICK = 0.05
 vehicles without physics (``HYBRID_MODE_DT`` of LibCarla)."""
 GRACE = 30.0
 """Seconds that the worker has for giving the server back."""
+SILENCE = 60.0
+"""Seconds without a tick, at least, after which a worker that has made some is ended; with a
+server's time-out of more than a sixth of it, six time-outs. Each wait in a tick has one."""
+_LOOK = 0.5
+"""Seconds between two looks at whether the run is to end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +242,7 @@ class _Follower:
         self._times: list[float] = []
         self._rows: list[np.ndarray] = []
         self._own: tuple[int, ...] = ()
+        self._silent = 0.0
 
     def run(self, interrupted: threading.Event) -> Ended:
         """Run the worker to its end, whatever that is; what it reported until then is written."""
@@ -250,7 +256,7 @@ class _Follower:
             last = self._follow(here, interrupted)
         finally:
             here.close()  # the worker sees that, and gives the server back
-            process.join(GRACE)
+            process.join(0.0 if self._silent else GRACE)
             if process.is_alive():
                 process.kill()
                 process.join()
@@ -267,15 +273,22 @@ class _Follower:
     def _follow(self, pipe: Connection, interrupted: threading.Event) -> Done | Failed | None:
         last: Done | Failed | None = None
         asked = False
+        heard = time.monotonic()
         while True:
-            try:
-                message: Told = pipe.recv()
-            except (EOFError, ConnectionResetError):
-                return last
             if interrupted.is_set() and not asked:
                 asked = True
                 with suppress(OSError):  # it has just ended
                     pipe.send("stop")
+            try:
+                if not pipe.poll(_LOOK):
+                    if self._times and time.monotonic() - heard > self._patience:
+                        self._silent = time.monotonic() - heard
+                        return last
+                    continue
+                message: Told = pipe.recv()
+            except (EOFError, ConnectionResetError):
+                return last
+            heard = time.monotonic()
             if isinstance(message, Done | Failed):
                 last = message
             elif isinstance(message, Note):
@@ -285,6 +298,10 @@ class _Follower:
                     self._on_picture(message.jpeg)
             else:
                 self._take(message)
+
+    @property
+    def _patience(self) -> float:
+        return max(SILENCE, 6.0 * self._job.address.timeout)
 
     def _take(self, tick: Tick) -> None:
         self._own = tick.own
@@ -316,6 +333,11 @@ class _Follower:
     def _crash(self, code: int) -> str:
         """Say what an exit code means: the Traffic Manager aborts when it meets an error."""
         job = self._job
+        if self._silent:
+            return (
+                f"the process that drives CARLA gave no sign for {self._silent:.0f} s and was "
+                f"ended; see {LOG_FILE}"
+            )
         if code == -signal.SIGABRT:
             return (
                 f"CARLA's Traffic Manager has given up: the server at {job.address} has "

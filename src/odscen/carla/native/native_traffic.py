@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla
+from odscen.carla.native.tick_watch import TickWatch
 from odscen.carla.server.batch import LIFTS, ROLE
 from odscen.results.records.run_records import Event, EventKind
 
@@ -125,6 +126,8 @@ class Traffic:
         # Where a road ends, others than OpenStreetMap's users expect a vehicle to go on.
         self._manager.set_osm_mode(True)
         self._manager.set_hybrid_physics_mode(not physics)
+        self._watch = TickWatch(self._port, lambda: int(server.world.get_snapshot().frame))
+        server.around_tick = self._watch.tick
         server.world.set_pedestrians_seed(seed)
         self.has_navigation = server.world.get_random_location_from_navigation() is not None
 
@@ -137,6 +140,11 @@ class Traffic:
     def running(self) -> int:
         """How many are on the road."""
         return len(self._underway)
+
+    @property
+    def freed(self) -> int:
+        """How often the Traffic Manager waited for itself and was freed."""
+        return self._watch.freed
 
     @property
     def own(self) -> tuple[int, ...]:
@@ -194,14 +202,14 @@ class Traffic:
         return np.array(rows, dtype="<f8").reshape(-1, COLUMNS)
 
     def close(self) -> None:
-        """Let go of all and end the Traffic Manager, which must not outlive the server."""
+        """Let go of all. The Traffic Manager stays as it is, idle, until the process ends.
+
+        To end it here is to wait for its thread, which may have missed the call that ends it.
+        """
         for one in self._underway.values():
             self._let_go(one)
         self._destroy(list(self._underway.values()))
         self._underway.clear()
-        with suppress(RuntimeError):
-            self._manager.set_synchronous_mode(False)
-            self._manager.shut_down()
 
     # ------------------------------------------------------------------------------- coming
     def _spawn_due(self, time: float) -> list[_Underway]:

@@ -44,6 +44,11 @@ NO_NAVIGATION = (
     "around them"
 )
 
+FREED = (
+    "CARLA's Traffic Manager waited for its own thread in {} ticks and was freed after 2 s each "
+    "(issue 9172 of carla-simulator/carla)"
+)
+
 ROAD_ENDS = (
     "the Traffic Manager removed {} vehicles {:.0f} to {:.0f} m before their goals, "
     "where it saw the road end; they count as arrived"
@@ -199,6 +204,8 @@ def _steps(
     if traffic.road_ends:
         low, high = min(traffic.road_ends), max(traffic.road_ends)
         tell(Note(ROAD_ENDS.format(len(traffic.road_ends), low, high)))
+    if traffic.freed:
+        tell(Note(FREED.format(traffic.freed)))
     for actor, reason in traffic.refusals().items():
         tell(Note(f"{actor}: the server would not take it: {reason}"))
     return Done(now, steps, time.perf_counter() - begin, stopped)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
@@ -16,7 +16,7 @@ from odscen.carla.server.releases import release_of
 from odscen.carla.server.server_lights import LightHold
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from collections.abc import Set as AbstractSet
     from contextlib import AbstractContextManager
     from types import TracebackType
@@ -50,6 +50,8 @@ class BorrowedServer:
         How often the stream of states was cut and came back.
     waited
         Seconds spent waiting for the server in batches and ticks.
+    around_tick
+        Entered for each tick that is made.
     roles
         More roles of actors that we make, besides those that begin with :data:`ROLE`.
     release
@@ -71,6 +73,7 @@ class BorrowedServer:
         self.roles: set[str] = set()
         self.interruptions = 0
         self.waited = 0.0
+        self.around_tick: Callable[[], AbstractContextManager[None]] = nullcontext
         self._carla, self._client, warning = connect(address)
         self.release = release_of(self._client.get_client_version())
         self.warnings = [words for words in (warning, self.release.warning) if words]
@@ -146,7 +149,7 @@ class BorrowedServer:
             self._own.clear()
             if self._world.get_settings().synchronous_mode and not self._follows:
                 with suppress(RuntimeError):
-                    self._world.tick(self.address.timeout)
+                    self._advance()
 
     # ------------------------------------------------------------------------------- for others
     @property
@@ -302,11 +305,11 @@ class BorrowedServer:
             return
         start = time.perf_counter()
         try:
-            frame = int(self._world.tick(self.address.timeout))
+            frame = self._advance()
         except RuntimeError:
             if not self.address.listens():
                 raise
-            frame = int(self._world.tick(self.address.timeout))
+            frame = self._advance()
             self.interruptions += 1
             self._frame = None
         self.waited += time.perf_counter() - start
@@ -317,6 +320,10 @@ class BorrowedServer:
                 f"frame {last} to {frame}; only one client may tick"
             )
             raise CarlaError(msg)
+
+    def _advance(self) -> int:
+        with self.around_tick():
+            return int(self._world.tick(self.address.timeout))
 
     def await_tick(self, after: float) -> None:
         """Wait until another client has made a tick since a time of :meth:`clock`.
