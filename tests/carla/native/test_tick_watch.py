@@ -175,4 +175,4 @@ def test_a_worker_that_gives_no_sign_is_ended_and_what_it_told_is_kept(
     assert run.status == "failed"
     assert "gave no sign for" in str(run.summary["error"])
     assert left == []
-    assert max(run.trajectories()["timestep_time"]) >= 1.9
+    assert max(run.trajectories()["time"]) >= 1.9
