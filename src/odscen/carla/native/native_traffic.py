@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla
+from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr
+from odscen.carla.native.spawn_queue import RETRY_SECONDS, SpawnQueue
 from odscen.carla.native.tick_watch import TickWatch
-from odscen.carla.server.batch import LIFTS, ROLE
 from odscen.results.records.run_records import Event, EventKind
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ END_OF_ROAD = 40.0
 """Metres of route left within which the Traffic Manager may remove a vehicle: a road that ends."""
 STRAYED = 15.0
 """Metres from its route at which a vehicle has taken another."""
-RETRY_SECONDS = 0.5
-"""Simulated seconds between two tries to spawn a road user."""
 _SEARCH = 30
 """Points of its route that a road user may pass in one tick, at most."""
 _TURN_AHEAD = 2
@@ -59,13 +57,6 @@ class _Underway:
     turned: int = 0
     speed: float = -1.0
     strayed: bool = False
-
-
-@dataclass(slots=True)
-class _Tries:
-    next: float = 0.0
-    count: int = 0
-    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +102,7 @@ class Traffic:
         physics: bool = True,
     ) -> None:
         self._server = server
-        self._blueprints = blueprints
-        self._waiting = sorted(actors, key=lambda actor: (actor.depart, actor.row))
-        self._tries: dict[int, _Tries] = {}
+        self._queue = SpawnQueue(server, actors, blueprints)
         self._underway: dict[int, _Underway] = {}
         self._starting: list[_Underway] = []
         self._physics = physics
@@ -134,7 +123,7 @@ class Traffic:
     @property
     def expected(self) -> int:
         """How many are on the road or still to come."""
-        return len(self._waiting) + len(self._underway)
+        return len(self._queue) + len(self._underway)
 
     @property
     def running(self) -> int:
@@ -153,16 +142,12 @@ class Traffic:
 
     def refusals(self) -> dict[str, str]:
         """Why the server refused a road user, by id; of those that were not spawned."""
-        return {
-            actor.id: self._tries[actor.row].reason
-            for actor in self._waiting
-            if actor.row in self._tries
-        }
+        return self._queue.refusals()
 
     @property
     def most_tries(self) -> int:
         """How often the one who was refused most often was tried."""
-        return max((tries.count for tries in self._tries.values()), default=0)
+        return self._queue.most_tries
 
     def step(self, time: float, delta: float) -> Happened:
         """Make the tick that begins at ``time``, seconds."""
@@ -213,44 +198,9 @@ class Traffic:
 
     # ------------------------------------------------------------------------------- coming
     def _spawn_due(self, time: float) -> list[_Underway]:
-        due = [actor for actor in self._waiting if actor.depart <= time and self._may(actor, time)]
-        new: list[_Underway] = []
-        for _ in LIFTS:  # all in this tick: a body on the ground is refused, and one above it taken
-            commands = [self._spawn_command(actor) for actor in due]
-            answers = self._server.spawn(commands) if commands else []
-            refused = []
-            for actor, answer in zip(due, answers, strict=True):
-                if isinstance(answer, int):
-                    one = _Underway(actor, answer, time)
-                    self._underway[actor.row] = one
-                    self._waiting.remove(actor)
-                    new.append(one)
-                else:
-                    tries = self._tries.setdefault(actor.row, _Tries())
-                    tries.next, tries.reason = time + RETRY_SECONDS, answer
-                    tries.count += 1
-                    refused.append(actor)
-            due = refused
+        new = [_Underway(actor, number, time) for actor, number in self._queue.spawn_due(time)]
+        self._underway |= {one.plan.row: one for one in new}
         return new
-
-    def _may(self, actor: NativeActor, time: float) -> bool:
-        tries = self._tries.get(actor.row)
-        return tries is None or tries.next <= time
-
-    def _spawn_command(self, actor: NativeActor) -> Any:
-        """At the exact place; only the height gives way, and physics lets a vehicle settle."""
-        tries = self._tries.get(actor.row)
-        lift = LIFTS[tries.count % len(LIFTS)] if tries else LIFTS[0]
-        if actor.person:
-            lift += actor.height / 2.0
-        at = xodr_to_carla(actor.at)
-        return self._server.spawn_command(
-            self._blueprints[actor.row],
-            "hero" if actor.ego else ROLE + actor.id,
-            (float(at.x), float(at.y), float(at.z) + lift),
-            pitch=float(at.pitch_deg),
-            yaw=float(at.yaw_deg),
-        )
 
     def _departed(self, one: _Underway, snapshot: Any, time: float) -> Event:
         state = snapshot.find(one.number)
