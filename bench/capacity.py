@@ -12,7 +12,9 @@ Collisions are counted inside junctions, too.
 
 With lights as programmed and with all of them off. netconvert does not read stop and yield signs,
 nor most speed limits; who stops, or slows down from 100 km/h, has delay that one who need not has
-not. So maps with such signs or limits are measured once more without them ("bare"), by both.
+not. So maps with such signs or limits are measured once more without them ("bare"), by both, and
+have a third network, netconvert's with the map's limits and stop signs
+(:mod:`bench.same_limits`).
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree as ET
 
 from bench.common import shared_maps
+from bench.same_limits import add_signs_and_inner_limits, map_with_limits
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,7 +75,7 @@ def main() -> None:
         return
     levels = [int(v) for v in os.environ.get("ODSCEN_BENCH_LEVELS", "100,300,500").split(",")]
     seeds = [int(v) for v in os.environ.get("ODSCEN_BENCH_SEEDS", "1,2").split(",")]
-    print("ours / netconvert's")
+    print("ours / netconvert's / netconvert's with limits and stop signs, where the map has them")
     print(
         "| map | lights | per hour and km | arrived | delay, s | trip, s | teleports | collisions |"
     )
@@ -80,9 +83,11 @@ def main() -> None:
     ratios = []
     for path in _maps():
         with tempfile.TemporaryDirectory() as folder:
-            for file, label in _versions(path, Path(folder)):
+            versions = _versions(path, Path(folder))
+            for file, label in versions:
+                ruled = len(versions) > 1 and file == path
                 try:
-                    bench = _MapBench(file, Path(folder), label, places=path)
+                    bench = _MapBench(file, Path(folder), label, places=path, ruled=ruled)
                 except subprocess.CalledProcessError:
                     print(f"| {label} | | | netconvert cannot read it |")
                     break
@@ -133,9 +138,9 @@ def _maps() -> list[Path]:
 
 
 class _MapBench:
-    """One map with both of its networks."""
+    """One map with its networks; ``ruled``: it has limits or signs that netconvert leaves out."""
 
-    def __init__(self, path: Path, folder: Path, label: str, *, places: Path) -> None:
+    def __init__(self, path: Path, folder: Path, label: str, *, places: Path, ruled: bool) -> None:
         import carla
         import sumolib
 
@@ -146,6 +151,13 @@ class _MapBench:
         left = ["--lefthand"] if 'rule="LHT"' in text else []
         _tool("netconvert", "--opendrive-files", path, "-o", self._files["netconvert"],
               "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
+        if ruled:
+            limited, net = folder / "limited.xodr", folder / "limited.net.xml"
+            map_with_limits(path, limited)
+            _tool("netconvert", "--opendrive-files", limited, "-o", net,
+                  "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
+            add_signs_and_inner_limits(path, self._files["ours"], net)
+            self._files["limited"] = net
         text = places.read_text(encoding="utf-8", errors="replace")
         lengths = {r.get("id"): float(r.get("length", 0)) for r in ET.fromstring(text).iter("road")}
         self._waypoints = [
@@ -171,10 +183,10 @@ class _MapBench:
             self._walks()
             modes.append(WALKED)
         for lights in modes:
-            ours, peer = (self._run(name, departs, seeds, lights) for name in self._files)
-            values = [f"{a:.0f} / {b:.0f}" for a, b in zip(ours, peer, strict=True)]
+            outcomes = [self._run(name, departs, seeds, lights) for name in self._files]
+            values = [" / ".join(f"{v:.0f}" for v in some) for some in zip(*outcomes, strict=True)]
             print(f"| {self._label} | {lights} | {level} | {' | '.join(values)} |", flush=True)
-            ratios.append(ours.delay / max(peer.delay, 0.1))
+            ratios.append(outcomes[0].delay / max(outcomes[1].delay, 0.1))
         return ratios
 
     def _trips(self, count: int) -> dict[str, float]:
@@ -190,7 +202,7 @@ class _MapBench:
                 break
         trips.sort(key=lambda trip: trip[2])
         routed = {name: self._routed(name, trips) for name in self._files}
-        both = [key for key in routed["ours"] if key in routed["netconvert"]]
+        both = [key for key in routed["ours"] if all(key in some for some in routed.values())]
         for name, vehicles in routed.items():
             text = "".join(ET.tostring(vehicles[key], encoding="unicode") for key in both)
             (self._folder / f"{name}.rou.xml").write_text(f"<routes>{VTYPE}{text}</routes>")

@@ -26,7 +26,7 @@ from odscen.convert.model.edge_plan import plan_edges
 from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
 from odscen.convert.model.net_ids import lane_id
-from odscen.convert.model.right_of_way import Movement, wrapped
+from odscen.convert.model.right_of_way import Movement
 from odscen.convert.model.road_gaps import merge_gaps, side_gaps
 from odscen.convert.pedestrian.crosswalks import place_crosswalks
 from odscen.convert.pedestrian.pedestrian_network import build_walks
@@ -50,6 +50,9 @@ if TYPE_CHECKING:
 
 SIDEWAYS = 5.5
 """m/s2 of lateral acceleration that the speed of a turn is limited to; netconvert's default."""
+
+EASED = math.radians(15.0)
+"""Change of heading that a turn gains by drivers who cut its corner; netconvert's default."""
 
 LEAST_TURN_SPEED = 2.0
 """m/s."""
@@ -258,14 +261,16 @@ class _NetworkBuilder:
         return Passage(
             movement,
             line.length,
-            self._speed(connection, line, min(source.speed, target.speed)),
+            self._speed(connection, line, movement.turn, around=min(source.speed, target.speed)),
             source.allowed & target.allowed,
             source.type,
             self._origins(connection.alignment),
             self.control.lights[number],
         )
 
-    def _speed(self, connection: PlannedConnection, line: Line, around: float) -> float:
+    def _speed(
+        self, connection: PlannedConnection, line: Line, turn: float, *, around: float
+    ) -> float:
         """Speed of an internal lane: what the map says, or else the slower road; less in curves."""
         table = self._table
         rows = np.array([stretch.row for stretch in connection.alignment])
@@ -277,10 +282,21 @@ class _NetworkBuilder:
             if not math.isnan(limit)
         ]
         speed = min(own) if own else around
-        turn = abs(wrapped(line.headings()[1] - line.headings()[0]))
-        if turn > 0.1:
-            speed = min(speed, math.sqrt(SIDEWAYS * line.length / turn))
+        sharp = abs(turn) - EASED
+        if sharp > 0.0:
+            radius = self._turning(connection, line) / sharp + line.widths[1] / 4.0
+            speed = min(speed, math.sqrt(SIDEWAYS * radius))
         return round(max(speed, LEAST_TURN_SPEED), 2)
+
+    def _turning(self, connection: PlannedConnection, line: Line) -> float:
+        """Metres of a turn: those on connecting roads, without what crosswalks took from others."""
+        roads = [self._table.road_ids[self._table.lane_road[s.row]] for s in connection.alignment]
+        inside = [
+            float(arc[-1] - arc[0])
+            for road, arc in zip(roads, line.arc, strict=True)
+            if self._odr.roads[road].junction is not None
+        ]
+        return sum(inside) or line.length
 
     # Edges
 
