@@ -21,6 +21,7 @@ ALL = (
     "recording",
     "short_runs",
     "studies",
+    "study_kills",
     "critical_search",
     "rules",
     "behaviour",
