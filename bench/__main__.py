@@ -22,6 +22,7 @@ ALL = (
     "short_runs",
     "studies",
     "study_kills",
+    "regression_suite",
     "critical_search",
     "rules",
     "behaviour",
