@@ -21,6 +21,7 @@ ALL = (
     "recording",
     "short_runs",
     "studies",
+    "network_size",
     "study_kills",
     "regression_suite",
     "critical_search",
