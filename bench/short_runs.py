@@ -39,7 +39,7 @@ KINDS = {
     "figures": ["--no-report", "--json"],
     "reports": ["--report"],
 }
-_POOL = """
+POOL = """
 import sys
 from multiprocessing import get_context
 
@@ -86,7 +86,7 @@ class Size(NamedTuple):
 def compare(folder: Path, size: Size, chosen: Sequence[str], *, runs: int, repeats: int) -> None:
     scenarios = _scenarios(folder, size, runs)
     script = folder / "pool.py"
-    script.write_text(_POOL % (size.seconds, JOBS), encoding="utf-8")
+    script.write_text(POOL % (size.seconds, JOBS), encoding="utf-8")
     out = folder / "runs"
     kinds = {kind: KINDS[kind] for kind in chosen}
     batches = {kind: _command(folder, out, scenarios, *more) for kind, more in kinds.items()}
@@ -94,7 +94,7 @@ def compare(folder: Path, size: Size, chosen: Sequence[str], *, runs: int, repea
         kind: _command(folder, folder / "alone", scenarios[:1], *more)
         for kind, more in kinds.items()
     }
-    _cpu(_command(folder, out, scenarios, *KINDS["records"]))
+    spent_by(_command(folder, out, scenarios, *KINDS["records"]))
     configs = sorted(out.glob(f"*/{layout.SUMO_FOLDER}/{layout.CONFIG_FILE}"))
     bare = folder / "bare"
     for config in configs:
@@ -104,10 +104,10 @@ def compare(folder: Path, size: Size, chosen: Sequence[str], *, runs: int, repea
     spent: dict[str, list[float]] = {kind: [] for kind in kinds}
     alone: dict[str, list[tuple[float, float]]] = {kind: [] for kind in kinds}
     for _ in range(repeats):
-        pool.append(_cpu([sys.executable, str(script)], given=given)[0])
+        pool.append(spent_by([sys.executable, str(script)], given=given)[0])
         for kind in kinds:
-            spent[kind].append(_cpu(batches[kind])[0])
-            alone[kind].append(_cpu(lone[kind]))
+            spent[kind].append(spent_by(batches[kind])[0])
+            alone[kind].append(spent_by(lone[kind]))
     peer = statistics.median(pool) / runs
     for kind in kinds:
         each = statistics.median(spent[kind]) / runs
@@ -134,7 +134,7 @@ def _command(folder: Path, out: Path, scenarios: list[Path], *more: str) -> list
     return [*command, "--jobs", str(JOBS), *more]
 
 
-def _cpu(command: list[str], *, given: str = "") -> tuple[float, float]:
+def spent_by(command: list[str], *, given: str = "") -> tuple[float, float]:
     """CPU seconds of a command with all that it starts, and wall seconds."""
     # What a forked process takes is its server's, which the command waits for.
     environment = worker_environment() if given else dict(os.environ)

@@ -13,7 +13,9 @@ from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.columns import check_map_graph
 from odscen.lanegraph.graph_files import from_graphml, to_graphml, to_npz_bytes
 from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, MapGraph, Relation
+from odscen.lanegraph.lane_nodes import place_nodes
 from odscen.lanegraph.query import node_id, node_ids, node_index
+from odscen.opendrive.lanes import RoadTable
 from tests.lanegraph.roads import junction, lane, network, road, section
 
 if TYPE_CHECKING:
@@ -214,6 +216,16 @@ def test_a_spacing_out_of_range_is_refused(spacing: float) -> None:
 def test_lanes_that_would_not_fit_into_memory_are_refused() -> None:
     with pytest.raises(InputError, match=r"road 1: .*4e\+06 m long together"):
         build(network(road("1", section(*(lane(-i) for i in range(1, 5))), length=999_999.0)))
+
+
+def test_more_lanes_are_built_where_more_are_allowed() -> None:
+    odr = network(road("1", section(*(lane(-i) for i in range(1, 3))), length=600_000.0))
+    table = RoadTable.of(odr)
+    words = r"more than 1e\+06 m; a build that may use more memory \(--build-memory\) may have more"
+    with pytest.raises(InputError, match=words):
+        place_nodes(table, 100.0)
+    nodes = place_nodes(table, 100.0, most=1.3e6)
+    assert len(nodes.lane) == 12_000
 
 
 def test_two_builds_of_a_map_give_equal_bytes() -> None:

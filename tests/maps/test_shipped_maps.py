@@ -101,6 +101,24 @@ def test_the_large_town_has_over_a_hundred_junctions():
     assert odr.notes == ()
 
 
+@pytest.mark.slow
+def test_towns_that_are_joined_are_one_network_without_a_gap():
+    pytest.importorskip("scenariogeneration", reason="needs the maintainers' tools")
+    from tools.make_maps.__main__ import map_text
+
+    odr = parse(map_text("towns_10"))
+    assert odr.notes == ()
+    country = [road for road in odr.roads.values() if road.name == "Country Road"]
+    assert len(country) == 13
+    successors = lane_successors(odr)
+    reached, fresh = set(), {key for key in successors if key.road == country[0].id}
+    while fresh:
+        reached |= fresh
+        fresh = {lane for key in fresh for lane in successors.get(key, ())} - reached
+    assert {road.id for road in country} <= {key.road for key in reached}
+    assert len({key.road for key in reached}) > 0.9 * len(odr.roads)
+
+
 @every_map
 def test_our_own_reader_has_nothing_to_remark(name):
     assert shipped(name).odr.notes == ()

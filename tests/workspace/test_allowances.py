@@ -44,6 +44,12 @@ def test_an_option_that_is_no_number_above_zero_is_refused(value: float) -> None
         BuildLimits(minutes=value)
 
 
+def test_a_map_that_may_use_more_memory_than_any_may_unasked_may_have_more_lanes() -> None:
+    assert BY_SIZE.for_map(256_000_000, spacing=2.0).times_usual == 1.0
+    assert BuildLimits(memory=0.5).for_map(1, spacing=2.0).times_usual == 1.0
+    assert BuildLimits(memory=14.5).for_map(1, spacing=2.0).times_usual == pytest.approx(10.0)
+
+
 def test_a_passed_limit_says_how_to_allow_twice_as_much_and_ends_with_exit_code_3() -> None:
     error = Allowance(2_000_000_000, 60.0, raise_it=True).passed("building the map", "memory")
     assert error.exit_code == 3

@@ -1,6 +1,6 @@
 """``python -m tools.make_maps [--only NAME] [-o DIR]``: write the maps that ship.
 
-``large_town`` is written only when it is named: it is too large to keep in the repository.
+``large_town``, ``towns_10`` and ``towns_100`` are written only when they are named.
 """
 
 from __future__ import annotations

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tools.make_maps.crossings import left_hand_crossing, signal_crossing, t_junction_signs
+from tools.make_maps.joined_towns import joined_towns
 from tools.make_maps.motorway import motorway_weave
 from tools.make_maps.roundabout import roundabout
 from tools.make_maps.rural import rural_hills
@@ -24,6 +26,11 @@ MAPS: dict[str, Callable[[str], Builder]] = {
     "town_5x5": town_5x5,
     "left_hand_crossing": left_hand_crossing,
 }
-ON_DEMAND: dict[str, Callable[[str], Builder]] = {"large_town": large_town}
+ON_DEMAND: dict[str, Callable[[str], Builder]] = {
+    "large_town": large_town,
+    "towns_10": partial(joined_towns, count=10),
+    "towns_100": partial(joined_towns, count=100),
+}
+"""Too large to be kept in the repository."""
 LEFT_HAND = {"left_hand_crossing"}
 """Maps that are mirrored when they are written."""

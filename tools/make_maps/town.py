@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 Node = tuple[int, int]
 """Column and row of a junction."""
+Arms = dict[Node, dict[int, End]]
+"""Ends of streets at each junction, by direction: quarters of a turn from east."""
 
 PITCHES = (105.0, 90.0, 125.0, 95.0, 115.0)
 """Metres between neighbouring streets, over and over."""
@@ -45,6 +47,8 @@ class Grid:
         Column whose traffic has priority.
     roundabouts
         Junctions that are roundabouts.
+    west, south
+        Metres from the origin of the map to the first junction.
     """
 
     columns: int
@@ -52,10 +56,13 @@ class Grid:
     avenue: int
     priority: int
     roundabouts: frozenset[Node]
+    west: float = 0.0
+    south: float = 0.0
 
     def place(self, node: Node) -> Pose:
         """Middle of a junction, looking east."""
-        return Pose(_offsets(self.columns)[node[0]], _offsets(self.rows)[node[1]], 0.0)
+        x, y = _offsets(self.columns)[node[0]], _offsets(self.rows)[node[1]]
+        return Pose(self.west + x, self.south + y, 0.0)
 
     def reach(self, node: Node) -> float:
         """Metres from the middle of a junction to the end of its arms."""
@@ -63,18 +70,29 @@ class Grid:
             return roundabout.REACH
         return WIDE_REACH if node[1] == self.avenue else REACH
 
+    def nodes(self) -> list[Node]:
+        """All places where streets meet or bend."""
+        return [(i, j) for i in range(self.columns) for j in range(self.rows)]
+
     def corners(self) -> list[Node]:
         """Nodes that are bends, not junctions."""
         return [(i, j) for i in (0, self.columns - 1) for j in (0, self.rows - 1)]
+
+    def extent(self) -> tuple[float, float]:
+        """Metres from the first junction to the last, eastwards and northwards."""
+        return _offsets(self.columns)[-1], _offsets(self.rows)[-1]
 
 
 def _offsets(count: int) -> list[float]:
     return list(accumulate(islice(cycle(PITCHES), count - 1), initial=0.0))
 
 
+SMALL = Grid(6, 6, 2, 3, frozenset({(4, 4), (1, 3)}))
+
+
 def town_5x5(name: str) -> Builder:
     """Five by five blocks with 32 places where streets meet."""
-    return _town(name, Grid(6, 6, 2, 3, frozenset({(4, 4), (1, 3)})))
+    return _town(name, SMALL)
 
 
 def large_town(name: str) -> Builder:
@@ -84,25 +102,34 @@ def large_town(name: str) -> Builder:
 
 def _town(name: str, grid: Grid) -> Builder:
     builder = Builder(name)
-    nodes = [(i, j) for i in range(grid.columns) for j in range(grid.rows)]
-    arms: dict[Node, dict[int, End]] = {node: {} for node in nodes}
+    add_junctions(builder, grid, add_streets(builder, grid))
+    return builder
+
+
+def add_streets(builder: Builder, grid: Grid) -> Arms:
+    """Add all streets of a town, and tell where they end."""
+    arms: Arms = {node: {} for node in grid.nodes()}
     corners = grid.corners()
-    for node in nodes:
+    for node in arms:
         for direction, other in ((0, (node[0] + 1, node[1])), (1, (node[0], node[1] + 1))):
             if other in arms and node not in corners and other not in corners:
                 _street(builder, grid, arms, node, other, direction)
     for corner in corners:
         _bend(builder, grid, arms, corner)
-    for node in nodes:
-        if node not in corners:
+    return arms
+
+
+def add_junctions(builder: Builder, grid: Grid, arms: Arms) -> None:
+    """Join the streets of a town where they meet."""
+    for node in arms:
+        if node not in grid.corners():
             _junction(builder, grid, node, arms[node])
-    return builder
 
 
 def _street(
     builder: Builder,
     grid: Grid,
-    arms: dict[Node, dict[int, End]],
+    arms: Arms,
     node: Node,
     other: Node,
     direction: int,
@@ -124,7 +151,7 @@ def _street(
     arms[other][direction + 2] = End(record, "end")
 
 
-def _bend(builder: Builder, grid: Grid, arms: dict[Node, dict[int, End]], corner: Node) -> None:
+def _bend(builder: Builder, grid: Grid, arms: Arms, corner: Node) -> None:
     """Road around a corner of the town, from the junction beside it to the one above or below."""
     i, j = corner
     beside = (1 if i == 0 else i - 1, j)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import InputError
+from odscen.lanegraph.centrelines import MOST_LANES
 from odscen.lanegraph.graphs import LaneGraph, Lanes, MapGraph
 from odscen.lanegraph.lane_density import check_density
 from odscen.lanegraph.lane_edges import connect
@@ -35,6 +36,7 @@ def build_map_graph(
     sha256: str,
     spacing: float = 2.0,
     table: RoadTable | None = None,
+    most_lanes: float = MOST_LANES,
 ) -> MapGraph:
     """Make lane graph, segments and pedestrian graph of a map (requirements R20 to R27, R32).
 
@@ -48,20 +50,22 @@ def build_map_graph(
         Metres between nodes of a lane or walk, before rounding per lane.
     table
         The road model as arrays, if it has been made already.
+    most_lanes
+        Metres that all drivable lanes, or all walks, may have together.
 
     Raises
     ------
     InputError
         If ``spacing`` is out of range.
     OpenDriveError
-        If the lanes together are longer than 1,000 km, need too many nodes, or lie on each other.
+        If the lanes together are longer, need too many nodes, or lie on each other.
     """
     if not MIN_SPACING <= spacing <= MAX_SPACING:
         problem = f"spacing {spacing} m is not within {MIN_SPACING} to {MAX_SPACING} m"
         raise InputError(problem)
     table = RoadTable.of(odr) if table is None else table
     successors = lane_successors(odr)
-    nodes = place_nodes(table, spacing)
+    nodes = place_nodes(table, spacing, most=most_lanes)
     check_density(table, nodes.lines.rows[nodes.lane], np.stack([nodes.x, nodes.y, nodes.z]))
     segments = build_segments(odr)
     row = {road: index for index, road in enumerate(odr.roads)}
@@ -75,6 +79,7 @@ def build_map_graph(
             odr,
             table,
             spacing=spacing,
+            most=most_lanes,
             vehicles=nodes,
             segments=segments,
             road_rows=road_rows,

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 SAMPLE_STEP = 1.0
 """Metres of s between samples of a centre line; a chord of 1 m at radius 5 m is 0.2 % short."""
 
-MAX_SAMPLES = 1_000_000
-"""More samples than this (1,000 km of lanes) are refused; they take about 0.3 kB of memory each."""
-
-
-MAX_NODES = 2_000_000
-"""Nodes of all lanes, or of all walks, of a map; they take about 0.5 kB of memory each."""
+MOST_LANES = 1e6
+"""Metres of all lanes, or of all walks, of a map, if nothing else is allowed; a sample takes about
+0.3 kB of memory."""
+NODES_PER_METRE = 2.0
+"""Nodes for each metre that is allowed, at most; they take about 0.5 kB of memory each."""
+MORE_LANES = "a build that may use more memory (--build-memory) may have more"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,13 @@ class CentreLines:
 
     @classmethod
     def of(
-        cls, table: RoadTable, rows: IntArray, *, forward: BoolArray, at: FloatArray
+        cls,
+        table: RoadTable,
+        rows: IntArray,
+        *,
+        forward: BoolArray,
+        at: FloatArray,
+        most: float = MOST_LANES,
     ) -> CentreLines:
         """Sample lanes.
 
@@ -74,20 +80,22 @@ class CentreLines:
             Shape ``(L,)``: see the class.
         at
             Shape ``(L,)``: where across the lane; 0.5 is the centre, 1 the outer border.
+        most
+            Metres that the lanes may have together.
 
         Raises
         ------
         OpenDriveError
-            If the lanes are longer than :data:`MAX_SAMPLES` allows.
+            If the lanes are longer.
         """
         s0, s1 = table.lane_s0[rows], table.lane_s1[rows]
         extent = np.maximum(s1 - s0, 0.0)
         total = float(np.sum(extent)) / SAMPLE_STEP + 2 * len(rows)
-        if not total < MAX_SAMPLES:
+        if not total < most / SAMPLE_STEP:
             longest = table.lane_keys[int(rows[np.argmax(extent)])]
             problem = (
                 f"the lanes of the map are {np.sum(extent):.3g} m long together, "
-                f"more than {MAX_SAMPLES * SAMPLE_STEP:.3g} m; this road has the longest"
+                f"more than {most:.3g} m; {MORE_LANES}; this road has the longest"
             )
             raise OpenDriveError(problem, element=f"road {shown_id(longest.road)}")
         count = np.ceil(extent / SAMPLE_STEP).astype(np.int64) + 1
@@ -101,7 +109,7 @@ class CentreLines:
         gone = np.concatenate([[0.0], np.cumsum(np.where(np.diff(lane) == 0, chords, 0.0))])
         distance = gone - gone[first[:-1]][lane]
         lengths = distance[first[1:] - 1]
-        _check_lengths(table, rows, extent, lengths)
+        _check_lengths(table, rows, extent, lengths, most)
         return cls(rows, s0, s1, forward, first, distance, lengths)
 
     def s_at(self, lane: IntArray, offset: FloatArray) -> FloatArray:
@@ -134,23 +142,25 @@ class CentreLines:
 
 
 def _check_lengths(
-    table: RoadTable, rows: IntArray, extent: FloatArray, lengths: FloatArray
+    table: RoadTable, rows: IntArray, extent: FloatArray, lengths: FloatArray, most: float
 ) -> None:
     """Refuse lanes that wind so much that they are longer than the roads they lie on permit."""
     total = float(np.sum(lengths))
-    if total <= MAX_SAMPLES * SAMPLE_STEP:  # not so for NaN, too
+    if total <= most:  # not so for NaN, too
         return
     longest = int(np.argmax(np.where(np.isnan(lengths), np.inf, lengths)))
     road, section, lane = table.lane_keys[int(rows[longest])]
     problem = (
         f"is {lengths[longest]:.3g} m long on {extent[longest]:.3g} m of its road; all lanes "
-        f"together are {total:.3g} m, the limit is {MAX_SAMPLES * SAMPLE_STEP:.3g} m"
+        f"together are {total:.3g} m, the limit is {most:.3g} m; {MORE_LANES}"
     )
     place = f"road {shown_id(road)} > laneSection {section} > lane {lane}"
     raise OpenDriveError(problem, element=place)
 
 
-def node_offsets(lengths: FloatArray, spacing: float) -> tuple[IntArray, IntArray, FloatArray]:
+def node_offsets(
+    lengths: FloatArray, spacing: float, *, most: float = MOST_LANES
+) -> tuple[IntArray, IntArray, FloatArray]:
     """Place nodes along lanes at equal gaps as near to ``spacing`` as a whole number allows.
 
     Parameters
@@ -159,6 +169,8 @@ def node_offsets(lengths: FloatArray, spacing: float) -> tuple[IntArray, IntArra
         Shape ``(L,)``, metres.
     spacing
         Metres.
+    most
+        Metres that the map may have of such lanes; it may have so many nodes too.
 
     Returns
     -------
@@ -169,13 +181,13 @@ def node_offsets(lengths: FloatArray, spacing: float) -> tuple[IntArray, IntArra
     Raises
     ------
     OpenDriveError
-        If there are more nodes than :data:`MAX_NODES`.
+        If there are more nodes than :data:`NODES_PER_METRE` allows.
     """
     wanted = float(np.sum(lengths)) / spacing
-    if not wanted <= MAX_NODES:
+    if not wanted <= (limit := NODES_PER_METRE * most):
         problem = (
             f"{np.sum(lengths):.3g} m of lanes have {wanted:.3g} nodes at a spacing of {spacing:g} "
-            f"m; the limit is {MAX_NODES:g}: choose a larger spacing"
+            f"m; the limit is {limit:g}: choose a larger spacing"
         )
         raise OpenDriveError(problem)
     count = np.maximum(np.rint(lengths / spacing), 1).astype(np.int64)

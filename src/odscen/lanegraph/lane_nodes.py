@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.lanegraph.centrelines import CentreLines, node_offsets
+from odscen.lanegraph.centrelines import MOST_LANES, CentreLines, node_offsets
 from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, ByteArray
 from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
 from odscen.opendrive.road_model import DRIVABLE_TYPES
@@ -64,13 +64,13 @@ class NodeTable:
     lane_change: ByteArray
 
 
-def place_nodes(table: RoadTable, spacing: float) -> NodeTable:
-    """Place nodes along all drivable lanes of a map (requirement R20)."""
+def place_nodes(table: RoadTable, spacing: float, *, most: float = MOST_LANES) -> NodeTable:
+    """Place nodes along all drivable lanes of a map, at most ``most`` metres (R20)."""
     drivable = np.array([kind in DRIVABLE_TYPES for kind in table.lane_type], dtype=np.bool_)
     rows = np.flatnonzero(drivable).astype(np.int64)
     forward = table.lane_forward[rows]
-    lines = CentreLines.of(table, rows, forward=forward, at=np.full(len(rows), 0.5))
-    planned, lane, offset = node_offsets(lines.lengths, spacing)
+    lines = CentreLines.of(table, rows, forward=forward, at=np.full(len(rows), 0.5), most=most)
+    planned, lane, offset = node_offsets(lines.lengths, spacing, most=most)
     s = lines.s_at(lane, offset)
     points = table.lane_points(rows[lane], s)
     wide = points.width >= MIN_LANE_WIDTH

@@ -91,6 +91,7 @@ def build_pedestrians(
     table: RoadTable,
     *,
     spacing: float,
+    most: float,
     vehicles: NodeTable,
     segments: SegmentMap,
     road_rows: IntArray,
@@ -105,6 +106,8 @@ def build_pedestrians(
         The road model and its arrays.
     spacing
         Metres between nodes of a walk, before rounding per walk.
+    most
+        Metres that the walks may have together.
     vehicles
         Nodes of the lane graph; joints keep off their lanes.
     segments
@@ -122,7 +125,7 @@ def build_pedestrians(
         If the walks are too long together, or too many lie on each other.
     """
     walks = _walks(odr, table)
-    nodes = _place(table, walks, spacing)
+    nodes = _place(table, walks, spacing, most)
     check_density(table, walks.rows[nodes.lane], nodes.place.T)
     used = np.flatnonzero(np.diff(nodes.first))
     number = np.cumsum(np.diff(nodes.first) > 0) - 1
@@ -194,12 +197,12 @@ def _roadside_allowed(odr: OpenDrive, table: RoadTable) -> BoolArray:
     return allowed
 
 
-def _place(table: RoadTable, walks: _Walks, spacing: float) -> _WalkNodes:
+def _place(table: RoadTable, walks: _Walks, spacing: float, most: float) -> _WalkNodes:
     rows, roadside = walks
     across = np.where(roadside, 1.0, 0.5)
     growing = np.ones(len(rows), dtype=np.bool_)
-    lines = CentreLines.of(table, rows, forward=growing, at=across)
-    planned, lane, offset = node_offsets(lines.lengths, spacing)
+    lines = CentreLines.of(table, rows, forward=growing, at=across, most=most)
+    planned, lane, offset = node_offsets(lines.lengths, spacing, most=most)
     s = lines.s_at(lane, offset)
     place, hdg, width = _points(table, walks, lane, s)
     wide = width >= MIN_WALK_WIDTH

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 from odscen.base.errors import in_file
 from odscen.base.stored_files import tables
 from odscen.results.by_place.analysis_times import AnalysisTimes
-from odscen.results.by_place.traffic import over_run
+from odscen.results.by_place.lane_places import LanePlaces
+from odscen.results.by_place.traffic import over_run, traffic_figures
 from odscen.results.measures.registry import ACTOR_FIGURES, COUNTS, SEGMENT_FIGURES, figure_of
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.outcomes import RunStatus
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.measured import read_figures
+from odscen.sumo.folder.recorded import read_lanes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -102,8 +103,21 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
                     for figure in ACTOR_FIGURES
                 }
         times = AnalysisTimes.of_summary(summary)
-        figures = read_figures(folder, end=summary["sim_seconds"], times=times)
+        figures = _of_lanes(folder, end=summary["sim_seconds"], times=times)
         for key, value in place_figures(figures) if figures is not None else ():
             if value is not None:
                 found[key] = round(float(value), DIGITS)
     return found
+
+
+def _of_lanes(folder: Path, *, end: float, times: AnalysisTimes) -> TrafficFigures | None:
+    """Figures by place of what was measured on lanes alone, ``None`` if nothing was.
+
+    Those of baselines need no more: no queues, control delay or lane groups, which take most of
+    the time that all figures of a run take.
+    """
+    lanes, file = read_lanes(folder), folder / layout.LANE_PLACES_FILE
+    if lanes is None or not file.is_file():
+        return None
+    places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
+    return traffic_figures(lanes, places, end=end, times=times)

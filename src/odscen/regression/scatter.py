@@ -160,6 +160,6 @@ def _known(values: Mapping[int, float | None]) -> dict[int, float]:
 @cache
 def quantile(tail: float, freedom: int) -> float:
     """Value that Student's t exceeds with probability ``tail``."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return float(t.isf(tail, freedom))
+    return -float(stdtrit(freedom, tail))

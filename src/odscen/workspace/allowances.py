@@ -70,6 +70,14 @@ class Allowance(NamedTuple):
         return self.memory // _FILE_SHARE
 
     @property
+    def times_usual(self) -> float:
+        """How many times the memory is that of the largest map, if the user has not allowed more.
+
+        A map may have so many times the lanes, too.
+        """
+        return max(1.0, self.memory / MOST_MEMORY)
+
+    @property
     def wall_seconds(self) -> float:
         """Wall seconds."""
         return _PATIENCE * self.seconds

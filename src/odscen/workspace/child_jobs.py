@@ -9,6 +9,7 @@ from typing import Any
 # Imported before there is work, for a child that waits for some.
 import odscen.convert.building.network  # noqa: F401
 from odscen.convert.model.conversion_settings import ConversionSettings
+from odscen.lanegraph.centrelines import MOST_LANES
 from odscen.workspace.converters import GivenNetwork
 from odscen.workspace.map_build import build_map
 
@@ -26,6 +27,7 @@ def _map(
     converter: Any,
     given: str | None,
     source: str,
+    times_usual: float,
     progress: Progress,
 ) -> Mapping[str, Any]:
     """Build the map whose .xodr lies in ``folder`` there."""
@@ -37,6 +39,7 @@ def _map(
         settings=ConversionSettings(spacing=spacing, converter=converter),
         builder=builder,
         given=None if given is None else GivenNetwork(Path(given).read_bytes(), source),
+        most_lanes=MOST_LANES * times_usual,
         progress=progress,
     )
     return {}

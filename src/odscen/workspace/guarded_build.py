@@ -66,6 +66,7 @@ def build_in_child(
                 "converter": settings.converter,
                 "given": None if network is None else str(network),
                 "source": given.source if given else "",
+                "times_usual": allowance.times_usual,
             },
             folders=(scratch, folder),
             allowance=allowance,

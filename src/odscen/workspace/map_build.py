@@ -53,6 +53,7 @@ def build_map(
     settings: ConversionSettings,
     builder: str,
     given: GivenNetwork | None,
+    most_lanes: float,
     progress: Callable[[str, float], None],
 ) -> None:
     """Fill ``folder`` with all of :data:`FILES`.
@@ -67,6 +68,8 @@ def build_map(
         Version of the folder's content.
     given
         A network that was brought in for the map.
+    most_lanes
+        Metres that all drivable lanes, or all walks, may have together.
     progress
         Called with what comes next and the share done.
 
@@ -85,7 +88,14 @@ def build_map(
     odr = parse(content, file=file)
     table = RoadTable.of(odr)
     progress("building the lane graph", 0.1)
-    graph = build_map_graph(odr, name=name, sha256=sha256, spacing=settings.spacing, table=table)
+    graph = build_map_graph(
+        odr,
+        name=name,
+        sha256=sha256,
+        spacing=settings.spacing,
+        table=table,
+        most_lanes=most_lanes,
+    )
     (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))
     (folder / FILES["graph"]).write_bytes(to_graphml(graph))
     progress("making the SUMO network", 0.4)

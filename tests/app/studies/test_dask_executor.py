@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-from contextlib import contextmanager
+import socket
+import sys
+import time
+from contextlib import contextmanager, suppress
+from subprocess import DEVNULL, Popen
 from typing import TYPE_CHECKING, Any
 
 import dask
@@ -24,7 +28,7 @@ from tests.app.studies.study_case import MadeUp, place, plan_file
 from tests.sumo.story_case import entry
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from odscen.app.studies.study_work import WorkOrder
@@ -150,6 +154,8 @@ def test_a_map_that_was_lost_with_its_workers_is_sent_again(tmp_path: Path) -> N
     from distributed import KilledWorker
 
     class Lost:
+        status = "error"
+
         def result(self) -> None:
             raise KilledWorker("odscen-map-1234-1", None, 3)
 
@@ -162,6 +168,68 @@ def test_a_map_that_was_lost_with_its_workers_is_sent_again(tmp_path: Path) -> N
     assert executor._packs == {}
     assert executor._again == [order]
     assert executor._deaths == {}
+
+
+@contextmanager
+def daemons(folder: Path) -> Iterator[Callable[..., Popen[bytes]]]:
+    """Start Dask's scheduler and workers as processes, and end them."""
+    started: list[Popen[bytes]] = []
+
+    def start(what: str, *given: str) -> Popen[bytes]:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{what}", "--no-dashboard"]
+        command += ["--host", "127.0.0.1", *given]
+        started.append(Popen(command, cwd=folder, stdout=DEVNULL, stderr=DEVNULL))
+        return started[-1]
+
+    try:
+        yield start
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("patience", ["3s", "60s"])
+def test_a_scheduler_that_is_started_anew_loses_and_doubles_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, patience: str
+) -> None:
+    """It is away for 6 s: Dask's client gives up before, or is patient and comes back."""
+    monkeypatch.setattr(dask_executor, "_CONNECT", patience)
+    out, port = begun(tmp_path, seeds=6), free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    worker = ("worker", address, "--no-nanny", "--nthreads", "1")
+    with daemons(tmp_path) as start:
+        schedulers = [start("scheduler", "--port", str(port))]
+        start(*worker)
+
+        def kill(ended: int, _: int) -> None:
+            if ended >= 2 and len(schedulers) == 1:
+                schedulers[0].kill()
+                schedulers[0].wait()
+                time.sleep(6.0)
+                schedulers.append(start("scheduler", "--port", str(port)))
+                start(*worker)
+
+        wait_for(port)
+        ended = carry_out_study(out, DaskExecutor(place(), address), done=kill)
+    assert len(schedulers) == 2
+    assert ended.state.counts["completed"] == 6
+    assert len((out / "journal.jsonl").read_text("utf-8").splitlines()) == 6
+
+
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+def wait_for(port: int) -> None:
+    """Wait until something listens."""
+    for _ in range(600):
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1.0):
+            return
+        time.sleep(0.1)
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tarfile
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import polars as pl
 import pytest
 
 from odscen.app.runs import check_file, run_all
-from odscen.app.studies import study_folder
+from odscen.app.studies import study_folder, study_work
 from odscen.app.studies.executors import LocalExecutor
 from odscen.app.studies.study_folder import TABLE_FILE, read_study
 from odscen.app.studies.study_plan import read_study_plan
@@ -24,6 +25,7 @@ from odscen.app.studies.study_runs import (
 from odscen.base.errors import ConflictError, InputError
 from odscen.base.folder_locks import locked
 from odscen.results.measures.registry import RUN_FIGURES
+from odscen.scenario.sampling.sampler import sample_scenario
 from odscen.sumo.realize.run_settings import RunSettings
 from tests.app.studies.study_case import WARM, MadeUp, place, plan_file
 
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.studies.study_runs import EndedStudy
+    from odscen.scenario.document.scenario_document import Scenario
 
 PLAN: dict[str, Any] = {"variant": [WARM], "seeds": 5}
 
@@ -61,6 +64,27 @@ def test_a_study_that_is_killed_and_resumed_has_the_table_of_another(
     ended = carry_out_study(other, MadeUp())
     assert ended.table["run"].n_unique() == 10
     assert (begun / TABLE_FILE).read_bytes() == (other / TABLE_FILE).read_bytes()
+
+
+def test_a_scenario_is_sampled_once_for_all_of_its_seeds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sample = {"maps": ["signal_crossing"], "count": 2, "fill": 0.05}
+    (tmp_path / "sampled.json").write_text(
+        json.dumps({"name": "sampled", "sample": [sample], "seeds": 2, "run": {"until": 5}}),
+        encoding="utf-8",
+    )
+    sampled: list[str] = []
+
+    def counted(*given: Any, name: str, **more: Any) -> Scenario:
+        sampled.append(name)
+        return sample_scenario(*given, name=name, **more)
+
+    monkeypatch.setattr(study_work, "sample_scenario", counted)
+    begin_study(place(), tmp_path / "sampled.json", tmp_path / "out")
+    ended = carry_out_study(tmp_path / "out", LocalExecutor(place(), 1))
+    assert ended.state.counts["completed"] == 4
+    assert sampled == ["signal_crossing-0000", "signal_crossing-0001"]
 
 
 def test_state_and_table_of_a_study_that_has_not_ended(begun: Path) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time
 import uuid
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -27,7 +28,7 @@ from odscen.app.studies.study_work import (
 from odscen.base.errors import ConflictError, InputError, MissingDependencyError, ToolError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Generator, Iterator, Mapping
 
     from distributed import Client, Future
 
@@ -51,6 +52,10 @@ _LOOK = 5.0
 """Wall seconds after which the threads of the workers are counted again."""
 _MAP_KEY = "odscen-map-"
 _CONNECT = "15s"
+_PAUSE = 1.0
+"""Wall seconds between two attempts to reach a scheduler that is not there."""
+_THERE = ("pending", "finished")
+"""States in which what has been sent to the scheduler is with it."""
 _LARGE_GRAPH = "1GiB"
 """A map goes with the task that gives it, which Dask warns of from 10 MB on."""
 
@@ -87,6 +92,7 @@ class DaskExecutor:
     _runs: int = 0
     _threads: int = 1
     _looked: float = 0.0
+    _lost: float = 0.0
 
     def outcomes(self, orders: Orders) -> Iterator[list[Outcome]]:
         """Outcomes of each order, when it has been carried out.
@@ -98,27 +104,55 @@ class DaskExecutor:
         ToolError
             If the scheduler cannot be reached, or not any more.
         """
-        with _client(self.scheduler) as client:
-            _refuse_workers(client)
-            ended: SimpleQueue[Future] = SimpleQueue()
-            running: dict[Future, WorkOrder] = {}
-            silent = time.monotonic()
-            while True:
-                while len(running) < self._room(client) and (order := self._next(orders)):
-                    future = self._submitted(client, order)
-                    running[future] = order
-                    future.add_done_callback(ended.put)
-                if not running:
+        lost: float | None = None
+        while True:
+            with self._connected(lost) as client:
+                if (yield from self._carried_out(client, orders)):
                     return
-                try:
-                    future = ended.get(timeout=_LISTEN)
-                except Empty:
-                    silent = self._heard(client, silent)
-                    continue
-                found = self._taken(future, running.pop(future))
-                if found:
-                    self._count(found)
-                    yield found
+            lost = self._lost
+
+    def _connected(self, lost: float | None) -> Client:
+        """A client; a scheduler that was lost may take :data:`PATIENCE` to be back."""
+        while True:
+            try:
+                return _client(self.scheduler)
+            except ToolError:
+                if lost is None:
+                    raise
+                if time.monotonic() - lost > PATIENCE:
+                    msg = (
+                        f"the Dask scheduler {self.scheduler} is gone; what has ended is kept: "
+                        "odscen study resume runs the rest"
+                    )
+                    raise ToolError(msg) from None
+                time.sleep(_PAUSE)
+
+    def _carried_out(self, client: Client, orders: Orders) -> Generator[list[Outcome], None, bool]:
+        """Give outcomes as long as the client lives; whether there are no more."""
+        _refuse_workers(client)
+        ended: SimpleQueue[Future] = SimpleQueue()
+        running: dict[Future, WorkOrder] = {}
+        while client.status != "closed":
+            while client.status == "running" and len(running) < self._room(client):
+                if (order := self._next(orders)) is None:
+                    if running:
+                        break
+                    return True
+                future = self._submitted(client, order)
+                running[future] = order
+                future.add_done_callback(ended.put)
+            if client.status == "running":
+                self._lost = time.monotonic()
+            try:
+                future = ended.get(timeout=_LISTEN)
+            except Empty:
+                continue
+            if found := self._taken(future, running.pop(future)):
+                self._count(found)
+                yield found
+        self._packs.clear()
+        self._again += running.values()
+        return False
 
     def _next(self, orders: Orders) -> WorkOrder | None:
         if self._again:
@@ -131,8 +165,9 @@ class DaskExecutor:
 
     def _room(self, client: Client) -> int:
         """Orders that may be with the scheduler at a time: each worker has its next one there."""
-        if time.monotonic() - self._looked > _LOOK and client.status == "running":
-            self._threads = max(sum(client.nthreads().values()), 1)
+        if time.monotonic() - self._looked > _LOOK:
+            with suppress(OSError):  # a scheduler that is lost just now
+                self._threads = max(sum(client.nthreads().values()), 1)
             self._looked = time.monotonic()
         return 2 * self._threads + 1
 
@@ -170,8 +205,9 @@ class DaskExecutor:
         return found
 
     def _sent_again(self, order: WorkOrder) -> list[Outcome]:
-        """Carry out an order again, with maps that are sent anew: those there were are lost."""
-        self._packs.clear()
+        """Carry out an order again, with maps that are sent anew where they are lost."""
+        kept = {name: one for name, one in self._packs.items() if one.status in _THERE}
+        self._packs = kept
         self._again.append(order)
         return []
 
@@ -191,19 +227,6 @@ class DaskExecutor:
     def _count(self, found: list[Outcome]) -> None:
         self._runs += len(found)
         self._spent += sum(float(one.row.get("seconds", 0.0)) for one in found)
-
-    def _heard(self, client: Client, since: float) -> float:
-        """When the scheduler was there last; raises when that is too long ago."""
-        now = time.monotonic()
-        if client.status == "running":
-            return now
-        if now - since > PATIENCE or client.status == "closed":
-            msg = (
-                f"the Dask scheduler {self.scheduler} is gone; what has ended is kept: "
-                "odscen study resume runs the rest"
-            )
-            raise ToolError(msg)
-        return since
 
 
 def _client(scheduler: str | None) -> Client:
@@ -229,7 +252,13 @@ def _client(scheduler: str | None) -> Client:
 
 def _refuse_workers(client: Client) -> None:
     """Refuse workers that are there with other versions; those that come later refuse orders."""
-    for address, found in client.run(versions, on_error="return").items():
+    try:
+        answers = client.run(versions, on_error="return")
+    except OSError:  # lost just now
+        return
+    for address, found in answers.items():
+        if isinstance(found, OSError):  # it has died
+            continue
         if isinstance(found, BaseException):
             msg = f"worker {address} does not have this odscen: {found}"
             raise ConflictError(msg)

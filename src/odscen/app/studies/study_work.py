@@ -7,6 +7,7 @@ It writes nothing that another worker reads, so an order can be lost or carried 
 from __future__ import annotations
 
 import io
+import json
 import os
 import platform
 import tarfile
@@ -219,11 +220,17 @@ def _entry(workspace: Workspace, source: ScenarioSource) -> MapEntry:
 def _document(source: ScenarioSource, loaded: LoadedMap) -> Scenario:
     if source.text is not None:
         return _read(source.text, source.name)
+    return _sampled(source.name, loaded, source.seed, json.dumps(source.config or {}))
+
+
+@lru_cache(maxsize=4)
+def _sampled(name: str, loaded: LoadedMap, seed: int, config: str) -> Scenario:
+    """Sample a scenario, once for all of its seeds and variants."""
     return sample_scenario(
         loaded.sumo.graph,
-        validated(SamplingConfig, source.config or {}),
-        seed=source.seed,
-        name=source.name,
+        validated(SamplingConfig, json.loads(config)),
+        seed=seed,
+        name=name,
         usable=loaded.usable,
     )
 

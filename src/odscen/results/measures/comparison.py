@@ -119,6 +119,6 @@ def _welch_margin(one: FloatArray, other: FloatArray) -> float:
 
 
 def _quantile(freedom: float) -> float:
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return float(t.ppf(0.5 + CONFIDENCE / 2, freedom))
+    return float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))
