@@ -122,6 +122,7 @@ def walking_conflicts(
         step, in one frame.
     """
     import polars as pl
+
     from odscen.base.near_points import cKDTree
 
     people, bodies = set(), {}

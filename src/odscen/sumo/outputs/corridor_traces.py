@@ -128,6 +128,7 @@ def _placed(
 ) -> pl.DataFrame:
     """Add ``along``; records on the same lanes beside the corridor are left out."""
     import polars as pl
+
     from odscen.base.near_points import cKDTree
 
     lanes, places = sumo_map.graph.lanes, sumo_map.lane_places
