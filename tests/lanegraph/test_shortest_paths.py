@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -103,6 +105,16 @@ def test_walkers_go_both_ways() -> None:
     back = walk_shortest_path(FORK, 70, 3)
     np.testing.assert_array_equal(forth, back[::-1])
     assert len(forth) == 68
+
+
+def test_the_distance_of_two_nodes_is_that_among_all_and_none_leads_outside_the_region() -> None:
+    mask = induced(FORK, ["r1", "j9"]).nodes
+    inside, outside = Router(FORK, mask), node_index(FORK, "2.0.-1.0")
+    for router in (inside, ROUTER):
+        among = router.distances(0).tolist()
+        assert [router.distance(0, node) for node in range(len(among))] == among
+    assert inside.distance(0, outside) == math.inf
+    assert ROUTER.distance(0, outside) < math.inf
 
 
 @settings(max_examples=30, deadline=None)

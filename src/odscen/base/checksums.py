@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import os
 import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ from odscen.base.errors import DamagedError, DamagedFile
 from odscen.base.to_disk import write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Iterator, Mapping
     from pathlib import Path
 
 SUMS_FILE = "SHA256SUMS"
@@ -30,6 +31,8 @@ _OWN = "its own checksum in its last line"
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _SEAL = '"sha256": "'
+_AT_ONCE = 1 << 18
+"""Bytes; where there are less no buffer is made for them, which would take longer."""
 
 
 def digest(content: bytes) -> str:
@@ -37,9 +40,13 @@ def digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def file_digest(path: Path) -> str:
+def file_digest(path: Path | str) -> str:
     """SHA-256 of a file of any size, hexadecimal."""
-    with path.open("rb") as file:
+    with open(path, "rb", buffering=0) as file:  # noqa: PTH123 - asked for each file of a run
+        first = file.read(_AT_ONCE)
+        if len(first) < _AT_ONCE:
+            return digest(first)
+        file.seek(0)
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
@@ -55,15 +62,22 @@ def sums_of(
     known
         What has been computed already; such files are not read.
     """
-    known = known or {}
-    names = sorted(
-        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()
-    )
+    known, top = known or {}, str(folder)
     return {
-        name: known.get(name) or file_digest(folder / name)
-        for name in names
+        name: known.get(name) or file_digest(f"{top}/{name}")
+        for name in sorted(_names_in(top, ""))
         if name != SUMS_FILE and name not in leave
     }
+
+
+def _names_in(folder: str, before: str) -> Iterator[str]:
+    """Yield names of files in a folder and below, folders with a slash before them."""
+    with os.scandir(folder) as found:
+        for entry in found:
+            if entry.is_dir(follow_symlinks=False):
+                yield from _names_in(entry.path, f"{before}{entry.name}/")
+            elif entry.is_file():
+                yield before + entry.name
 
 
 def write_sums(folder: Path, sums: Mapping[str, str]) -> None:

@@ -44,3 +44,26 @@ def function_when_used(module: str, name: str) -> None:
 
     setattr(stand_in, name, call)
     sys.modules[module] = stand_in
+
+
+def names_when_used(*names: str) -> None:
+    """Put modules where importers find them, to be loaded when a name of theirs is asked for.
+
+    As :func:`import_when_used`, for modules of a package that is not there yet: it need not be
+    imported to find them.
+    """
+    for name in names:
+        if name not in sys.modules:
+            sys.modules[name] = _stand_in(name)
+
+
+def _stand_in(module: str) -> ModuleType:
+    stand_in = ModuleType(module)
+
+    def asked(name: str) -> Any:
+        if sys.modules.get(module) is stand_in:
+            del sys.modules[module]
+        return getattr(importlib.import_module(module), name)
+
+    setattr(stand_in, "__getattr__", asked)  # noqa: B010 - a module has none of its own
+    return stand_in

@@ -8,6 +8,8 @@ put together by templates (:mod:`odscen.results.report.page_templates`) by the s
 from __future__ import annotations
 
 import itertools
+import re
+from functools import cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import markupsafe
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 _VOID = frozenset({"meta", "input", "br"})
 # What XML 1.0 cannot hold; carriage returns do not survive a parser.
 _FORBIDDEN = dict.fromkeys([*(c for c in range(32) if chr(c) not in "\t\n"), 0xFFFE, 0xFFFF])
+_UNUSUAL = re.compile("[^\\t\\n -~]|[&<>\"']")
+"""What may have to be left out or escaped."""
 
 
 class Markup(markupsafe.Markup):
@@ -53,10 +57,18 @@ def escaped(content: object) -> Markup:
 def _escaped(content: object) -> str:
     if isinstance(content, markupsafe.Markup):
         return content
-    text = str(content).translate(_FORBIDDEN)
+    text = str(content)
+    if not _UNUSUAL.search(text):  # nearly all that there is
+        return text
+    text = text.translate(_FORBIDDEN)
     if not text.isascii():
         text = text.encode("utf-8", "replace").decode("utf-8")  # lone surrogates cannot be written
     return markupsafe.escape(text)
+
+
+@cache
+def _attribute(key: str) -> str:
+    return key.rstrip("_").replace("_", "-")
 
 
 def element(name: str, /, *children: object, **attributes: Attribute) -> Markup:
@@ -76,8 +88,11 @@ def element(name: str, /, *children: object, **attributes: Attribute) -> Markup:
     for key, value in attributes.items():
         if value is None:
             continue
-        text = number(value) if isinstance(value, float) else str(value)
-        opened.append(f'{key.rstrip("_").replace("_", "-")}="{_escaped(text)}"')
+        if isinstance(value, float):
+            text = number(value)
+        else:
+            text = str(value) if isinstance(value, int) else _escaped(str(value))
+        opened.append(f'{_attribute(key)}="{text}"')
     head = " ".join(opened)
     if name in _VOID:
         return Markup(f"<{head}>")

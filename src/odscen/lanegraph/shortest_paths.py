@@ -6,6 +6,7 @@ functions below make one for a single query.
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -32,7 +33,7 @@ MIN_EDGE_LENGTH = 1e-6
 
 _KEPT = 2
 """Trees of shortest paths that are kept, at least."""
-_NODES_KEPT = 1 << 17
+_NODES_KEPT = 1 << 20
 """Nodes that they have together, where they are more: 12 bytes each."""
 _FEW = 64
 """Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
@@ -79,6 +80,11 @@ class _PathFinder:
         result[self.nodes] = self._from(source)[0]
         return result
 
+    def distance(self, source: int, target: int) -> float:
+        """Metres from one node to another one; inf if it cannot be reached."""
+        distances = self._from(source)[0]
+        return float(distances[self._local[target]]) if self.mask[target] else math.inf
+
     def reachable(self, source: int) -> BoolArray:
         """Nodes that can be reached from ``source`` in the region, itself included; ``(N,)``."""
         return np.isfinite(self.distances(source))
@@ -88,9 +94,10 @@ class _PathFinder:
         distances, predecessors = self._from(source)
         if not self.mask[target] or not np.isfinite(distances[self._local[target]]):
             return np.empty(0, dtype=np.int32)
-        steps = [int(self._local[target])]
-        while (before := int(predecessors[steps[-1]])) != NO_PREDECESSOR:
-            steps.append(before)
+        step, item = int(self._local[target]), predecessors.item
+        steps = [step]
+        while (step := item(step)) != NO_PREDECESSOR:
+            steps.append(step)
         return self.nodes[steps[::-1]].astype(np.int32)
 
     def paths_to(self, target: int) -> PathsTo:

@@ -148,12 +148,19 @@ class Workspace:
 
     def map_names(self) -> list[str]:
         """Names of all maps, sorted; some may be broken, see :meth:`catalogue`."""
-        return sorted(
-            folder.name
-            for folder in (self.root / "maps").iterdir()
-            if _NAME.fullmatch(folder.name)
-            and any((folder / name).is_file() for name in (INFO_FILE, XODR_FILE))
-        )
+        return sorted(name for name in self._map_folders() if self._is_map(name))
+
+    def _map_folders(self) -> list[str]:
+        return [folder.name for folder in (self.root / "maps").iterdir()]
+
+    def _is_map(self, name: str) -> bool:
+        folder = self.root / "maps" / name
+        files = (INFO_FILE, XODR_FILE)
+        return bool(_NAME.fullmatch(name)) and any((folder / one).is_file() for one in files)
+
+    def _has(self, name: str) -> bool:
+        """Whether there is such a map; asked for each run of many, and does not look at others."""
+        return name in self._map_folders() and self._is_map(name)
 
     def maps(self) -> list[MapEntry]:
         """All maps that can be used, sorted by name."""
@@ -179,9 +186,8 @@ class Workspace:
         DamagedError
             If it is broken.
         """
-        names = self.map_names()
-        if name not in names:
-            raise NotFoundError("map", name, names)
+        if not self._has(name):
+            raise NotFoundError("map", name, self.map_names())
         entry = read_entry(self.root / "maps" / name)
         if entry.info["builder"] != BUILDER:
             return self.add_map(entry.checked("xodr"), name=name, settings=entry.conversion)
@@ -198,7 +204,7 @@ class Workspace:
             If the map of that name has other content.
         """
         broken: OdscenError | None = None
-        if name in self.map_names():
+        if self._has(name):
             try:
                 entry = self.map(name)
             except DamagedError as error:
@@ -211,7 +217,7 @@ class Workspace:
                 return other
         if broken is not None:
             raise broken
-        if name not in self.map_names():
+        if not self._has(name):
             raise NotFoundError("map", name, self.map_names())
         msg = (
             f"map {name!r} in {self.root} has other content (sha256 {entry.sha256[:12]}...) "

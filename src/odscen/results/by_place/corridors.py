@@ -234,7 +234,7 @@ def _shortest(graph: MapGraph, first: str, last: str, mask: BoolArray | None) ->
 
 
 def _measured(graph: MapGraph, names: Sequence[str], path: Int32Array) -> Corridor:
-    from scipy.spatial import cKDTree
+    from odscen.base.near_points import cKDTree
 
     lanes = graph.lanes
     line = np.column_stack([lanes.x[path], lanes.y[path]])

@@ -122,7 +122,8 @@ def walking_conflicts(
         step, in one frame.
     """
     import polars as pl
-    from scipy.spatial import cKDTree
+
+    from odscen.base.near_points import cKDTree
 
     people, bodies = set(), {}
     for actor in actors:

@@ -6,7 +6,6 @@ from collections import Counter, defaultdict
 from typing import TYPE_CHECKING
 
 from odscen.base.shown import some_of
-from odscen.lanegraph.query import is_connected
 from odscen.scenario.checks.actor_checks import (
     AssetLookup,
     actor_problems,
@@ -102,14 +101,14 @@ def roi_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
         if count > 1:
             message = f"segment {name!r} is listed {count} times; once is enough"
             yield warning("segment_twice", "roi", message, segments=[name])
-    inside = Region.of(graph, scenario.roi).segments
-    if len(inside) > 1 and not is_connected(graph.segments, inside):
+    region = Region.of(graph, scenario.roi)
+    if not region.is_whole:
         yield error(
             "roi_not_connected",
             "roi",
             "the region of interest is in several pieces; add the segments between them or remove "
             "some",
-            segments=inside,
+            segments=region.segments,
         )
 
 

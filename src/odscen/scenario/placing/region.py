@@ -14,6 +14,7 @@ from odscen.base.errors import NotFoundError
 from odscen.base.ids import NodeId, SegmentId
 from odscen.lanegraph.query import (
     induced,
+    is_connected,
     is_walk_node_id,
     node_id,
     node_index,
@@ -43,12 +44,22 @@ _MOST = 200_000
 class _PathsInside:
     """What is known of the ways inside a set of segments, in whatever order they are named."""
 
-    def __init__(self, graph: MapGraph, lanes: BoolArray, walks: BoolArray) -> None:
-        self.graph, self.lanes, self.walks = graph, lanes, walks
+    def __init__(
+        self,
+        graph: MapGraph,
+        segments: frozenset[SegmentId],
+        lanes: BoolArray,
+        walks: BoolArray,
+    ) -> None:
+        self.graph, self.segments, self.lanes, self.walks = graph, segments, lanes, walks
         self.leads: dict[tuple[NodePlace, NodePlace], bool] = {}
         self.candidates: dict[tuple[NodePlace, NodePlace], bool] = {}
         self.places: dict[str, NodePlace | None] = {}
         self._over: tuple[BoolArray, Router] | None = None
+
+    @cached_property
+    def is_whole(self) -> bool:
+        return len(self.segments) < 2 or is_connected(self.graph.segments, sorted(self.segments))
 
     @cached_property
     def router(self) -> Router:
@@ -103,6 +114,11 @@ class Region:
     def router_over(self, mask: BoolArray) -> Router:
         """Paths inside the region over the nodes of a mask, shape ``(N,)``; the last is kept."""
         return self._ways.over(mask)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether its segments, if there are any, are in one piece."""
+        return self._ways.is_whole
 
     def place(self, node: str) -> NodePlace | None:
         """Where a node id leads on the map, inside the region or not; ``None`` if nowhere."""
@@ -190,7 +206,7 @@ def _region(graph: MapGraph, segments: tuple[str, ...]) -> Region:
 def _ways(graph: MapGraph, segments: frozenset[SegmentId]) -> _PathsInside:
     """One for all regions of a batch with these segments."""
     roi = induced(graph, sorted(segments))
-    return _PathsInside(graph, roi.nodes, roi.walk_nodes)
+    return _PathsInside(graph, segments, roi.nodes, roi.walk_nodes)
 
 
 def place_of(graph: MapGraph, node: str) -> NodePlace | None:

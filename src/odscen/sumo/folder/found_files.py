@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from odscen.results.by_place.traffic import TABLES
@@ -56,5 +57,18 @@ def found_files(folder: Path) -> dict[str, str]:
         "parity_figures": layout.PARITY_FIGURES_FILE,
         "log": layout.LOG_FILE,
     }
-    found = {key: name for key, name in names.items() if (folder / name).exists()}
+    top = str(folder)
+    there = {part: _listed(f"{top}/{part}") for part in ("", sumo, layout.FIGURES_FOLDER)}
+    found = {}
+    for key, name in names.items():
+        place, _, own = name.rpartition("/")
+        if own in there[place]:
+            found[key] = name
     return {**found, "summary": layout.SUMMARY_FILE}
+
+
+def _listed(folder: str) -> frozenset[str]:
+    try:
+        return frozenset(os.listdir(folder))  # noqa: PTH208 - names, and no paths
+    except OSError:
+        return frozenset()

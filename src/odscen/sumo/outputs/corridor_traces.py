@@ -128,7 +128,8 @@ def _placed(
 ) -> pl.DataFrame:
     """Add ``along``; records on the same lanes beside the corridor are left out."""
     import polars as pl
-    from scipy.spatial import cKDTree
+
+    from odscen.base.near_points import cKDTree
 
     lanes, places = sumo_map.graph.lanes, sumo_map.lane_places
     xy = np.column_stack([lanes.x, lanes.y])[nodes] + np.array(sumo_map.net_offset)

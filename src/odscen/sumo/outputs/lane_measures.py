@@ -33,6 +33,7 @@ than 2 % below.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 from odscen.sumo.realize.measure_files import EMISSIONS
@@ -73,25 +74,45 @@ def lane_table(
     """
     import polars as pl
 
-    col = pl.col
     by_lane = {lane: length for lanes in lengths.values() for lane, length in lanes.items()}
+    own = pl.LazyFrame(
+        {"lane": list(by_lane), "length": list(by_lane.values())},
+        schema={"lane": pl.String, "length": pl.Float64},
+    )
     # SUMO leads teleported vehicles over the first lane of an edge, be it a sidewalk.
-    rows = _named(lanes, lengths).filter(col("lane").is_in(list(by_lane)))
+    rows, entered = _named(lanes, lengths).join(own, on="lane"), ()
     if emissions is not None:
-        measured = _named(emissions, lengths).select(
-            "begin", "lane", *(_in_units(name) for name in EMISSIONS)
-        )
+        measured = _named(emissions, lengths).select("begin", "lane", *_emitted())
         rows = rows.join(measured, on=["begin", "lane"], how="left")
-    here = pl.DataFrame(
-        {"lane": list((present or {}).keys()), "present": list((present or {}).values())},
-        schema={"lane": pl.String, "present": pl.Int64},
-    ).with_columns(begin=pl.lit(rows["begin"].min(), dtype=pl.Float64))
+    if present:
+        here = pl.LazyFrame({"lane": list(present.keys()), "present": list(present.values())})
+        first = pl.col("begin") == pl.col("begin").min()
+        there = pl.when(first).then("present").otherwise(0).fill_null(0)
+        rows = rows.join(here, on="lane", how="left").with_columns(present=there)
+        entered = ((pl.col("entered") - pl.col("present")).clip(0),)
+    seconds, time_loss, waiting, kept = _measures(emissions=emissions is not None)
+    return (
+        rows.with_columns(seconds)
+        .with_columns(time_loss, waiting, *entered)
+        .select(kept)
+        .sort("begin", "lane")
+        .collect()
+    )
+
+
+@cache
+def _measures(*, emissions: bool) -> tuple[pl.Expr, pl.Expr, pl.Expr, tuple[pl.Expr, ...]]:
+    """Seconds; with them, time loss and waiting; then all columns. Made once for all runs."""
+    import polars as pl
+
+    col = pl.col
     sampled, moved = col("sampledSeconds"), col("speed") * col("sampledSeconds")
     # Where hardly a vehicle moved there is no travel time, and SUMO's density has an upper bound;
     # all were stopped for the whole interval then, a whole number of vehicles.
     at_least = col("density") * col("length") / 1000.0
     still = pl.when(col("entered") + col("left") + col("departed") + col("arrived") == 0)
-    standing = still.then((at_least - 1e-3).ceil()).otherwise(at_least) * _period()
+    standing = still.then((at_least - 1e-3).ceil()).otherwise(at_least)
+    standing *= col("end") - col("begin")
     fronts = (
         pl.when(col("traveltime").fill_null(_MOST_TRAVEL_TIME) >= _MOST_TRAVEL_TIME)
         .then(pl.min_horizontal(sampled, standing))
@@ -106,70 +127,58 @@ def lane_table(
         .then(sampled - col("seconds") - (moved - col("distance")) * (sampled - waited) / moved)
         .otherwise(sampled - col("seconds"))
     )
-    return (
-        rows.join(here, on=["begin", "lane"], how="left")
-        .with_columns(length=col("lane").replace_strict(by_lane, return_dtype=pl.Float64))
-        .with_columns(seconds=fronts.fill_null(0.0))
-        .with_columns(
-            time_loss=loss.otherwise(col("timeLoss")).fill_null(0.0).clip(0.0, col("seconds")),
-            waiting=(waited - rears.clip(0.0, waited)).fill_null(0.0).clip(0.0, col("seconds")),
-            entered=(col("entered") - col("present").fill_null(0)).clip(0),
-        )
-        .select(
-            "begin", "end", "edge", "lane", "seconds", "distance",
-            *(col(name).cast(pl.Int64) for name in _COUNTS), "waiting", "time_loss",
-            *((col(name.lower()).fill_null(0.0) for name in EMISSIONS) if emissions else ()),
-        )
-        .sort("begin", "lane")
-    )  # fmt: skip
+    seconds = fronts.fill_null(0.0).alias("seconds")
+    time_loss = loss.otherwise(col("timeLoss")).fill_null(0.0).clip(0.0, col("seconds"))
+    waiting = (waited - rears.clip(0.0, waited)).fill_null(0.0).clip(0.0, col("seconds"))
+    emitted = (col(name.lower()).fill_null(0.0) for name in EMISSIONS) if emissions else ()
+    kept = (
+        *map(col, ("begin", "end", "edge", "lane", "seconds", "distance")),
+        *(col(name).cast(pl.Int64) for name in _COUNTS),
+        *map(col, ("waiting", "time_loss")),
+        *emitted,
+    )
+    return seconds, time_loss.alias("time_loss"), waiting.alias("waiting"), kept
 
 
-def _named(file: Path, lengths: Mapping[str, Mapping[str, float]]) -> pl.DataFrame:
+def _named(file: Path, lengths: Mapping[str, Mapping[str, float]]) -> pl.LazyFrame:
     """Rows of a file of lane data; columns lose their prefix, times become numbers."""
     import polars as pl
 
     rows = pl.read_parquet(file)
     if "edge_id" not in rows.columns:  # no vehicle was there, and SUMO had no columns to write
         return _nothing()
+    renamed = {name: name.removeprefix("lane_").removeprefix("edge_") for name in rows.columns}
+    renamed |= {"edge_id": "edge", "lane_id": "lane"}
+    lazy = rows.lazy()
     if "lane_id" not in rows.columns:
-        rows = rows.with_columns(
+        lazy = lazy.with_columns(
             lane_id=pl.col("edge_id").replace_strict(
                 {edge: next(iter(own)) for edge, own in lengths.items()},
                 default=None,
                 return_dtype=pl.String,
             )
         )
-    names = {
-        name: name.removeprefix("lane_").removeprefix("edge_")
-        for name in rows.columns
-        if name not in ("edge_id", "lane_id")
-    }
-    return (
-        rows.filter(pl.col("lane_id").is_not_null())
-        .rename({**names, "edge_id": "edge", "lane_id": "lane"})
-        .with_columns(
-            begin=pl.col("interval_begin").cast(pl.Float64),
-            end=pl.col("interval_end").cast(pl.Float64),
-        )
+    return lazy.rename(renamed, strict=False).with_columns(
+        begin=pl.col("interval_begin").cast(pl.Float64),
+        end=pl.col("interval_end").cast(pl.Float64),
     )
 
 
-def _nothing() -> pl.DataFrame:
+def _nothing() -> pl.LazyFrame:
     import polars as pl
 
     from odscen.sumo.realize.measure_files import LANE_ATTRIBUTES
 
     numbers = ("begin", "end", *LANE_ATTRIBUTES, *(f"{name}_abs" for name in EMISSIONS))
     texts = ("edge", "lane")
-    return pl.DataFrame(
+    return pl.LazyFrame(
         schema={**dict.fromkeys(numbers, pl.Float64), **dict.fromkeys(texts, pl.String)}
     )
 
 
-def _period() -> pl.Expr:
-    import polars as pl
-
-    return pl.col("end") - pl.col("begin")
+@cache
+def _emitted() -> tuple[pl.Expr, ...]:
+    return tuple(map(_in_units, EMISSIONS))
 
 
 def _in_units(name: str) -> pl.Expr:

@@ -8,6 +8,7 @@ Either the stages of the network are timed anew, and yellow, clearing of crossin
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -116,6 +117,8 @@ def realized_lights(
         Seconds that the run lasts; the scenario's duration if not given.
     """
     signals = scenario.signals
+    if not signals.junctions:
+        return _mapped_lights(sumo_map, signals.control, buses=signals.bus_priority)
     timings = {timing.junction: timing for timing in signals.junctions}
     until = scenario.simulation.duration if until is None else until
     found = []
@@ -127,6 +130,19 @@ def realized_lights(
         one = _Realizing(light, view, timing, control, sumo_map, buses=asked)
         found.append(one.designed(scenario.demand.clock, until) if timing.stages else one.kept())
     return tuple(found)
+
+
+@lru_cache(maxsize=8)
+def _mapped_lights(
+    sumo_map: SumoMap, control: Control, *, buses: bool
+) -> tuple[RealizedLight, ...]:
+    """All lights as the map has them: the same for all scenarios that say no more of them."""
+    return tuple(
+        _Realizing(
+            light, view, JunctionTiming(junction=view.names[0]), control, sumo_map, buses=buses
+        ).kept()
+        for light, view in zip(sumo_map.lights, scenario_lights(sumo_map), strict=True)
+    )
 
 
 class _Realizing:

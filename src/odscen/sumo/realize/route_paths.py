@@ -231,12 +231,10 @@ def _from_spawn(
     if not goals or not router.mask[spawn]:
         return {}
     begun = {index: leads.of(spawn, bodies[index], router.mask) for index in goals}
-    ends = {lead.nodes[-1] for mine in begun.values() for lead in mine}
-    metres = {end: router.distances(end) for end in sorted(ends)}
     chosen = {
         index: _best(
             goals[index],
-            [(lead, lead.cost + float(metres[lead.nodes[-1]][goals[index]])) for lead in mine],
+            [(lead, lead.cost + router.distance(lead.nodes[-1], goals[index])) for lead in mine],
         )
         for index, mine in begun.items()
     }

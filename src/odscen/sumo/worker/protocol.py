@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, NamedTuple
 
 
@@ -242,7 +242,12 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 def encode(message: Message | Command | EgoPose | Outside | MoreRules) -> str:
     """One line, newline included."""
-    return json.dumps({"kind": _NAMES[type(message)], **asdict(message)}) + "\n"
+    return json.dumps({"kind": _NAMES[type(message)], **_fields(message)}, default=_fields) + "\n"
+
+
+def _fields(one: Any) -> dict[str, Any]:
+    """What ``asdict`` gives, one level; it would copy each text."""
+    return {field.name: getattr(one, field.name) for field in fields(one)}
 
 
 def decode(line: str | bytes) -> Message | Command | EgoPose | Outside | MoreRules | None:
