@@ -6,7 +6,6 @@ Names, units and types are in ``docs/learning-formats.md``;
 
 from __future__ import annotations
 
-import io
 import json
 from typing import TYPE_CHECKING, Any
 
@@ -36,8 +35,7 @@ def run_arrays(source: ExportSource) -> ExportFiles:
     InputError
         If there are no road users, or too much, in the run.
     """
-    import numpy as np
-
+    from odscen.base.given_arrays import npz_bytes
     from odscen.interchange.recordings.record import recording_of
 
     recording = recording_of(source)
@@ -48,9 +46,7 @@ def run_arrays(source: ExportSource) -> ExportFiles:
         **_tracks(recording),
         "agent_node": _first_nodes(recording, source.sumo_map.graph),
     }
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
-    return {f"{recording.name}.npz": buffer.getvalue()}
+    return {f"{recording.name}.npz": npz_bytes(arrays)}
 
 
 def _head(recording: RunRecording) -> Arrays:
