@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
 from odscen.interchange import (
+    arrays_export,
     commonroad_export,
     graphml_export,
     openscenario_export,
@@ -38,6 +39,7 @@ EXPORTERS = {
         sumo_export.EXPORTER,
         graphml_export.EXPORTER,
         openscenario_export.EXPORTER,
+        arrays_export.EXPORTER,
         pyg_export.EXPORTER,
         scenarionet_export.EXPORTER,
         waymo_export.EXPORTER,
@@ -68,7 +70,7 @@ def export(
         Folder for the files; made if need be.
     to
         Name of the format, one of :data:`EXPORTERS` that is not of runs only: ``sumo``,
-        ``graphml``, ``openscenario``.
+        ``graphml``, ``openscenario``, ``arrays`` and ``pyg``.
     options
         What the format lets one choose: of ``openscenario`` the ``version``.
     name

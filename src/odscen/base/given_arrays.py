@@ -94,7 +94,7 @@ def _read(stream: IO[bytes], size: int) -> Array:
         raise ValueError(msg)
     try:
         shape, by_columns, dtype = readers[version](stream)
-    except (SyntaxError, TypeError, RecursionError, MemoryError) as error:
+    except Exception as error:  # numpy reads it as Python, and passes on whatever that raises
         msg = "its header cannot be read"
         raise ValueError(msg) from error
     if dtype.kind not in _KINDS:

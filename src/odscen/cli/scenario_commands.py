@@ -273,7 +273,7 @@ def export(
 
     given = {"version": version, "begin": begin, "end": end}
     options = {name: value for name, value in given.items() if value is not None}
-    of_runs = EXPORTERS[to].files is None and scenario.is_dir()
+    of_runs = EXPORTERS[to].runs is not None and scenario.is_dir()
     write = export_run if as_run or of_runs else as_scenario
     files = write(Workspace.open(workspace), scenario, out, to=to, options=options)
     for file in files:

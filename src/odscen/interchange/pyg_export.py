@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from odscen.interchange.arrays_export import scenario_array_files
 from odscen.interchange.exporter import Exporter
 
 if TYPE_CHECKING:
@@ -159,7 +160,9 @@ def _first_nodes(recording: RunRecording, graph: MapGraph) -> np.ndarray[Any, np
 
 EXPORTER = Exporter(
     name="pyg",
-    label="arrays of a run for PyTorch Geometric (.npz)",
+    label="arrays of a run, or of a scenario, for PyTorch Geometric (.npz)",
+    files=scenario_array_files,
+    checked=False,
     runs=run_arrays,
     options=("begin", "end"),
     needs_roads=True,
