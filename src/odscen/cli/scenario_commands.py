@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,7 +21,10 @@ from odscen.cli.console import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from odscen.learning.fill_check import CheckedFill
+    from odscen.learning.generator_options import OptionValue
     from odscen.workspace.store import Workspace
 
 _MOST_REMARKS = 10
@@ -68,6 +72,13 @@ def generate(
             help='Another program that places them: "program {in}.npz {out}.npz".',
         ),
     ] = None,
+    generator_option: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="An option of the generator; the value as JSON or text. Repeatable.",
+        ),
+    ] = None,
     generator_timeout: Annotated[
         float, typer.Option(min=1, metavar="SECONDS", help="Time that it may take for a scenario.")
     ] = 600.0,
@@ -93,7 +104,11 @@ def generate(
     )
     door = None
     if generator is not None or generator_cmd is not None:
-        door = GeneratorDoor(generator, generator_cmd, generator_timeout)
+        given = _option_values(generator_option or ())
+        door = GeneratorDoor(generator, generator_cmd, generator_timeout, given)
+    elif generator_option:
+        msg = "--generator-option is of a generator: name one with --generator"
+        raise InputError(msg)
     fills: dict[str, CheckedFill] = {}
     with progress("generating") as step:
         paths = scenarios.generate(
@@ -116,6 +131,22 @@ def generate(
             _show_remarks(checked)
     if as_json:
         print_json({"scenarios": rows})
+
+
+def _option_values(settings: Iterable[str]) -> dict[str, OptionValue]:
+    """Read ``NAME=VALUE``: numbers and true or false as JSON, all else as text."""
+    found: dict[str, OptionValue] = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        if not (name and equals):
+            msg = f"--generator-option {setting!r}: write NAME=VALUE"
+            raise InputError(msg)
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = text
+        found[name.strip()] = value if isinstance(value, bool | int | float | str) else text
+    return found
 
 
 def _show_remarks(checked: CheckedFill) -> None:
