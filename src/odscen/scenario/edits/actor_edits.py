@@ -179,8 +179,8 @@ def fill_roi(
     scenario: Scenario,
     graph: MapGraph,
     usable: Usable,
-    place_by: NamedPlacer,
     *,
+    place_by: NamedPlacer | None = None,
     share: float,
     seed: int | None = None,
     generator: str | None = None,
@@ -193,7 +193,7 @@ def fill_roi(
     usable
         What the simulator that will run it can use of the map.
     place_by
-        The generators that are installed.
+        The generators that are installed; none if not given.
     share
         Of the largest number of actors that fits, 0 to 1.
     seed
@@ -211,10 +211,13 @@ def fill_roi(
         If there is no such generator, it has no such option, or it gives no traffic.
     """
     refuse_errors(roi_problems(scenario, graph))
-    if generator is None and options:
-        msg = "options are of a generator; name one"
-        raise ScenarioError(msg)
     seed = scenario.seed if seed is None else seed
+    place = None
+    if generator is not None and place_by is not None:
+        place = place_by(generator, options or {}, seed)
+    elif generator is not None or options:
+        msg = "there is no generator here to be named, or to have options"
+        raise ScenarioError(msg)
     crowd = sample_scenario(
         graph,
         overridden(SamplingConfig(), fill=share),
@@ -222,7 +225,7 @@ def fill_roi(
         name=scenario.name,
         usable=usable,
         roi=scenario.roi,
-        place=None if generator is None else place_by(generator, options or {}, seed),
+        place=place,
     ).actors
     nodes = {flow.spawn for flow in scenario.flows}
     ids = {flow.id for flow in scenario.flows}
