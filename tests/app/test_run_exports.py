@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import re
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -16,7 +17,7 @@ import polars as pl
 import pytest
 from lxml import etree
 
-from odscen.app.export import EXPORTERS, export, export_run
+from odscen.app.export import EXPORTERS, export, export_run, export_runs
 from odscen.app.runs import run_many
 from odscen.base.errors import InputError
 from odscen.interchange.exporter import WhatHappened
@@ -316,6 +317,20 @@ def test_a_window_that_cannot_be_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=words):
         export_run(workspace, run.folder, tmp_path, to="waymo", options=window)
+
+
+def test_of_a_folder_of_runs_each_is_written_into_a_folder_of_its_own(
+    workspace: Workspace, run: Run, exports: Path, tmp_path: Path
+) -> None:
+    runs = tmp_path / "runs"
+    for name in ("a", "b"):
+        shutil.copytree(run.folder, runs / name)
+    (runs / "notes").mkdir()
+    files = export_runs(workspace, runs, tmp_path / "out", to="pyg")
+    assert [one.relative_to(tmp_path / "out").as_posix() for one in files] == ["a/a.npz", "b/b.npz"]
+    one, alone = read_arrays(files[0]), read_arrays(_file(exports, "pyg/*.npz"))
+    assert np.array_equal(one["agent_state"], alone["agent_state"])
+    assert export_runs(workspace, run.folder, tmp_path / "one", to="pyg")[0].parent.name == "one"
 
 
 @pytest.mark.parametrize("to", [one for one in FORMATS if one != "pyg"])

@@ -64,7 +64,7 @@ def test_the_generator_that_ships_and_an_own_one_with_options_fill_the_region(
     ).to_be_visible()
     placed = fill(filling)
     assert len(placed) > 5
-    assert any(one["initial_speed"] for one in placed)  # chance has all at rest
+    assert any(one["initial_speed"] for one in placed)  # at random all start from rest
 
     choose(filling, "Placed by", "Generator spread")
     many = fill(filling)

@@ -11,7 +11,7 @@ import { useLoaded } from "../ui/useLoaded";
 
 const AT_RANDOM = "";
 
-/** Who places the road users of a fill: chance, or a generator that is installed, with its options. */
+/** Who places the road users of a fill: at random, or a generator that is installed, with its options. */
 export function GeneratorForm({
   filler,
   onChange,
@@ -27,7 +27,7 @@ export function GeneratorForm({
       <Select
         label="Placed by"
         data={[
-          { value: AT_RANDOM, label: "Chance" },
+          { value: AT_RANDOM, label: "Random" },
           ...offered.value.map(({ name }) => ({ value: name, label: `Generator ${name}` })),
         ]}
         value={filler?.generator ?? AT_RANDOM}

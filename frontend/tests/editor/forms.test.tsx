@@ -200,7 +200,7 @@ test("a generator is chosen with its options, and one that fails says why", asyn
   await user.click(screen.getByRole("button", { name: "Fill the region" }));
   const options = { apart: 30, moving: true };
   expect(onFill).toHaveBeenLastCalledWith(0.3, 1, { generator: "spread", options });
-  await choose(user, "Placed by", "Chance");
+  await choose(user, "Placed by", "Random");
   await user.click(screen.getByRole("button", { name: "Fill the region" }));
   expect(onFill).toHaveBeenLastCalledWith(0.3, 1, null);
 });

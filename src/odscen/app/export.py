@@ -164,6 +164,28 @@ def export_run(
     return _write(exporter.runs(source), out)
 
 
+def export_runs(
+    workspace: Workspace,
+    folder: Path,
+    out: Path,
+    *,
+    to: str,
+    options: Mapping[str, str] | None = None,
+) -> list[Path]:
+    """Write what happened in a run, or in all runs that have ended in a folder, each in its own.
+
+    Parameters and errors are those of :func:`export_run`; ``folder`` may be one of runs, such as
+    ``runs`` of a workspace, with other things among them.
+    """
+    from odscen.sumo.folder.layout import SUMMARY_FILE
+
+    inside = sorted(one.parent for one in folder.glob(f"*/{SUMMARY_FILE}"))
+    if (folder / SUMMARY_FILE).is_file() or not inside:
+        return export_run(workspace, folder, out, to=to, options=options)
+    written = (export_run(workspace, run, out / run.name, to=to, options=options) for run in inside)
+    return [file for files in written for file in files]
+
+
 def _roads(map_file: Path) -> OpenDrive:
     from odscen.opendrive.parse import parse
 

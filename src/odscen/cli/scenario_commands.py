@@ -31,7 +31,7 @@ _MOST_REMARKS = 10
 """Repairs of a fill that are printed."""
 
 ScenarioArgument = Annotated[
-    Path, typer.Argument(help="Scenario, as JSON or GraphML.", metavar="SCENARIO")
+    Path, typer.Argument(help="Scenario, as JSON, GraphML or arrays.", metavar="SCENARIO")
 ]
 
 
@@ -167,7 +167,8 @@ def _fill_row(checked: CheckedFill) -> dict[str, Any]:
 
 def check(
     scenarios: Annotated[
-        list[Path], typer.Argument(help="Scenarios, as JSON or GraphML.", metavar="SCENARIO...")
+        list[Path],
+        typer.Argument(help="Scenarios, as JSON, GraphML or arrays.", metavar="SCENARIO..."),
     ],
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
@@ -257,8 +258,8 @@ def export(
     scenario: Annotated[
         Path,
         typer.Argument(
-            help="Scenario, as JSON or GraphML; for formats of runs and with --as-run the folder "
-            "of a run.",
+            help="Scenario, as JSON, GraphML or arrays; for formats of runs and with --as-run the "
+            "folder of a run, or of several.",
             metavar="SCENARIO",
         ),
     ],
@@ -299,13 +300,13 @@ def export(
     What a format cannot say is listed in a file NAME.export.json beside it.
     """
     from odscen.app.export import export as as_scenario
-    from odscen.app.export import export_run
+    from odscen.app.export import export_runs
     from odscen.workspace.store import Workspace
 
     given = {"version": version, "begin": begin, "end": end}
     options = {name: value for name, value in given.items() if value is not None}
     of_runs = EXPORTERS[to].runs is not None and scenario.is_dir()
-    write = export_run if as_run or of_runs else as_scenario
+    write = export_runs if as_run or of_runs else as_scenario
     files = write(Workspace.open(workspace), scenario, out, to=to, options=options)
     for file in files:
         log(f"Wrote {file}")
