@@ -1,6 +1,7 @@
 """Read exports with independent readers: ``python -m tools.read_exports [FORMAT ...]``.
 
 Each reader has an environment of its own in ``build/interchange``, made once, with pinned versions.
+Scenarios of the runs go through a ``HeteroData`` and back, and must have the same bytes.
 Runs of three maps are exported in each format, read there, and compared with what the runs
 recorded: each track, each position, all lanes. ``--maps FOLDER`` takes all maps of a folder instead
 of three that ship. The table goes to ``build/interchange/results.json`` as well.
@@ -18,11 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from odscen.app.export import export_run
+from odscen.app.export import export, export_run
 from odscen.app.runs import run_many
-from odscen.app.scenarios import generate
+from odscen.app.scenarios import generate, read_scenario
+from odscen.scenario.document.json_form import dumps
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.folder.layout import SCENARIO_FILE
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
 
@@ -38,11 +41,13 @@ STEP = 0.1
 class Reader:
     """What is installed for a format, as lists of arguments of pip, and the end of its files.
 
-    ``{site}`` is the folder of the environment's packages.
+    ``{site}`` is the folder of the environment's packages; ``of`` names the reader that shares its
+    environment.
     """
 
     ending: str
     packages: tuple[tuple[str, ...], ...]
+    of: str | None = None
 
 
 READERS = {
@@ -69,12 +74,14 @@ READERS = {
             ("numpy==2.4.6", "torch-geometric==2.8.0"),
         ),
     ),
+    "arrays": Reader(".npz", (), of="pyg"),
     "scenarionet": Reader("", (("metadrive-simulator==0.4.3",),)),
 }  # fmt: skip
 
 
 def environment(name: str) -> Path:
     """Python of a reader's environment; it is made if it is not there."""
+    name = READERS[name].of or name
     folder = BUILD / name
     python, ready = folder / "bin" / "python", folder / "ready"
     wanted = json.dumps(READERS[name].packages)
@@ -106,16 +113,25 @@ def recorded_runs(maps: list[Path], *, seconds: float, fill: float) -> list[tupl
     return runs
 
 
-def read(name: str, workspace: Workspace, run: Run) -> dict[str, Any]:
-    """Export a run, read it, and compare; counts and the largest error."""
-    out = BUILD / "exports" / name / run.folder.name
-    files = export_run(workspace, run.folder, out, to=name)
-    ending = READERS[name].ending
-    file = next(one for one in files if one.name.endswith(ending)) if ending else out
+def come_back(workspace: Workspace, run: Run) -> dict[str, Any]:
+    """Scenario of a run as arrays, through a ``HeteroData``, and as a document again."""
+    file = run.folder / SCENARIO_FILE
+    (exported,) = export(workspace, file, BUILD / "exports" / "arrays", to="arrays")
+    back = exported.with_name(f"{run.folder.name}.back.npz")
+    counts = _told("arrays", exported, back)
+    same = dumps(read_scenario(back)).encode() == file.read_bytes()
+    expected = len(workspace.map_for(run.summary["map"], run.summary["map_sha256"]).graph().lanes.x)
+    return {
+        "format": "arrays", "run": run.folder.name, **counts, "same_bytes": same,
+        "expected_nodes": expected,
+    }  # fmt: skip
+
+
+def _told(name: str, file: Path, out: Path) -> dict[str, Any]:
+    """Let a reader read a file in its environment; what it says at the end."""
     script = ROOT / "tools" / "readers" / f"{name}_reader.py"
-    rows_file = out / "read.json"
     done = subprocess.run(
-        [environment(name), script, file, rows_file],
+        [environment(name), script, file, out],
         check=False,
         stdout=subprocess.PIPE,
         text=True,
@@ -124,7 +140,18 @@ def read(name: str, workspace: Workspace, run: Run) -> dict[str, Any]:
     if done.returncode:
         msg = f"{name} cannot read {file}"
         raise SystemExit(msg)
-    counts = json.loads(done.stdout.splitlines()[-1])
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def read(name: str, workspace: Workspace, run: Run) -> dict[str, Any]:
+    """Export a run, read it, and compare; counts and the largest error."""
+    out = BUILD / "exports" / name / run.folder.name
+    files = export_run(workspace, run.folder, out, to=name)
+    ending = READERS[name].ending
+    file = next(one for one in files if one.name.endswith(ending)) if ending else out
+    rows_file = out / "read.json"
+    counts = _told(name, file, rows_file)
     graph = workspace.map_for(run.summary["map"], run.summary["map_sha256"]).graph()
     counts["expected_lanes"] = len(graph.lanes.lanes.keys)
     rows = json.loads(rows_file.read_text())
@@ -183,6 +210,13 @@ def _named(name: str, rows: list[list[Any]], notes: dict[str, Any], begin: float
 
 def check(result: dict[str, Any]) -> list[str]:
     """What is wrong with a result."""
+    if result["format"] == "arrays":
+        nodes = result["node"] == result["expected_nodes"]
+        return [
+            words
+            for words, well in (("other bytes", result["same_bytes"]), ("other nodes", nodes))
+            if not well
+        ]
     never = ("missing_states", "extra_states", "states_missed_by_checker")
     wrong = [f"{one} {result[one]}" for one in never if result.get(one)]
     if result["read_tracks"] != result["recorded_tracks"]:
@@ -210,7 +244,8 @@ def main() -> int:
     results, failed = [], False
     for name in given.formats or READERS:
         for workspace, run in runs:
-            result = read(name, workspace, run)
+            back = name == "arrays"
+            result = come_back(workspace, run) if back else read(name, workspace, run)
             wrong = check(result)
             failed |= bool(wrong)
             print(f"{name} {result['run']}: {'; '.join(wrong) or 'ok'}", json.dumps(result))

@@ -20,6 +20,7 @@ from odscen.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from odscen.app.export import export
+    from odscen.app.learner_arrays import scenario_arrays, scenario_from_arrays
     from odscen.app.reports import renew_report
     from odscen.app.resumed_runs import resume
     from odscen.app.runs import run, run_many
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
         WorkspaceError,
     )
     from odscen.convert.model.conversion_settings import ConversionSettings
+    from odscen.learning.hetero_data import read_arrays
     from odscen.regression.compare import RunComparison, compare
     from odscen.results.judging.expectations import parse_expectation
     from odscen.scenario.document.problems import Problem
@@ -66,6 +68,9 @@ _HOMES = {
     "write_scenario": "odscen.app.scenarios",
     "check": "odscen.app.scenarios:check_scenario",
     "export": "odscen.app.export",
+    "scenario_arrays": "odscen.app.learner_arrays",
+    "scenario_from_arrays": "odscen.app.learner_arrays",
+    "read_arrays": "odscen.learning.hetero_data",
     "ConditionKind": "odscen.scenario.story.condition_kinds",
     "Reading": "odscen.scenario.story.condition_kinds",
     "ActionKind": "odscen.scenario.story.action_kinds",
@@ -127,11 +132,14 @@ __all__ = [
     "export",
     "generate",
     "parse_expectation",
+    "read_arrays",
     "read_scenario",
     "renew_report",
     "resume",
     "run",
     "run_many",
+    "scenario_arrays",
+    "scenario_from_arrays",
     "shipped_maps",
     "watch",
     "write_scenario",

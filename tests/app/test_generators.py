@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from odscen.app.generators import GeneratorDoor, Placer, open_generator
+from odscen.app.generators import GeneratorDoor, Placer, installed_generators, open_generator
 from odscen.app.maps import load_map
 from odscen.app.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import generate, read_scenario
@@ -20,10 +20,12 @@ from odscen.base.errors import InputError
 from odscen.learning.fill import Fill, FillRequest, fill_from_bytes
 from odscen.learning.fill_check import CheckedFill
 from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.document.scenario_document import Actor
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.scenario.sampling.sampler import sample_scenario
 from odscen.sumo.folder.recorded import trajectory_files
 from odscen.workspace.store import Workspace
+from tests import own_generator
 from tests.app.conftest import CROSSING
 
 PROGRAM = """
@@ -113,6 +115,54 @@ def test_the_same_seed_gives_the_same_bytes_by_any_door(
         again = generate(workspace, settings=SETTINGS, out=tmp_path / name / "2", generator=door)
         assert [one.read_bytes() for one in once] == [one.read_bytes() for one in again]
         assert once[0].read_bytes() != once[1].read_bytes()
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "site"
+    folder.mkdir()
+    own_generator.install(folder, monkeypatch)
+
+
+@pytest.mark.usefixtures("installed")
+def test_installed_generators_are_listed_with_their_options_and_what_fails() -> None:
+    reference, gone, spread = installed_generators()
+    assert (reference.name, reference.options, reference.error) == ("reference", (), "")
+    assert reference.summary
+    assert gone.name == "gone"
+    assert "it cannot be imported from my_traffic:Gone" in gone.error
+    assert spread.summary == "Places cars a number of nodes apart."
+    assert [(one.name, one.kind, one.usual) for one in spread.options] == [
+        ("apart", "integer", 12), ("category", "string", "car"), ("moving", "boolean", False),
+    ]  # fmt: skip
+
+
+@pytest.mark.usefixtures("installed")
+def test_options_reach_the_generator(workspace: Workspace, tmp_path: Path) -> None:
+    def actors(**options: bool | float | str) -> list[Actor]:
+        door = GeneratorDoor(name="spread", options=options)
+        (path, _) = generate(workspace, settings=SETTINGS, out=tmp_path / "out", generator=door)
+        return [*read_scenario(path).actors]
+
+    few, many = actors(apart=60, category="truck"), actors(apart=12, moving=True)
+    assert {one.category for one in few} == {"truck"}
+    assert len(many) > 2 * len(few)
+    assert all(one.initial_speed for one in many)
+
+
+@pytest.mark.usefixtures("installed")
+@pytest.mark.parametrize(
+    ("door", "said"),
+    [
+        (GeneratorDoor(name="spread", options={"apart": 1}), "spread: option 'apart' is 1, not w"),
+        (GeneratorDoor(name="reference", options={"a": 1}), "reference: it has no option 'a'"),
+        (GeneratorDoor(command="a {in} {out}", options={"a": 1}), "go into its command"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(door: GeneratorDoor, said: str) -> None:
+    with pytest.raises(InputError) as refused:
+        open_generator(door)
+    assert said in str(refused.value)
 
 
 def test_one_object_fills_all_scenarios(workspace: Workspace) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import re
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -16,7 +17,7 @@ import polars as pl
 import pytest
 from lxml import etree
 
-from odscen.app.export import EXPORTERS, export, export_run
+from odscen.app.export import EXPORTERS, export, export_run, export_runs
 from odscen.app.runs import run_many
 from odscen.base.errors import InputError
 from odscen.interchange.exporter import WhatHappened
@@ -87,8 +88,23 @@ def test_the_arrays_have_every_recorded_state(exports: Path, recorded: States) -
 
 def test_the_arrays_are_those_of_the_document(exports: Path) -> None:
     arrays = read_arrays(_file(exports, "pyg/*.npz"))
-    rows = re.findall(r"^\| `(\w+)` \| `([^`]+)` \| (\w+) \|", DOCUMENT.read_text(), re.MULTILINE)
-    named = {name: (shape, kind) for name, shape, kind in rows}
+    hold_against_document(arrays, "Arrays of a run")
+
+
+def test_the_arrays_of_a_scenario_are_those_of_the_document(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    (file,) = export(workspace, sampled, tmp_path, to="arrays")
+    hold_against_document(read_arrays(file), "Arrays of a scenario")
+
+
+def hold_against_document(arrays: dict[str, Any], heading: str) -> None:
+    """Names, types and dimensions of arrays are those of a section's tables."""
+    section = DOCUMENT.read_text().partition(f"## {heading}\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (`.+?`) \| `([^`]+)` \| (\w+) \|", section, re.MULTILINE)
+    named = {
+        name: (shape, kind) for names, shape, kind in rows for name in re.findall(r"`(\w+)`", names)
+    }
     assert named.keys() == arrays.keys()
     kinds = {"U": "text", "b": "bool", "f": "float64"}
     for name, (shape, kind) in named.items():
@@ -303,7 +319,21 @@ def test_a_window_that_cannot_be_is_refused(
         export_run(workspace, run.folder, tmp_path, to="waymo", options=window)
 
 
-@pytest.mark.parametrize("to", FORMATS)
+def test_of_a_folder_of_runs_each_is_written_into_a_folder_of_its_own(
+    workspace: Workspace, run: Run, exports: Path, tmp_path: Path
+) -> None:
+    runs = tmp_path / "runs"
+    for name in ("a", "b"):
+        shutil.copytree(run.folder, runs / name)
+    (runs / "notes").mkdir()
+    files = export_runs(workspace, runs, tmp_path / "out", to="pyg")
+    assert [one.relative_to(tmp_path / "out").as_posix() for one in files] == ["a/a.npz", "b/b.npz"]
+    one, alone = read_arrays(files[0]), read_arrays(_file(exports, "pyg/*.npz"))
+    assert np.array_equal(one["agent_state"], alone["agent_state"])
+    assert export_runs(workspace, run.folder, tmp_path / "one", to="pyg")[0].parent.name == "one"
+
+
+@pytest.mark.parametrize("to", [one for one in FORMATS if one != "pyg"])
 def test_a_scenario_that_has_not_run_is_refused(
     to: str, workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

@@ -101,7 +101,7 @@ def test_a_file_that_is_cut_off_is_refused(share: float) -> None:
 
 def test_objects_are_never_unpickled() -> None:
     data = npz(node=np.array([{"a": 1}, 2], dtype=object), category=GOOD["category"])
-    with pytest.raises(InputError, match="f: an array is malformed: Object arrays"):
+    with pytest.raises(InputError, match="f: array node: it is malformed: it has values of object"):
         fill_from_bytes(data, file="f")
 
 

@@ -6,16 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.learning.hetero_data import hetero_data, read_arrays
+from odscen.lanegraph.query import walk_node_ids
+from odscen.learning.hetero_data import arrays_of, hetero_data, read_arrays
+from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
+from odscen.scenario.forms.array_form import to_arrays
+from odscen.scenario.forms.array_reading import from_arrays
+from tests.graphs import SHA256, fork
 
 
 @pytest.mark.parametrize(
     ("about", "words"),
     [
-        (None, "no file of arrays"),
-        ("{", "no file of arrays"),
-        (json.dumps({"format": "odscen-arrays", "version": 99}), "99, not odscen-arrays 1"),
+        (None, r"it cannot be read as an \.npz file"),
+        ("{", "no arrays of a run or a scenario"),
+        (json.dumps({"format": "odscen-arrays", "version": 99}), "it is odscen-arrays 99; this"),
     ],
 )
 def test_other_files_are_refused_by_name(about: str | None, words: str, tmp_path: Path) -> None:
@@ -67,3 +73,50 @@ def _two_nodes() -> dict[str, np.ndarray]:
         "light_lane": np.zeros(0, dtype=np.int64),
         "time": np.array([0.0]),
     }
+
+
+def test_the_arrays_of_a_scenario_become_a_valid_graph_and_come_back_whole() -> None:
+    pytest.importorskip("torch_geometric")
+    arrays = to_arrays(_on_the_fork(), fork())
+    data = hetero_data(arrays)
+    assert data.validate(raise_on_error=True)
+    assert data["actor"].num_nodes == 2
+    assert data["actor", "starts_at", "node"].edge_index.tolist() == [[0], [1]]
+    assert data["actor", "starts_at", "walk"].edge_index.tolist() == [[1], [0]]
+    assert data["actor", "goes_to", "node"].num_edges == 1
+    assert data["actor"].x[0].tolist() == [1, *[0] * 6, 12.5, -1, 0, 0, 1]
+    back = arrays_of(data)
+    assert back.keys() == arrays.keys()
+    for name, values in arrays.items():
+        assert back[name].dtype == values.dtype, name
+        assert np.array_equal(back[name], values, equal_nan=values.dtype.kind == "f"), name
+    assert from_arrays(back) == _on_the_fork()
+
+
+def test_a_speed_changed_in_the_data_is_changed_in_the_scenario() -> None:
+    pytest.importorskip("torch_geometric")
+    data = hetero_data(to_arrays(_on_the_fork(), fork()))
+    data["actor"].actor_speed[0] = 3.0
+    assert from_arrays(arrays_of(data)).actors[0].speed == 3.0
+
+
+def test_data_of_a_run_does_not_go_back() -> None:
+    pytest.importorskip("torch_geometric")
+    with pytest.raises(InputError, match="only the data of a scenario"):
+        arrays_of(hetero_data(_two_nodes()))
+
+
+def _on_the_fork() -> Scenario:
+    graph = fork()
+    return Scenario(
+        name="one",
+        map=MapReference(name="toy", sha256=SHA256),
+        roi=("r1", "j9", "r2"),
+        actors=(
+            Actor(
+                id="car", category=Category.CAR, spawn="1.0.-1.1", goal="2.0.-1.3", speed=12.5,
+                ego=True,
+            ),
+            Actor(id="anna", category=Category.PEDESTRIAN, spawn=walk_node_ids(graph)[0]),
+        ),
+    )  # fmt: skip

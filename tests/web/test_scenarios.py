@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import inspect
 import threading
+from pathlib import Path
 from string import Formatter
 from typing import get_args
 
@@ -29,6 +30,7 @@ from odscen.web.application import create_app
 from odscen.web.wire.document_changes import changes_between
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
+from tests import own_generator
 from tests.web.conftest import CROSSING
 from tests.web.json_patch import patched
 
@@ -239,6 +241,62 @@ def test_what_an_edit_refuses_changes_nothing(
     assert answer.status_code in (404, 422), answer.text
     assert answer.json()["error"]["message"]
     assert client.get(f"/api/scenarios/{new}").json() == before
+
+
+def test_a_region_is_filled_by_an_installed_generator_and_its_options(
+    client: TestClient, sampled: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "site").mkdir()
+    own_generator.install(tmp_path / "site", monkeypatch)
+    offered = {one["name"]: one for one in client.get("/api/generators").json()}
+    assert [*offered] == ["reference", "gone", "spread"]
+    assert offered["spread"]["options"][0] == {
+        "name": "apart", "kind": "integer", "title": "Nodes between two cars", "meaning": "",
+        "usual": 12, "low": 4, "high": 400, "choices": [],
+    }  # fmt: skip
+    version, found = 1, {}
+    spread = ({"apart": 60, "category": "truck"}, {"apart": 12})
+    for generator, options in (("reference", {}), *(("spread", one) for one in spread)):
+        answer = post_edit(
+            client, sampled, version, "fill_roi", share=0.3, seed=4, generator=generator,
+            options=options,
+        )  # fmt: skip
+        assert answer.status_code == 200, answer.text
+        version = answer.json()["version"]
+        actors = answer.json()["document"]["actors"]
+        found[generator, options.get("apart")] = actors
+        assert [one for one in answer.json()["problems"] if one["severity"] == "error"] == []
+    assert len(found["reference", None]) > 5
+    assert {one["category"] for one in found["spread", 60]} == {"truck"}
+    assert len(found["spread", 12]) > 2 * len(found["spread", 60])
+
+
+@pytest.mark.parametrize(
+    ("generator", "options", "status", "said"),
+    [
+        ("os:system", {}, 404, "no generator named 'os:system'"),
+        ("odscen.learning.reference.reference_generator:ReferenceGenerator", {}, 404, "no gene"),
+        ("/tmp/mine.py:Mine", {}, 404, "no generator named"),
+        ("reference", {"size": 3}, 422, "reference: it has no option 'size'"),
+        (None, {"size": 3}, 422, "no generator here"),
+        ("reference", {"size": [3]}, 422, ""),
+    ],
+)
+def test_the_page_names_no_module_and_no_option_that_there_is_not(
+    client: TestClient,
+    sampled: str,
+    generator: str | None,
+    options: dict[str, object],
+    status: int,
+    said: str,
+) -> None:
+    before = client.get(f"/api/scenarios/{sampled}").json()
+    answer = post_edit(
+        client, sampled, 1, "fill_roi", share=0.3, generator=generator, options=options
+    )
+    assert answer.status_code == status, answer.text
+    assert said in answer.json()["error"]["message"]
+    assert client.get(f"/api/scenarios/{sampled}").json() == before
 
 
 def test_a_stale_version_is_refused_and_told_the_newest(client: TestClient, new: str) -> None:

@@ -1588,6 +1588,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/generators": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Generators
+         * @description Generators that are installed, for the edit ``fill_roi``: the one that ships is the first.
+         */
+        get: operations["list_generators_api_generators_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/scenarios/{name}/demand/day": {
         parameters: {
             query?: never;
@@ -3525,7 +3545,7 @@ export interface components {
         };
         /**
          * FillRoiEdit
-         * @description Put a random crowd into the region in the place of all actors (R47); flows stay.
+         * @description Put a crowd into the region in the place of all actors (R47); flows stay.
          */
         FillRoiEdit: {
             /**
@@ -3537,6 +3557,12 @@ export interface components {
             share: number;
             /** Seed */
             seed?: number | null;
+            /** Generator */
+            generator?: string | null;
+            /** Options */
+            options?: {
+                [key: string]: boolean | number | string;
+            } | null;
         };
         /**
          * FitRow
@@ -3673,6 +3699,45 @@ export interface components {
              * @default false
              */
             once: boolean;
+        };
+        /**
+         * GeneratorInfo
+         * @description A generator that can fill a region; ``error`` says why it cannot, and is empty if it can.
+         */
+        GeneratorInfo: {
+            /** Name */
+            name: string;
+            /** Summary */
+            summary: string;
+            /** Options */
+            options: components["schemas"]["GeneratorOptionInfo"][];
+            /** Error */
+            error: string;
+        };
+        /**
+         * GeneratorOptionInfo
+         * @description An option of a generator; ``usual`` ``null`` has to be given.
+         */
+        GeneratorOptionInfo: {
+            /** Name */
+            name: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "number" | "integer" | "boolean" | "string";
+            /** Title */
+            title: string;
+            /** Meaning */
+            meaning: string;
+            /** Usual */
+            usual: boolean | number | string | null;
+            /** Low */
+            low: number | null;
+            /** High */
+            high: number | null;
+            /** Choices */
+            choices: string[];
         };
         /**
          * GoOn
@@ -20740,6 +20805,116 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["TemplateInfo"][];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    list_generators_api_generators_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GeneratorInfo"][];
                 };
             };
             /** @description The request cannot be read. */

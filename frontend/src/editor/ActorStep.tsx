@@ -1,6 +1,7 @@
 import { Button, Collapse, Group, Stack, Text } from "@mantine/core";
 import { type ReactNode, useState } from "react";
 
+import type { Filler } from "../api/generators";
 import { type Actor, type Assets, CATEGORIES, type Edit, type Flow } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
@@ -40,7 +41,7 @@ interface Props {
   onRemove: () => void;
   onSelect: (ids: string[]) => void;
   onShowGoals: () => void;
-  onFill: (share: number, seed: number) => void;
+  onFill: (share: number, seed: number, filler: Filler | null) => void;
 }
 
 /** Choose a kind, place road users on the map, then set where they go and how. */

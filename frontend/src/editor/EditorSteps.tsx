@@ -1,6 +1,7 @@
 import { Button, Loader, Text } from "@mantine/core";
 import { memo, useMemo, useState } from "react";
 
+import type { Filler } from "../api/generators";
 import type { Assets, Edit } from "../api/types";
 import { inBounds, inCircle } from "../map/areas";
 import type { PackedDrawing } from "../map/drawing";
@@ -81,9 +82,9 @@ function AllSteps({ store, now, drawing, assets }: Props) {
       region.candidates.map((segment): Edit => ({ kind: "grow_roi", segment })),
       `Add ${count(region.candidates.length, "segment")}`,
     );
-  const fill = async (share: number, seed: number): Promise<void> => {
+  const fill = async (share: number, seed: number, filler: Filler | null): Promise<void> => {
     setFilling(true);
-    if (await changes.fill(share, seed).finally(() => setFilling(false))) now.select([]);
+    if (await changes.fill(share, seed, filler).finally(() => setFilling(false))) now.select([]);
   };
   return (
     <Steps
@@ -166,7 +167,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
                   onShowGoals={() => {
                     if (one) sights.goals(one, now.goals ?? []);
                   }}
-                  onFill={(share, seed) => void fill(share, seed)}
+                  onFill={(share, seed, filler) => void fill(share, seed, filler)}
                 />
                 {ones.length > 0 && (
                   <Button variant="default" onClick={() => openStep("traffic")}>

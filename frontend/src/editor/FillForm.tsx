@@ -1,10 +1,12 @@
 import { ActionIcon, Button, Group, NumberInput, Slider, Text, Tooltip } from "@mantine/core";
 import { useState } from "react";
 
+import type { Filler } from "../api/generators";
 import { IconDice } from "../ui/icons";
 import { count } from "../ui/words";
+import { GeneratorForm } from "./GeneratorForm";
 
-/** Random road users in the place of all that were placed; flows stay. */
+/** Road users, random ones or those of a generator, in the place of all that were placed; flows stay. */
 export function FillForm({
   actors,
   busy,
@@ -12,16 +14,18 @@ export function FillForm({
 }: {
   actors: number;
   busy: boolean;
-  onFill: (share: number, seed: number) => void;
+  onFill: (share: number, seed: number, filler: Filler | null) => void;
 }) {
   const [share, setShare] = useState(30);
   const [seed, setSeed] = useState(1);
+  const [filler, setFiller] = useState<Filler | null>(null);
   const replaced =
     actors === 1
       ? "the road user of the scenario; undo restores it"
       : `the ${count(actors, "road user")} of the scenario; undo restores them`;
   return (
     <div className="fold">
+      <GeneratorForm filler={filler} onChange={setFiller} />
       <div>
         <Text size="sm" fw={500}>
           Density: {share} % of the maximum
@@ -60,7 +64,7 @@ export function FillForm({
       <Text size="sm" c="dimmed">
         The same seed gives the same road users.{actors > 0 && ` They replace ${replaced}.`}
       </Text>
-      <Button variant="light" loading={busy} onClick={() => onFill(share / 100, seed)}>
+      <Button variant="light" loading={busy} onClick={() => onFill(share / 100, seed, filler)}>
         Fill the region
       </Button>
     </div>

@@ -1,3 +1,4 @@
+import type { Filler } from "../api/generators";
 import type { Actor, Category, Edit, Flow, ScenarioState } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { count } from "../ui/words";
@@ -21,8 +22,8 @@ export interface Changes {
   setGoal: (one: Actor | Flow, goal: string | null) => void;
   /** Adds segments to the region: those that hang together with it. */
   extendRegion: (rows: readonly number[]) => void;
-  /** Random road users in the place of all; whether they were placed. */
-  fill: (share: number, seed: number) => Promise<boolean>;
+  /** Random road users, or those of a generator, in the place of all; whether they were placed. */
+  fill: (share: number, seed: number, filler: Filler | null) => Promise<boolean>;
 }
 
 /** What can be done to road users and flows, as edits that the server is asked for. */
@@ -115,8 +116,8 @@ export function changesOf({
           `${count(left, "segment")} did not hang together with the rest and ${left === 1 ? "was" : "were"} left out.`,
         );
     },
-    fill: async (share, seed) => {
-      const done = await edit({ kind: "fill_roi", share, seed });
+    fill: async (share, seed, filler) => {
+      const done = await edit({ kind: "fill_roi", share, seed, ...filler });
       if (done)
         say(`${count(done.document.actors.length, "road user")} placed. Undo restores the previous ones.`);
       return done !== null;

@@ -3,6 +3,7 @@ import { screen, within } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
 import type { Background } from "../../src/api/demand";
+import { generators } from "../../src/api/generators";
 import { ActorForm, ManyForm } from "../../src/editor/ActorForm";
 import { BackgroundForm } from "../../src/editor/BackgroundForm";
 import { Duration } from "../../src/editor/Duration";
@@ -168,9 +169,40 @@ test("a random fill says whom it replaces and passes on density and seed", async
   expect(screen.queryByText(/replace/)).toBeNull();
   await fill(user, "Random seed", "7");
   await user.click(screen.getByRole("button", { name: "Fill the region" }));
-  expect(onFill).toHaveBeenCalledWith(0.3, 7);
+  expect(onFill).toHaveBeenCalledWith(0.3, 7, null);
   again(<FillForm actors={1} busy={false} onFill={onFill} />);
   expect(screen.getByText(/They replace the road user of the scenario; undo restores it\./)).toBeTruthy();
+});
+
+test("a generator is chosen with its options, and one that fails says why", async () => {
+  const option = { title: "", meaning: "", low: null, high: null, choices: [] };
+  vi.spyOn(generators, "all").mockResolvedValue([
+    { name: "gone", summary: "", options: [], error: "it cannot be imported" },
+    {
+      name: "spread",
+      summary: "Places cars apart.",
+      error: "",
+      options: [
+        { ...option, name: "apart", kind: "integer", title: "Apart", usual: 12 },
+        { ...option, name: "moving", kind: "boolean", title: "They move", usual: false },
+      ],
+    },
+  ]);
+  const onFill = vi.fn();
+  const { user } = show(<FillForm actors={0} busy={false} onFill={onFill} />);
+  await screen.findByText("Placed by");
+  await choose(user, "Placed by", "Generator gone");
+  expect(screen.getByRole("alert").textContent).toContain("it cannot be imported");
+  await choose(user, "Placed by", "Generator spread");
+  expect(screen.getByText("Places cars apart.")).toBeTruthy();
+  await fill(user, "Apart", "30");
+  await user.click(screen.getByRole("checkbox", { name: "They move" }));
+  await user.click(screen.getByRole("button", { name: "Fill the region" }));
+  const options = { apart: 30, moving: true };
+  expect(onFill).toHaveBeenLastCalledWith(0.3, 1, { generator: "spread", options });
+  await choose(user, "Placed by", "Random");
+  await user.click(screen.getByRole("button", { name: "Fill the region" }));
+  expect(onFill).toHaveBeenLastCalledWith(0.3, 1, null);
 });
 
 test("a new random seed is drawn with a button", async () => {

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
 from odscen.interchange import (
+    arrays_export,
     commonroad_export,
     graphml_export,
     openscenario_export,
@@ -38,6 +39,7 @@ EXPORTERS = {
         sumo_export.EXPORTER,
         graphml_export.EXPORTER,
         openscenario_export.EXPORTER,
+        arrays_export.EXPORTER,
         pyg_export.EXPORTER,
         scenarionet_export.EXPORTER,
         waymo_export.EXPORTER,
@@ -68,7 +70,7 @@ def export(
         Folder for the files; made if need be.
     to
         Name of the format, one of :data:`EXPORTERS` that is not of runs only: ``sumo``,
-        ``graphml``, ``openscenario``.
+        ``graphml``, ``openscenario``, ``arrays`` and ``pyg``.
     options
         What the format lets one choose: of ``openscenario`` the ``version``.
     name
@@ -160,6 +162,28 @@ def export_run(
     if exporter.needs_roads:
         source = replace(source, roads=_roads(source.map_file))
     return _write(exporter.runs(source), out)
+
+
+def export_runs(
+    workspace: Workspace,
+    folder: Path,
+    out: Path,
+    *,
+    to: str,
+    options: Mapping[str, str] | None = None,
+) -> list[Path]:
+    """Write what happened in a run, or in all runs that have ended in a folder, each in its own.
+
+    Parameters and errors are those of :func:`export_run`; ``folder`` may be one of runs, such as
+    ``runs`` of a workspace, with other things among them.
+    """
+    from odscen.sumo.folder.layout import SUMMARY_FILE
+
+    inside = sorted(one.parent for one in folder.glob(f"*/{SUMMARY_FILE}"))
+    if (folder / SUMMARY_FILE).is_file() or not inside:
+        return export_run(workspace, folder, out, to=to, options=options)
+    written = (export_run(workspace, run, out / run.name, to=to, options=options) for run in inside)
+    return [file for files in written for file in files]
 
 
 def _roads(map_file: Path) -> OpenDrive:

@@ -4,20 +4,31 @@ An installed package offers one in its ``pyproject.toml``::
 
     [project.entry-points."odscen.generators"]
     mine = "my_package.traffic:MyGenerator"
+
+The page chooses among these and the one that ships; it cannot name a module or a program.
 """
 
 from __future__ import annotations
 
+import inspect
 import shlex
 import subprocess
 import tempfile
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.base.errors import InputError, OdscenError
+from odscen.base.errors import InputError, NotFoundError, OdscenError
 from odscen.learning.fill import Fill, FillRequest, fill_from_arrays, fill_from_bytes, request_bytes
 from odscen.learning.fill_check import CheckedFill, checked_fill
+from odscen.learning.generator_options import (
+    GeneratorOption,
+    OptionValue,
+    option_values,
+    options_of,
+)
 from odscen.learning.named_objects import named_object
 from odscen.scenario.document.named_random import stream
 
@@ -26,11 +37,13 @@ if TYPE_CHECKING:
 
     import numpy as np
 
+    from odscen.app.maps import LoadedMap
     from odscen.base.categories import Body, Category
     from odscen.lanegraph.graphs import MapGraph
     from odscen.learning.fill import Generator
     from odscen.learning.traffic_snapshots import LightView
     from odscen.scenario.document.scenario_document import Actor
+    from odscen.scenario.edits.actor_edits import NamedPlacer
     from odscen.scenario.placing.region import Region
     from odscen.scenario.sampling.sampler import Crew
 
@@ -46,11 +59,24 @@ MOST_BYTES = 1_000_000_000
 
 
 class GeneratorDoor(NamedTuple):
-    """Where traffic comes from: a class or an entry point by name, or the line of a command."""
+    """Where traffic comes from: a class or an entry point by name, or the line of a command.
+
+    ``options`` are those of a class, see :mod:`odscen.learning.generator_options`.
+    """
 
     name: str | None = None
     command: str | None = None
     time_limit: float = TIME_LIMIT
+    options: Mapping[str, OptionValue] = MappingProxyType({})
+
+
+class OfferedGenerator(NamedTuple):
+    """A generator that is installed; ``error`` says why it cannot be used, or is empty."""
+
+    name: str
+    summary: str
+    options: tuple[GeneratorOption, ...] = ()
+    error: str = ""
 
 
 def open_generator(door: GeneratorDoor) -> Generator:
@@ -59,16 +85,20 @@ def open_generator(door: GeneratorDoor) -> Generator:
     Raises
     ------
     InputError
-        If there is none, or it cannot be imported or made.
+        If there is none, it cannot be imported or made, or an option is not possible.
     """
     if door.command is not None and door.name is not None:
         msg = "a generator is given by its name or as a command, not both"
         raise InputError(msg)
     if door.command is not None:
+        if door.options:
+            msg = "options are for classes; those of another program go into its command"
+            raise InputError(msg, element="generator")
         return _Command(_words(door.command), door.time_limit)
     found = _found(door.name or "")
+    values = _values(found, door)
     try:
-        made = found() if isinstance(found, type) else found
+        made = found(**values) if isinstance(found, type) else found
     except Exception as error:  # whatever code from outside may raise
         msg = f"it cannot be made: {error!r}"
         raise InputError(msg, element=door.name) from error
@@ -76,6 +106,55 @@ def open_generator(door: GeneratorDoor) -> Generator:
         msg = "it has no method `fill(graph, request, rng)`"
         raise InputError(msg, element=door.name)
     return _Guarded(made, door.name or "")
+
+
+def _values(found: Any, door: GeneratorDoor) -> dict[str, OptionValue]:
+    """Options that a class is made with; what is no class has none."""
+    try:
+        return option_values(options_of(found) if isinstance(found, type) else (), door.options)
+    except InputError as error:
+        error.element = door.name
+        raise
+
+
+def installed_generators() -> tuple[OfferedGenerator, ...]:
+    """The generator that ships and those of installed packages, by name, with their options."""
+    return tuple(_offered(name) for name in _installed())
+
+
+def placer_of(loaded: LoadedMap) -> NamedPlacer:
+    """Place actors on a map by an installed generator: its name, options, and a seed.
+
+    The function raises :class:`NotFoundError` for any other name, that of a module included.
+    """
+
+    def place_by(
+        name: str, options: Mapping[str, OptionValue], seed: int
+    ) -> Callable[[Region, Crew], tuple[Actor, ...]]:
+        from odscen.sumo.realize.signals_ahead import lights_at_start
+
+        known = _installed()
+        if name not in known:
+            what = "generator"
+            raise NotFoundError(what, name, known)
+        placer = Placer(open_generator(GeneratorDoor(name, options=options)))
+        lights = lights_at_start(loaded.sumo)
+        return placer.for_scenario(loaded.usable.bodies, seed, lights=lights)
+
+    return place_by
+
+
+def _installed() -> list[str]:
+    return [REFERENCE, *sorted({one.name for one in entry_points(group=GROUP)} - {REFERENCE})]
+
+
+def _offered(name: str) -> OfferedGenerator:
+    try:
+        found = _found(name)
+        summary = (inspect.getdoc(found) or "").partition("\n")[0]
+        return OfferedGenerator(name, summary, options_of(found))
+    except InputError as error:
+        return OfferedGenerator(name, "", error=error.problem)
 
 
 class Placer:

@@ -32,7 +32,7 @@ SUFFIX = SCENARIO_SUFFIX
 
 
 def read_scenario(path: Path) -> Scenario:
-    """Read a scenario, as JSON document or in its graph form.
+    """Read a scenario, as JSON document, in its graph form or as arrays.
 
     Parameters
     ----------
@@ -72,12 +72,14 @@ def write_scenario(scenario: Scenario, path: Path) -> Path:
     Raises
     ------
     InputError
-        If the file is of the graph form, which has its own way of writing.
+        If the file is of the graph form or of arrays, which have their own way of writing.
     WorkspaceError
         If it cannot be written.
     """
-    if path.suffix == ".graphml":
-        msg = "the graph form is written by: odscen export --to graphml; name a .json file"
+    forms = {".graphml": ("the graph form is", "graphml"), ".npz": ("arrays are", "arrays")}
+    if path.suffix in forms:
+        what, to = forms[path.suffix]
+        msg = f"{what} written by: odscen export --to {to}; name a .json file"
         raise InputError(msg, file=str(path))
     return write_text(path, dumps(scenario))
 
@@ -108,7 +110,7 @@ def scenario_name(scenario: Scenario | Path) -> str:
     if not isinstance(scenario, Path):
         return plain_name(scenario.name) or "scenario"
     name = scenario.name
-    for ending in (SUFFIX, ".json", ".graphml"):
+    for ending in (SUFFIX, ".json", ".graphml", ".npz"):
         if name.endswith(ending):
             return name.removesuffix(ending)
     return name

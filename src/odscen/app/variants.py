@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic_core import from_json
 
+from odscen.app.generators import placer_of
 from odscen.app.maps import map_of
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import InputError, ScenarioError, in_file
@@ -36,7 +37,12 @@ def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenari
         If a rule forbids it.
     """
     function = EDIT_ENTRIES[edit.kind].function
-    known = {"graph": loaded.sumo.graph, "lights": loaded.lights, "usable": loaded.usable}
+    known: dict[str, Any] = {
+        "graph": loaded.sumo.graph,
+        "lights": loaded.lights,
+        "usable": loaded.usable,
+        "place_by": placer_of(loaded),
+    }
     ours = {name: known[name] for name in inspect.signature(function).parameters if name in known}
     return function(scenario, **ours, **edit.arguments)
 

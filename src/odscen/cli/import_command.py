@@ -1,14 +1,15 @@
-"""``odscen import``: a scenario from an OpenSCENARIO file."""
+"""``odscen import``: a scenario from an OpenSCENARIO file, or from arrays."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from odscen.base.errors import NoMapError
+from odscen.base.errors import InputError, NoMapError
 from odscen.cli.console import (
     JsonOption,
     WorkspaceOption,
@@ -21,6 +22,8 @@ from odscen.cli.console import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from odscen.workspace.store import Workspace
+
 
 class EgoChoice(StrEnum):
     """What drives the ego."""
@@ -30,7 +33,13 @@ class EgoChoice(StrEnum):
 
 
 def import_(
-    file: Annotated[Path, typer.Argument(help="OpenSCENARIO file.", metavar="FILE.xosc")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="OpenSCENARIO file, or arrays as odscen export --to arrays writes them.",
+            metavar="FILE.xosc|FILE.npz",
+        ),
+    ],
     out: Annotated[Path, typer.Option(help="Scenario to write.")],
     maps: Annotated[
         Path | None, typer.Option(help="Folder of maps, beside that of the file.")
@@ -47,11 +56,21 @@ def import_(
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Read an OpenSCENARIO file as a scenario, and report on each of its elements."""
+    """Read a file as a scenario, and report on what it has.
+
+    Of an OpenSCENARIO file each element is taken, approximated, ignored or refused. Arrays give the
+    scenario that they were written of, with what was changed in them; its problems are listed.
+    """
     from odscen.app.scenario_imports import import_scenario
     from odscen.workspace.store import Workspace
 
     store = Workspace.open(workspace)
+    if file.suffix == ".npz":
+        if maps is not None or on_map is not None:
+            msg = "--maps and --map are for OpenSCENARIO; arrays name a map of the workspace"
+            raise InputError(msg, file=str(file))
+        _import_arrays(store, file, out, as_json=as_json)
+        return
     try:
         found = import_scenario(store, file, out=out, maps=maps, on_map=on_map, ego=ego.value)
     except NoMapError as error:
@@ -68,6 +87,19 @@ def import_(
     log(f"Wrote {out}")
     if found.plan_file is not None:
         log(f"Wrote {found.plan_file}: odscen sweep {out} --plan {found.plan_file}")
+
+
+def _import_arrays(workspace: Workspace, file: Path, out: Path, *, as_json: bool) -> None:
+    from odscen.app.scenarios import check_scenario, read_scenario, write_scenario
+
+    scenario = read_scenario(file)
+    problems = check_scenario(workspace, scenario)
+    write_scenario(scenario, out)
+    for one in problems:
+        log(f"{one.severity}: {one.where}: {one.message}")
+    log(f"Wrote {out}")
+    if as_json:
+        print_json({"file": str(out), "problems": [asdict(one) for one in problems]})
 
 
 def _print_lists(lists: Mapping[str, Sequence[Any]]) -> None:

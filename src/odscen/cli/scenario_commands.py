@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,14 +21,17 @@ from odscen.cli.console import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from odscen.learning.fill_check import CheckedFill
+    from odscen.learning.generator_options import OptionValue
     from odscen.workspace.store import Workspace
 
 _MOST_REMARKS = 10
 """Repairs of a fill that are printed."""
 
 ScenarioArgument = Annotated[
-    Path, typer.Argument(help="Scenario, as JSON or GraphML.", metavar="SCENARIO")
+    Path, typer.Argument(help="Scenario, as JSON, GraphML or arrays.", metavar="SCENARIO")
 ]
 
 
@@ -68,6 +72,13 @@ def generate(
             help='Another program that places them: "program {in}.npz {out}.npz".',
         ),
     ] = None,
+    generator_option: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="An option of the generator; the value as JSON or text. Repeatable.",
+        ),
+    ] = None,
     generator_timeout: Annotated[
         float, typer.Option(min=1, metavar="SECONDS", help="Time that it may take for a scenario.")
     ] = 600.0,
@@ -93,7 +104,11 @@ def generate(
     )
     door = None
     if generator is not None or generator_cmd is not None:
-        door = GeneratorDoor(generator, generator_cmd, generator_timeout)
+        given = _option_values(generator_option or ())
+        door = GeneratorDoor(generator, generator_cmd, generator_timeout, given)
+    elif generator_option:
+        msg = "--generator-option is of a generator: name one with --generator"
+        raise InputError(msg)
     fills: dict[str, CheckedFill] = {}
     with progress("generating") as step:
         paths = scenarios.generate(
@@ -118,6 +133,22 @@ def generate(
         print_json({"scenarios": rows})
 
 
+def _option_values(settings: Iterable[str]) -> dict[str, OptionValue]:
+    """Read ``NAME=VALUE``: numbers and true or false as JSON, all else as text."""
+    found: dict[str, OptionValue] = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        if not (name and equals):
+            msg = f"--generator-option {setting!r}: write NAME=VALUE"
+            raise InputError(msg)
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = text
+        found[name.strip()] = value if isinstance(value, bool | int | float | str) else text
+    return found
+
+
 def _show_remarks(checked: CheckedFill) -> None:
     """Say what was repaired of a fill."""
     for row, what, column, why in checked.remarks[:_MOST_REMARKS]:
@@ -136,7 +167,8 @@ def _fill_row(checked: CheckedFill) -> dict[str, Any]:
 
 def check(
     scenarios: Annotated[
-        list[Path], typer.Argument(help="Scenarios, as JSON or GraphML.", metavar="SCENARIO...")
+        list[Path],
+        typer.Argument(help="Scenarios, as JSON, GraphML or arrays.", metavar="SCENARIO..."),
     ],
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
@@ -226,8 +258,8 @@ def export(
     scenario: Annotated[
         Path,
         typer.Argument(
-            help="Scenario, as JSON or GraphML; for formats of runs and with --as-run the folder "
-            "of a run.",
+            help="Scenario, as JSON, GraphML or arrays; for formats of runs and with --as-run the "
+            "folder of a run, or of several.",
             metavar="SCENARIO",
         ),
     ],
@@ -268,13 +300,13 @@ def export(
     What a format cannot say is listed in a file NAME.export.json beside it.
     """
     from odscen.app.export import export as as_scenario
-    from odscen.app.export import export_run
+    from odscen.app.export import export_runs
     from odscen.workspace.store import Workspace
 
     given = {"version": version, "begin": begin, "end": end}
     options = {name: value for name, value in given.items() if value is not None}
-    of_runs = EXPORTERS[to].files is None and scenario.is_dir()
-    write = export_run if as_run or of_runs else as_scenario
+    of_runs = EXPORTERS[to].runs is not None and scenario.is_dir()
+    write = export_runs if as_run or of_runs else as_scenario
     files = write(Workspace.open(workspace), scenario, out, to=to, options=options)
     for file in files:
         log(f"Wrote {file}")

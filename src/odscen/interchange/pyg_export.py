@@ -6,10 +6,10 @@ Names, units and types are in ``docs/learning-formats.md``;
 
 from __future__ import annotations
 
-import io
 import json
 from typing import TYPE_CHECKING, Any
 
+from odscen.interchange.arrays_export import scenario_array_files
 from odscen.interchange.exporter import Exporter
 
 if TYPE_CHECKING:
@@ -36,8 +36,7 @@ def run_arrays(source: ExportSource) -> ExportFiles:
     InputError
         If there are no road users, or too much, in the run.
     """
-    import numpy as np
-
+    from odscen.base.given_arrays import npz_bytes
     from odscen.interchange.recordings.record import recording_of
 
     recording = recording_of(source)
@@ -48,9 +47,7 @@ def run_arrays(source: ExportSource) -> ExportFiles:
         **_tracks(recording),
         "agent_node": _first_nodes(recording, source.sumo_map.graph),
     }
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
-    return {f"{recording.name}.npz": buffer.getvalue()}
+    return {f"{recording.name}.npz": npz_bytes(arrays)}
 
 
 def _head(recording: RunRecording) -> Arrays:
@@ -163,7 +160,9 @@ def _first_nodes(recording: RunRecording, graph: MapGraph) -> np.ndarray[Any, np
 
 EXPORTER = Exporter(
     name="pyg",
-    label="arrays of a run for PyTorch Geometric (.npz)",
+    label="arrays of a run, or of a scenario, for PyTorch Geometric (.npz)",
+    files=scenario_array_files,
+    checked=False,
     runs=run_arrays,
     options=("begin", "end"),
     needs_roads=True,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.base.errors import GraphFormatError
+from odscen.base.given_arrays import npz_bytes
 from odscen.base.ids import JunctionId, LaneKey, RoadId, SegmentId
 from odscen.lanegraph.columns import (
     EDGE_COLUMNS,
@@ -53,9 +54,7 @@ def graph_arrays(graph: MapGraph) -> dict[str, Array]:
 
 def to_npz_bytes(graph: MapGraph) -> bytes:
     """Write the graph as an .npz file; the same graph gives the same bytes."""
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **graph_arrays(graph))
-    return buffer.getvalue()
+    return npz_bytes(graph_arrays(graph))
 
 
 def from_npz_bytes(data: bytes, *, file: str | None = None) -> MapGraph:
@@ -67,27 +66,42 @@ def from_npz_bytes(data: bytes, *, file: str | None = None) -> MapGraph:
         If the bytes are not such a file, or one of another version.
     """
     try:
-        return check_map_graph(_read(data))
-    except GraphFormatError as error:
-        error.file = error.file or file
-        raise
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                problem = "it is a single array, not a map graph"
+                raise GraphFormatError(problem, file=file)
+            arrays = {name: archive[name] for name in archive.files}
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, MemoryError) as err:
         problem = "it cannot be read as an .npz file"
         raise GraphFormatError(problem, file=file) from err
+    except (ValueError, TypeError, SyntaxError, NotImplementedError) as err:
+        msg = f"an array is malformed: {err}"
+        raise GraphFormatError(msg, file=file) from err
+    return graph_from_arrays(arrays, file=file)
+
+
+def graph_from_arrays(arrays: Mapping[str, Array], *, file: str | None = None) -> MapGraph:
+    """Inverse of :func:`graph_arrays`; other arrays may be among them.
+
+    Raises
+    ------
+    GraphFormatError
+        If they are not those of a map graph, or of one of another version.
+    """
+    try:
+        return check_map_graph(_graph(arrays))
+    except GraphFormatError as error:
+        error.file = error.file or file
+        raise
     except KeyError as err:
         problem = f"an array is missing: {err.args[0]}"
         raise GraphFormatError(problem, file=file) from err
-    except (ValueError, TypeError, IndexError, SyntaxError, NotImplementedError) as err:
+    except (ValueError, TypeError, IndexError) as err:
         msg = f"an array is malformed: {err}"
         raise GraphFormatError(msg, file=file) from err
 
 
-def _read(data: bytes) -> MapGraph:
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        if not isinstance(archive, np.lib.npyio.NpzFile):
-            problem = "it is a single array, not a map graph"
-            raise GraphFormatError(problem)
-        arrays = {name: archive[name] for name in archive.files}
+def _graph(arrays: Mapping[str, Array]) -> MapGraph:
     if _texts(arrays, "format") != (FORMAT,):
         problem = "it is not an odscen map graph"
         raise GraphFormatError(problem)

@@ -6,9 +6,6 @@ simulator; what it gives back is checked by :mod:`odscen.learning.fill_check`.
 
 from __future__ import annotations
 
-import io
-import zipfile
-import zlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -16,6 +13,7 @@ import numpy as np
 
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
+from odscen.base.given_arrays import arrays_from_npz, npz_bytes
 from odscen.lanegraph.graph_npz import graph_arrays
 from odscen.learning.traffic_snapshots import no_lights
 
@@ -151,9 +149,7 @@ class Generator(Protocol):
 
 def request_bytes(request: FillRequest) -> bytes:
     """Write a request as an .npz file, without pickles; the same request gives the same bytes."""
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **request.arrays())
-    return buffer.getvalue()
+    return npz_bytes(request.arrays())
 
 
 def fill_from_bytes(data: bytes, *, file: str) -> Fill:
@@ -164,22 +160,7 @@ def fill_from_bytes(data: bytes, *, file: str) -> Fill:
     InputError
         If it is no such file, or an array is missing or malformed.
     """
-    if data.startswith(np.lib.format.MAGIC_PREFIX):
-        msg = "it is a single array, not an .npz file with `node` and `category`"
-        raise InputError(msg, file=file)
-    if not data.startswith(b"PK"):  # numpy would take anything else for pickles
-        msg = "it cannot be read as an .npz file"
-        raise InputError(msg, file=file)
-    try:
-        archive = np.load(io.BytesIO(data), allow_pickle=False)
-        wanted = ("node", "category", *OPTIONAL)
-        arrays = {name: archive[name] for name in wanted if name in archive.files}
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, MemoryError) as err:
-        msg = "it cannot be read as an .npz file"
-        raise InputError(msg, file=file) from err
-    except (ValueError, TypeError, SyntaxError, NotImplementedError) as err:
-        msg = f"an array is malformed: {err}"
-        raise InputError(msg, file=file) from err
+    arrays = arrays_from_npz(data, file=file, only=("node", "category", *OPTIONAL))
     return fill_from_arrays(arrays, file=file)
 
 

@@ -1,4 +1,4 @@
-"""Arrays of a run as a ``HeteroData`` of PyTorch Geometric.
+"""Arrays of runs and scenarios as a ``HeteroData`` of PyTorch Geometric, and back.
 
 ``pip install 'odscen[torch]'`` has PyTorch and PyTorch Geometric; ``pip install torch --index-url
 https://download.pytorch.org/whl/cpu`` before it takes the build without CUDA, a tenth of the size.
@@ -7,46 +7,67 @@ https://download.pytorch.org/whl/cpu`` before it takes the build without CUDA, a
 from __future__ import annotations
 
 import json
-import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.base.errors import InputError
+from odscen.base.given_arrays import MOST_UNPACKED, arrays_from_npz
+from odscen.base.given_files import read_given
 from odscen.lanegraph.graphs import Relation, WalkKind
+from odscen.learning.scenario_hetero_data import scenario_arrays_of, scenario_hetero_data
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from odscen.base.arrays import FloatArray
+    from odscen.base.given_arrays import Array
 
-    Array = np.ndarray[Any, np.dtype[Any]]
-
-FORMAT = "odscen-arrays"
-VERSION = 1
+_KNOWN = {"odscen-arrays": 1, "odscen-scenario-arrays": 1}
+"""Formats of arrays, of a run and of a scenario, and their versions."""
 
 
-def read_arrays(file: Path) -> dict[str, Array]:
-    """Arrays of an .npz file that ``odscen export --to pyg`` wrote.
+def read_arrays(path: Path) -> dict[str, Array]:
+    """Read the arrays of a run or of a scenario, as ``odscen export`` wrote them.
+
+    Nothing in the file is run; each array has the size that its header says.
+
+    Parameters
+    ----------
+    path
+        An .npz file of ``--to pyg`` or ``--to arrays``.
+
+    Returns
+    -------
+    dict of str to numpy.ndarray
+        All arrays by name, see docs/learning-formats.md.
 
     Raises
     ------
     InputError
-        If it is no such file, or one of another version.
+        If the file cannot be read, is no such file or one of another version, or has a malformed
+        array; names it.
     """
-    try:
-        with np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        about = json.loads(str(arrays["about"]))
-        known = (about["format"], about["version"]) == (FORMAT, VERSION)
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
-        msg = "it is no file of arrays of a run"
-        raise InputError(msg, file=str(file)) from error
-    if not known:
-        msg = f"it is {about['format']} {about['version']}, not {FORMAT} {VERSION}"
-        raise InputError(msg, file=str(file))
+    arrays = arrays_from_npz(read_given(path, most=MOST_UNPACKED), file=str(path))
+    known = _format(arrays)
+    if known is None:
+        msg = "these are no arrays of a run or a scenario"
+        raise InputError(msg, file=str(path))
+    if _KNOWN.get(known[0]) != known[1]:
+        offered = " and ".join(f"{name} {version}" for name, version in _KNOWN.items())
+        msg = f"it is {known[0]} {known[1]}; this odscen reads {offered}"
+        raise InputError(msg, file=str(path))
     return arrays
+
+
+def _format(arrays: Mapping[str, Array]) -> tuple[str, int] | None:
+    """Format and version that arrays say they are of."""
+    try:
+        about = json.loads(str(arrays["about"]))
+        return str(about["format"]), int(about["version"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
 
 
 def hetero_data(arrays: Mapping[str, Array]) -> Any:
@@ -55,23 +76,47 @@ def hetero_data(arrays: Mapping[str, Array]) -> Any:
     Parameters
     ----------
     arrays
-        Of a run, see ``docs/learning-formats.md``.
+        Of a run or of a scenario, see ``docs/learning-formats.md``.
 
     Returns
     -------
     HeteroData
-        Node types ``node`` and ``walk`` (the graphs of the map), ``lane``, ``agent``, ``light``;
-        edge types ``(node, successor | left | right, node)``, ``(walk, sidewalk | roadside |
-        crosswalk | joint, walk)`` both ways, ``(node, on, lane)``, ``(lane, successor, lane)``,
-        ``(light, controls, lane)``, ``(agent, starts_at, node)``. Reals are float32 and positions
-        relative to ``data.origin`` (x and y, float64), for single precision is half a metre at
-        projected coordinates.
+        Of a run: node types ``node`` and ``walk`` (the graphs of the map), ``lane``, ``agent``,
+        ``light``; edge types ``(node, successor | left | right, node)``, ``(walk, sidewalk |
+        roadside | crosswalk | joint, walk)`` both ways, ``(node, on, lane)``, ``(lane, successor,
+        lane)``, ``(light, controls, lane)``, ``(agent, starts_at, node)``. Of a scenario:
+        ``segment``, ``actor`` and ``flow`` in place of the last two, and their edges. Reals are
+        float32 and positions relative to ``data.origin`` (x and y, float64), for single precision
+        is half a metre at projected coordinates.
 
     Raises
     ------
     ModuleNotFoundError
         If torch or torch_geometric is not installed.
     """
+    if _format(arrays) == ("odscen-scenario-arrays", 1):
+        return scenario_hetero_data(arrays)
+    return _run_data(arrays)
+
+
+def arrays_of(data: Any) -> dict[str, Array]:
+    """Arrays of a scenario from its ``HeteroData``, for ``odscen.scenario_from_arrays``.
+
+    The same as those that it was made of, but for what was changed in the columns; see
+    :func:`~odscen.learning.scenario_hetero_data.scenario_arrays_of`.
+
+    Raises
+    ------
+    InputError
+        If it is not of a scenario: what happened in a run is not made again from numbers.
+    """
+    if "actor" not in data.node_types:
+        msg = "it has no actors: only the data of a scenario goes back to arrays"
+        raise InputError(msg)
+    return scenario_arrays_of(data)
+
+
+def _run_data(arrays: Mapping[str, Array]) -> Any:
     import torch
     from torch_geometric.data import HeteroData
 

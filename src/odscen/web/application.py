@@ -140,6 +140,7 @@ def create_app(
     ):
         app.include_router(routes.router)
     app.include_router(scenario_routes.templates)
+    app.include_router(scenario_routes.generators)
     app.include_router(demand_routes.days)
     app.include_router(exchange_routes.router)
     app.include_router(exchange_routes.exports)

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from odscen.base.categories import Category
+from odscen.learning.generator_options import OptionKind, OptionValue
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.workspace.asset_catalogue import Age, TimeOfDay
 
@@ -197,6 +198,28 @@ class TemplateInfo(Answer):
     source: str
     needs: str
     numbers: list[TemplateNumber]
+
+
+class GeneratorOptionInfo(Answer):
+    """An option of a generator; ``usual`` ``null`` has to be given."""
+
+    name: str
+    kind: OptionKind
+    title: str
+    meaning: str
+    usual: OptionValue | None
+    low: float | None
+    high: float | None
+    choices: list[str]
+
+
+class GeneratorInfo(Answer):
+    """A generator that can fill a region; ``error`` says why it cannot, and is empty if it can."""
+
+    name: str
+    summary: str
+    options: list[GeneratorOptionInfo]
+    error: str
 
 
 class OfVersion(RequestBody):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 from odscen.base.errors import ScenarioError
 from odscen.scenario.checks.actor_checks import (
@@ -33,11 +33,12 @@ from odscen.scenario.placing.region import Region, on_foot
 from odscen.scenario.sampling.sampler import sample_scenario
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from odscen.base.categories import Category
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.sampling.sampler import Crew
 
 
 @edit("Add {category}")
@@ -164,34 +165,67 @@ def copy_actors(scenario: Scenario, graph: MapGraph, copies: Mapping[str, str]) 
     return scenario
 
 
-@edit("Fill the region at random")
+class NamedPlacer(Protocol):
+    """Places actors by a generator that is known by its name."""
+
+    def __call__(
+        self, name: str, options: Mapping[str, bool | float | str], seed: int
+    ) -> Callable[[Region, Crew], tuple[Actor, ...]]:
+        """Make the function that places them in a region."""
+
+
+@edit("Fill the region")
 def fill_roi(
-    scenario: Scenario, graph: MapGraph, usable: Usable, *, share: float, seed: int | None = None
+    scenario: Scenario,
+    graph: MapGraph,
+    usable: Usable,
+    *,
+    place_by: NamedPlacer | None = None,
+    share: float,
+    seed: int | None = None,
+    generator: str | None = None,
+    options: Mapping[str, bool | float | str] | None = None,
 ) -> Scenario:
-    """Put a random crowd into the region in the place of all actors (R47); flows stay.
+    """Put a crowd into the region in the place of all actors (R47); flows stay.
 
     Parameters
     ----------
     usable
         What the simulator that will run it can use of the map.
+    place_by
+        The generators that are installed; none if not given.
     share
         Of the largest number of actors that fits, 0 to 1.
     seed
         Of the crowd; the scenario's if not given.
+    generator
+        Name of the installed one that places it; it is placed at random if not given.
+    options
+        Of the generator.
 
     Raises
     ------
     ScenarioError
         If the region is not usable, the share is not possible, or no actor fits.
+    InputError
+        If there is no such generator, it has no such option, or it gives no traffic.
     """
     refuse_errors(roi_problems(scenario, graph))
+    seed = scenario.seed if seed is None else seed
+    place = None
+    if generator is not None and place_by is not None:
+        place = place_by(generator, options or {}, seed)
+    elif generator is not None or options:
+        msg = "there is no generator here to be named, or to have options"
+        raise ScenarioError(msg)
     crowd = sample_scenario(
         graph,
         overridden(SamplingConfig(), fill=share),
-        seed=scenario.seed if seed is None else seed,
+        seed=seed,
         name=scenario.name,
         usable=usable,
         roi=scenario.roi,
+        place=place,
     ).actors
     nodes = {flow.spawn for flow in scenario.flows}
     ids = {flow.id for flow in scenario.flows}

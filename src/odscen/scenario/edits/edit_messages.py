@@ -34,7 +34,10 @@ if TYPE_CHECKING:
     from odscen.scenario.document.document_parts import Part
     from odscen.scenario.document.scenario_document import Scenario
 
-_KNOWN = {"scenario": "Scenario", "graph": "MapGraph", "lights": "Light", "usable": "Usable"}
+_KNOWN = {
+    "scenario": "Scenario", "graph": "MapGraph", "lights": "Light", "usable": "Usable",
+    "place_by": "NamedPlacer",
+}  # fmt: skip
 """Arguments that come with the map, and the names of their types, which need no message."""
 _JSON = {"Iterable": list, "Sequence": list, "Mapping": dict}
 """JSON has lists and objects; an Iterable would be read only when it is used."""

@@ -1,4 +1,4 @@
-"""Scenarios in either form, document or graph: every command takes both."""
+"""Scenarios in any form, document, graph or arrays: every command takes all."""
 
 from __future__ import annotations
 
@@ -11,15 +11,24 @@ from odscen.scenario.forms.graph_form import from_graphml
 if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
+_ARCHIVE = b"PK\x03\x04"
+"""How an .npz file begins."""
+
 
 def read_any(text: str | bytes, *, file: str | None = None) -> Scenario:
-    """Read a scenario from its JSON document or from its GraphML graph form, whichever it is.
+    """Read a scenario from its JSON document, the GraphML of its graph form, or an .npz of arrays.
 
     Raises
     ------
     ScenarioError
-        If it is neither, or has problems.
+        If it is none of these, or has problems.
+    InputError
+        If arrays are malformed.
     """
+    if isinstance(text, bytes) and text.startswith(_ARCHIVE):
+        from odscen.scenario.forms.array_reading import from_npz
+
+        return from_npz(text, file=file)
     try:
         decoded = text if isinstance(text, str) else text.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -1,0 +1,155 @@
+"""Options of a generator: what it lets one choose, as it says so in JSON Schema.
+
+A class has an attribute ``options``: a schema of an object whose properties are numbers, whole
+numbers, true or false, or texts, or a pydantic model, which has such a schema. It is made with the
+values as keyword arguments.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+
+from odscen.base.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+OptionValue = bool | float | str
+OptionKind = Literal["number", "integer", "boolean", "string"]
+_KINDS: tuple[OptionKind, ...] = get_args(OptionKind)
+_CALLED = {
+    "number": "a number", "integer": "a whole number", "boolean": "true or false",
+    "string": "a text",
+}  # fmt: skip
+_MOST = 100
+"""Options of a generator, and choices of an option."""
+_LONGEST = 1000
+"""Characters of a text."""
+
+
+class GeneratorOption(NamedTuple):
+    """What a generator lets one choose.
+
+    Attributes
+    ----------
+    usual
+        Its value if none is given; ``None`` if one has to be.
+    low, high
+        Bounds of a number; ``None`` for none.
+    choices
+        Texts of which it is one; empty for any.
+    """
+
+    name: str
+    kind: OptionKind
+    title: str
+    meaning: str
+    usual: OptionValue | None
+    low: float | None
+    high: float | None
+    choices: tuple[str, ...]
+
+
+def options_of(made_by: Any) -> tuple[GeneratorOption, ...]:
+    """Options that a class of generators has; none if it says nothing of them.
+
+    Raises
+    ------
+    InputError
+        If what it says is no schema of plain values.
+    """
+    said = getattr(made_by, "options", None)
+    if said is None:
+        return ()
+    try:
+        schema = said.model_json_schema() if hasattr(said, "model_json_schema") else said
+    except Exception as error:  # whatever code from outside may raise
+        msg = f"its options have no schema: {error!r}"
+        raise InputError(msg) from error
+    properties = schema.get("properties") if isinstance(schema, dict) else None
+    if not isinstance(properties, dict) or len(properties) > _MOST:
+        msg = "its `options` are no JSON Schema with `properties`, and no pydantic model"
+        raise InputError(msg)
+    return tuple(_option(str(name), one) for name, one in properties.items())
+
+
+def option_values(
+    options: Iterable[GeneratorOption], given: Mapping[str, OptionValue]
+) -> dict[str, OptionValue]:
+    """Check values and complete them with the usual ones.
+
+    Raises
+    ------
+    InputError
+        If there is no such option, a value is not possible, or one is missing.
+    """
+    known = {one.name: one for one in options}
+    for name in given:
+        if name not in known:
+            offered = f"there are {', '.join(known)}" if known else "it has none"
+            msg = f"it has no option {name!r}; {offered}"
+            raise InputError(msg)
+    found = {}
+    for name, one in known.items():
+        value = given.get(name, one.usual)
+        if value is None:
+            msg = f"option {name!r} has to be given: {_CALLED[one.kind]}"
+            raise InputError(msg)
+        found[name] = _checked(one, value)
+    return found
+
+
+def _option(name: str, schema: Any) -> GeneratorOption:
+    kind = schema.get("type") if isinstance(schema, dict) else None
+    choices = schema.get("enum", ()) if isinstance(schema, dict) else ()
+    texts = isinstance(choices, list | tuple) and all(isinstance(one, str) for one in choices)
+    if kind not in _KINDS or not texts or len(choices) > _MOST or (choices and kind != "string"):
+        msg = f"option {name!r} is not one of {', '.join(_KINDS)}; an enum has texts"
+        raise InputError(msg)
+    bounds = [schema.get("minimum"), schema.get("maximum")]
+    if not all(one is None or _is_number(one) for one in bounds):
+        msg = f"bounds of option {name!r} are no numbers: {bounds}"
+        raise InputError(msg)
+    option = GeneratorOption(
+        name=name,
+        kind=kind,
+        title=str(schema.get("title", name))[:_LONGEST],
+        meaning=str(schema.get("description", ""))[:_LONGEST],
+        usual=None,
+        low=bounds[0],
+        high=bounds[1],
+        choices=tuple(choices),
+    )
+    usual = schema.get("default")
+    return option if usual is None else option._replace(usual=_checked(option, usual))
+
+
+def _checked(option: GeneratorOption, value: Any) -> OptionValue:
+    """Return a value as it is given to the generator."""
+    name, kind = option.name, option.kind
+    fits = {
+        "number": _is_number(value),
+        "integer": _is_number(value) and value == round(value),
+        "boolean": isinstance(value, bool),
+        "string": isinstance(value, str) and len(value) <= _LONGEST,
+    }[kind]
+    if not fits:
+        msg = f"option {name!r} is {value!r}, not {_CALLED[kind]}"
+        raise InputError(msg)
+    if option.choices and value not in option.choices:
+        msg = f"option {name!r} is {value!r}, not one of {', '.join(option.choices)}"
+        raise InputError(msg)
+    if kind in ("number", "integer"):
+        low, high = option.low, option.high
+        if (low is not None and value < low) or (high is not None and value > high):
+            bounds = f"{'' if low is None else f'{low:g}'}..{'' if high is None else f'{high:g}'}"
+            msg = f"option {name!r} is {value:g}, not within {bounds}"
+            raise InputError(msg)
+        return int(value) if kind == "integer" else float(value)
+    found: OptionValue = value
+    return found
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
