@@ -9,6 +9,7 @@ from tools.make_maps.motorway import motorway_weave
 from tools.make_maps.roundabout import roundabout
 from tools.make_maps.rural import rural_hills
 from tools.make_maps.town import large_town, town_5x5
+from tools.make_maps.varied_town import COUNT, varied_town
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,6 +25,9 @@ MAPS: dict[str, Callable[[str], Builder]] = {
     "town_5x5": town_5x5,
     "left_hand_crossing": left_hand_crossing,
 }
-ON_DEMAND: dict[str, Callable[[str], Builder]] = {"large_town": large_town}
+ON_DEMAND: dict[str, Callable[[str], Builder]] = {
+    "large_town": large_town,
+    **{f"varied_town_{seed:02d}": varied_town for seed in range(COUNT)},
+}
 LEFT_HAND = {"left_hand_crossing"}
 """Maps that are mirrored when they are written."""
