@@ -119,9 +119,7 @@ def _drawn(rng: random.Random, seed: int) -> VariedGrid:
     )
 
 
-def _closed(
-    rng: random.Random, streets: Sequence[tuple[Node, int]]
-) -> frozenset[tuple[Node, int]]:
+def _closed(rng: random.Random, streets: Sequence[tuple[Node, int]]) -> frozenset[tuple[Node, int]]:
     """Some of the streets, no two of which meet."""
     found, used = [], set[Node]()
     for (i, j), direction in rng.sample(streets, k=len(streets) // 6):
@@ -193,8 +191,8 @@ def _junction(
     if grid.style == "signs" and narrow and grid.room(node) > roundabout.REACH:
         roundabout.roundabout_arms(builder, grid.place(node), arms)
         return
-    style = rng.choice(("lights", "lights", "none", "signs")) if grid.style == "mixed" else (
-        grid.style
+    style = (
+        rng.choice(("lights", "lights", "none", "signs")) if grid.style == "mixed" else (grid.style)
     )
     control, major = style, list[int]()
     if style == "signs":

@@ -104,6 +104,7 @@ def evaluate_model(
     model: TrafficModel | None = None,
     seed: int = 0,
     run: bool = True,
+    run_baselines: bool = True,
     most: int = SCENES,
     draws: int = DRAWS,
     told: Callable[[str], None] | None = None,
@@ -123,6 +124,8 @@ def evaluate_model(
         The model that ships if not given.
     run
         Whether fills are run for two seconds.
+    run_baselines
+        Whether those of the baselines are run as well.
     most
         Fills of each map; they are like snapshots at even steps of the data.
     draws
@@ -159,7 +162,8 @@ def evaluate_model(
             if told is not None:
                 told(f"{name}: {source}")
             made = compared.filled(place, seed, most)
-            found.append(compared.quality(source, made, run=run))
+            runs = run and (run_baselines or source == REFERENCE)
+            found.append(compared.quality(source, made, run=runs))
     return found
 
 

@@ -1,4 +1,4 @@
-"""What a driver sees of the traffic behind the junction ahead: whether there is room, who is next."""
+"""What a driver sees of the traffic behind the junction ahead: room, and who is next."""
 
 from __future__ import annotations
 
@@ -51,18 +51,25 @@ def beyond_columns(ways: Ways, states: GapStates) -> FloatArray:
     room = np.where(seen, np.clip(gap, 0.0, FREE), FREE)
     stands = seen & (speed < STOPPED)
     near = np.minimum(states.near[entry] + taken, 4.0) / 4.0
-    queue = np.where(taken, np.where(speed < STOPPED, states.queue[entry] + 1.0, 0.0),
-                     states.queue[entry])  # fmt: skip
+    behind = states.queue[entry]
+    queue = np.where(taken, np.where(speed < STOPPED, behind + 1.0, 0.0), behind)
     count = len(states.gap)
     least = np.full(count, FREE)
     np.minimum.at(least, ways.root, room)
+    pace = np.where(room < _ROOM[-1], np.maximum(speed, 0.0) / 15.0, 1.0)
     slowest = np.ones(count)
-    np.minimum.at(slowest, ways.root, np.where(room < _ROOM[-1], np.maximum(speed, 0.0) / 15.0, 1.0))
-    columns = [1.0 - np.minimum(least, bend) / bend for bend in _ROOM]
-    columns.append(1.0 - np.minimum(slowest, 1.0))
-    for one in (np.exp(-room / 30.0), stands * np.exp(-room / 20.0), near,
-                np.minimum(queue, 8.0) / 8.0):  # fmt: skip
-        columns.append(_mean(ways.root, one, count))
+    np.minimum.at(slowest, ways.root, pace)
+    means = (
+        np.exp(-room / 30.0),
+        stands * np.exp(-room / 20.0),
+        near,
+        np.minimum(queue, 8.0) / 8.0,
+    )
+    columns = [
+        *(1.0 - np.minimum(least, bend) / bend for bend in _ROOM),
+        1.0 - slowest,
+        *(_mean(ways.root, one, count) for one in means),
+    ]
     found: FloatArray = np.column_stack(columns)
     return found
 

@@ -1,8 +1,8 @@
 """Whom a driver meets at the junction ahead, from the shape of the lanes through it alone.
 
 A lane graph has no rules of right of way. Mostly the larger road goes first: of two approaches
-opposite each other the fastest, then those of most lanes, then the straightest. Who comes by another
-one waits for their traffic; of two who go first, or two who wait, the one who turns more.
+opposite each other the fastest, then those of most lanes, then the straightest. Who comes by
+another one waits for their traffic; of two who go first, or two who wait, the one who turns more.
 """
 
 from __future__ import annotations

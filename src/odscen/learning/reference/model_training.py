@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 HIDDEN = 32
 NOISE = 0.1
-"""Deviation of what is added to the features of roads, so that single ones are not learned by heart.
+"""Deviation of what is added to features of roads, so that single ones are not learned by heart.
 
 Those of traffic stay as they are: blurred, they would tell too little of a queue to go on with it.
 """
@@ -91,7 +91,7 @@ class TrainingSettings:
     """
 
     seed: int = 0
-    epochs: int = 40
+    epochs: int = 12
     empty: float = 8.0
     decay: float = 0.3
     balance: float = 0.5

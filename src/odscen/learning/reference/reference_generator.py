@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from odscen.learning.traffic_snapshots import LightView
 
 WEIGHTS = "reference_model.npz"
-PASSES = 14
-BEFORE = 4
+PASSES = 13
+BEFORE = 3
 """Passes after which what is behind junctions is as in traffic."""
 MORE = 1.05
 """Share of the vehicles wanted that a pass may place at most; those too many are taken away."""

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.lanegraph.graphs import Relation
-from odscen.learning.reference.expected_flow import expected_flow
 from odscen.learning.reference.beyond_junctions import Ways, beyond_columns
+from odscen.learning.reference.expected_flow import expected_flow
 from odscen.learning.reference.junction_approaches import approaches
 from odscen.learning.reference.road_strips import Strips, road_strips
 from odscen.learning.reference.stop_lines import setbacks
@@ -55,8 +55,8 @@ class Site:
     ways
         Where strips lead through junctions.
     beside_ahead
-        Shape ``(N, 2)``: on the lanes to the left and right the nearest nodes that are placed before
-        this one, -1 without any.
+        Shape ``(N, 2)``: on the lanes to the left and right the nearest nodes that are placed
+        before this one, -1 without any.
     to_line
         Shape ``(N,)``: metres to the end of the strip or the crosswalk before it, 0 behind that.
     """
