@@ -104,7 +104,7 @@ def evaluate_model(
     model: TrafficModel | None = None,
     seed: int = 0,
     run: bool = True,
-    run_baselines: bool = True,
+    baselines: bool = True,
     most: int = SCENES,
     draws: int = DRAWS,
     told: Callable[[str], None] | None = None,
@@ -124,8 +124,8 @@ def evaluate_model(
         The model that ships if not given.
     run
         Whether fills are run for two seconds.
-    run_baselines
-        Whether those of the baselines are run as well.
+    baselines
+        Whether random fill and binned statistics are measured as well.
     most
         Fills of each map; they are like snapshots at even steps of the data.
     draws
@@ -133,7 +133,8 @@ def evaluate_model(
     """
     towns = {one.town for one in shards}
     known = [one for one in others if one.town not in towns]
-    statistics = binned_statistics(examples_of(workspace, known)) if known else None
+    count = known if baselines else []
+    statistics = binned_statistics(examples_of(workspace, count)) if count else None
     generator = ReferenceGenerator(model)
 
     def by_reference(on: WholeMap, request: FillRequest, rng: np.random.Generator) -> Fill:
@@ -152,6 +153,8 @@ def evaluate_model(
     sources = {REFERENCE: by_reference, BINNED: by_bins, RANDOM: placed_at_random}
     if statistics is None:
         del sources[BINNED]
+    if not baselines:
+        del sources[RANDOM]
     found = []
     for name in sorted({one.map_name for one in shards}):
         mine = [one for one in shards if one.map_name == name]
@@ -162,8 +165,7 @@ def evaluate_model(
             if told is not None:
                 told(f"{name}: {source}")
             made = compared.filled(place, seed, most)
-            runs = run and (run_baselines or source == REFERENCE)
-            found.append(compared.quality(source, made, run=runs))
+            found.append(compared.quality(source, made, run=run))
     return found
 
 

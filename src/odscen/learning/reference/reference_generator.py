@@ -43,6 +43,8 @@ WEIGHTS = "reference_model.npz"
 PASSES = 13
 BEFORE = 3
 """Passes after which what is behind junctions is as in traffic."""
+BACK = 0.6
+"""Share of the last step of the bias that the next may be, if it goes the other way."""
 MORE = 1.05
 """Share of the vehicles wanted that a pass may place at most; those too many are taken away."""
 SHARPNESS = 2.0
@@ -143,18 +145,20 @@ def place_traffic(
     density = np.full(len(site.limit), density_column(wanted, metres))
     fixed = np.column_stack([site.columns, light_columns(site, lights), density])
     draw = _Draw(model, site, lights, allowed, lengths, fixed)
-    bias, best = 0.0, NOBODY
+    bias, best, most, last = 0.0, NOBODY, 2.0, 0.0
     states = GapStates.empty(len(site.limit))
     for number in range(PASSES if wanted else 0):
         states, found = draw.traffic(bias, states, rng)
-        if number < BEFORE:
-            best = NOBODY  # it knew nothing of what is behind junctions
-        elif _missing(found, wanted) < _missing(best, wanted):
+        if number >= BEFORE and _missing(found, wanted) < _missing(best, wanted):
             best = found
         if number >= BEFORE and wanted <= len(found.node) <= MORE * wanted + 1.0:
             break
         aim = (1.0 + MORE) / 2.0 * wanted
-        bias += float(np.clip(1.2 * np.log((aim + 0.5) / (len(found.node) + 0.5)), -2.0, 2.0))
+        step = 1.2 * np.log((aim + 0.5) / (len(found.node) + 0.5))
+        # Vehicles attract others, so that a little more may be many more: go back by less.
+        most = most * BACK if step * last < 0.0 else most
+        last = float(np.clip(step, -most, most))
+        bias += last
     keep = np.sort(rng.permutation(len(best.node))[:wanted])
     return PlacedTraffic(best.node[keep], best.category[keep], best.speed[keep])
 
