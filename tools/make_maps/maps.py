@@ -11,6 +11,7 @@ from tools.make_maps.motorway import motorway_weave
 from tools.make_maps.roundabout import roundabout
 from tools.make_maps.rural import rural_hills
 from tools.make_maps.town import large_town, town_5x5
+from tools.make_maps.varied_town import COUNT, varied_town
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +31,8 @@ ON_DEMAND: dict[str, Callable[[str], Builder]] = {
     "large_town": large_town,
     "towns_10": partial(joined_towns, count=10),
     "towns_100": partial(joined_towns, count=100),
+    **{f"varied_town_{seed:02d}": varied_town for seed in range(COUNT)},
 }
-"""Too large to be kept in the repository."""
+"""Too large, or too many, to be kept in the repository."""
 LEFT_HAND = {"left_hand_crossing"}
 """Maps that are mirrored when they are written."""

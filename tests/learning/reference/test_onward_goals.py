@@ -62,3 +62,20 @@ def test_the_same_random_numbers_give_the_same_goals() -> None:
     graph = fork()
     nodes = np.arange(0, len(graph.lanes.x), 3)
     np.testing.assert_array_equal(drawn(graph, nodes, 4), drawn(graph, nodes, 4))
+
+
+def test_who_is_too_fast_for_the_turn_goes_straight_on() -> None:
+    graph = fork()
+    roads = np.ones(len(graph.lanes.x), dtype=np.bool_)
+    names = [graph.lanes.lanes.keys[one].road for one in graph.lanes.lane]
+    end = max(k for k, name in enumerate(names) if name == "1" and graph.lanes.hdg[k] == 0.0)
+
+    def goals(speed: float) -> set[str]:
+        found = onward_goals(
+            graph, roads, node=np.full(40, end), speed=np.full(40, speed),
+            rng=np.random.default_rng(1),
+        )  # fmt: skip
+        return {str(names[goal]) for goal in found}
+
+    assert goals(13.0) == {"2"}
+    assert goals(5.0) == {"2", "3"}

@@ -21,6 +21,7 @@ from odscen.base.errors import InputError
 from odscen.learning.binned_baseline import binned_statistics, place_binned
 from odscen.learning.fill import VEHICLES, Fill
 from odscen.learning.fill_check import checked_fill
+from odscen.learning.reference.model_training import placed
 from odscen.learning.reference.reference_generator import ReferenceGenerator, names_of
 from odscen.learning.traffic_metrics import (
     MEASURES,
@@ -53,8 +54,8 @@ NEAR = 1
 SCENES = 12
 """Fills of each map that are compared, at most."""
 DRAWS = 20
-RUN = 2
-"""Fills of each map that are run for two seconds."""
+RUN = 3
+"""Fills of each map that are run for two seconds, as full as snapshots at even steps of size."""
 
 
 class MeasuredValue(NamedTuple):
@@ -103,6 +104,7 @@ def evaluate_model(
     model: TrafficModel | None = None,
     seed: int = 0,
     run: bool = True,
+    baselines: bool = True,
     most: int = SCENES,
     draws: int = DRAWS,
     told: Callable[[str], None] | None = None,
@@ -122,6 +124,8 @@ def evaluate_model(
         The model that ships if not given.
     run
         Whether fills are run for two seconds.
+    baselines
+        Whether random fill and binned statistics are measured as well.
     most
         Fills of each map; they are like snapshots at even steps of the data.
     draws
@@ -129,7 +133,8 @@ def evaluate_model(
     """
     towns = {one.town for one in shards}
     known = [one for one in others if one.town not in towns]
-    statistics = binned_statistics(examples_of(workspace, known)) if known else None
+    count = known if baselines else []
+    statistics = binned_statistics(examples_of(workspace, count)) if count else None
     generator = ReferenceGenerator(model)
 
     def by_reference(on: WholeMap, request: FillRequest, rng: np.random.Generator) -> Fill:
@@ -148,6 +153,8 @@ def evaluate_model(
     sources = {REFERENCE: by_reference, BINNED: by_bins, RANDOM: placed_at_random}
     if statistics is None:
         del sources[BINNED]
+    if not baselines:
+        del sources[RANDOM]
     found = []
     for name in sorted({one.map_name for one in shards}):
         mine = [one for one in shards if one.map_name == name]
@@ -233,8 +240,8 @@ class _ComparedMap:
             lambda some: stopped(self._rows[0], self._pick(self._rows, some)),
             self._draws,
         )
-        braking = [one.braking for shard in shards for one in shard.snapshots]
-        values["hard_braking"] = _braking(braking)
+        examples = examples_of(self._workspace, shards)
+        values["hard_braking"] = _braking([one.snapshot.braking[placed(one)] for one in examples])
         return self._quality(FLOOR, self._scenes, values)
 
     def filled(
@@ -251,9 +258,10 @@ class _ComparedMap:
             scenes.append(scene_of_actors(on, actors, scene.lights, name=scene.name))
             off.append(dropped)
         lights = lights_at_start(on.loaded.sumo)
-        largest = sorted(range(len(self._scenes)), key=lambda k: -len(self._scenes[k].node))
+        by_size = sorted(range(len(self._scenes)), key=lambda k: len(self._scenes[k].node))
+        steps = (np.arange(RUN) + 0.5) / RUN * len(by_size)
         scenarios = []
-        for number in largest[:: max(len(largest) // RUN, 1)][:RUN]:
+        for number in dict.fromkeys(by_size[int(step)] for step in steps):
             wanted = len(self._scenes[number].node)
             actors, _ = self._asked(place, wanted, lights, seed, len(scenes) + number)
             scenarios.append(scenario_of(on, actors, number))

@@ -73,7 +73,7 @@ def whole_map(entry: MapEntry) -> WholeMap:
     places = wanted_crew(region, SamplingConfig(), loaded.usable, fill=0.5).road_places
     none = np.zeros(len(graph.lanes.x), dtype=np.bool_)
     allowed = np.stack([places.allowed.get(one, none) for one in VEHICLES])
-    learned = LearnedMap(site_of(graph.lanes), allowed, graph.lanes.spacing)
+    learned = LearnedMap(site_of(graph.lanes, graph.walks), allowed, graph.lanes.spacing)
     return WholeMap(loaded, region, places, learned)
 
 

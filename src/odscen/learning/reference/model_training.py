@@ -10,7 +10,11 @@ import numpy as np
 from odscen.base.errors import InputError
 from odscen.learning.fill import VEHICLES
 from odscen.learning.reference.gap_states import gap_states
-from odscen.learning.reference.site_features import light_columns, traffic_columns
+from odscen.learning.reference.site_features import (
+    junction_columns,
+    light_columns,
+    traffic_columns,
+)
 from odscen.learning.reference.small_network import new_network, trained
 from odscen.learning.reference.traffic_model import (
     CLASSES,
@@ -31,7 +35,10 @@ if TYPE_CHECKING:
 
 HIDDEN = 32
 NOISE = 0.1
-"""Deviation of what is added to the features, so that single roads are not learned by heart."""
+"""Deviation of what is added to features of roads, so that single ones are not learned by heart.
+
+Those of traffic stay as they are: blurred, they would tell too little of a queue to go on with it.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +91,7 @@ class TrainingSettings:
     """
 
     seed: int = 0
-    epochs: int = 40
+    epochs: int = 12
     empty: float = 8.0
     decay: float = 0.3
     balance: float = 0.5
@@ -120,7 +127,9 @@ def train_model(
     tell = told or (lambda _: None)
     tell("looking at snapshots")
     rows = _rows(examples, settings, rng)
-    x = (rows.x + NOISE * rng.normal(size=rows.x.shape)).astype(np.float32)
+    x = rows.x.copy()
+    fixed = examples[0].of.site.columns.shape[1]
+    x[:, :fixed] += (NOISE * rng.normal(size=(len(x), fixed))).astype(np.float32)
     tell(f"learning where vehicles are, from {len(x):,} nodes")
     occupied = trained(
         new_network(x.shape[1], HIDDEN, 1, rng),
@@ -221,6 +230,7 @@ def _looked_at(example: Example, kept: float, rng: np.random.Generator) -> _Look
             site.columns[nodes],
             light_columns(site, snapshot.lights)[nodes],
             np.full(len(nodes), density),
+            junction_columns(site, states)[nodes],
             traffic_columns(site, states, nodes),
         ]
     )

@@ -27,6 +27,12 @@ AHEAD = 120.0
 """Metres that a vehicle follows its lane at least, where a goal allows it."""
 SECONDS = 8.0
 """And for how long at its speed."""
+BRAKING = 4.0
+"""m/s² with which a vehicle slows down at most for a bend on the way to its goal."""
+_SIDEWAYS = 5.5
+"""m/s² across the driving direction that limit the speed in a bend inside a junction."""
+_SLOWEST = 2.0
+"""m/s; no bend is slower."""
 _CHANGE = 30.0
 """Metres that a lane change counts as on the way to a goal."""
 
@@ -64,7 +70,7 @@ def onward_goals(
         goals = rng.permutation(pool)[:TRIES]
         if not len(open_) or not len(goals):
             continue
-        free = onwards.free_metres(node[open_], goals, wanted[open_])
+        free = onwards.free_metres(node[open_], goals, wanted[open_], speed[open_])
         row, table = router.reach(node[open_].astype(np.int32), goals.astype(np.int32))
         free[~table[row].T | (goals[:, None] == node[open_])] = -1.0
         order = rng.permuted(np.tile(np.arange(len(goals)), (len(open_), 1)), axis=1).T
@@ -90,6 +96,7 @@ class _LanesOnwards(NamedTuple):
     lanes: LaneGraph
     section: IntArray
     back: csr_array
+    passing: FloatArray
 
     @classmethod
     def of(cls, lanes: LaneGraph, roads: BoolArray) -> _LanesOnwards:
@@ -107,12 +114,16 @@ class _LanesOnwards(NamedTuple):
         names = [(key.road, key.section) for key in lanes.lanes.keys]
         rows = {name: row for row, name in enumerate(dict.fromkeys(names))}
         section = np.array([rows[name] for name in names], dtype=np.int64)
-        return cls(lanes, section, csr_array((cost[order][first], where), shape=(count, count)))
+        back = csr_array((cost[order][first], where), shape=(count, count))
+        return cls(lanes, section, back, _passing_speeds(lanes))
 
-    def free_metres(self, node: IntArray, goals: IntArray, wanted: FloatArray) -> FloatArray:
+    def free_metres(
+        self, node: IntArray, goals: IntArray, wanted: FloatArray, speed: FloatArray
+    ) -> FloatArray:
         """Metres to the first lane change of each vehicle on its way to each goal, ``(K, V)``.
 
-        At most ``wanted``, which ``(V,)`` vehicles have; all of it to the goal without a change.
+        Or to the first bend that it is too fast for. At most ``wanted``, which ``(V,)`` vehicles
+        have; all of it to the goal without either.
         """
         lanes = self.lanes
         targets = lanes.lane[goals].astype(np.int64)
@@ -125,10 +136,27 @@ class _LanesOnwards(NamedTuple):
             there = ahead[rows, at]
             arrived = there < 0
             beside = ~arrived & (self.section[at] == self.section[np.maximum(there, 0)])
+            slow = self.passing[np.maximum(there, 0)]
+            fast = ~arrived & (speed**2 > slow**2 + 2.0 * BRAKING * metres)
             metres = np.where(going & arrived, wanted, metres)
-            going &= ~arrived & ~beside
+            metres = np.where(going & fast, 0.0, metres)
+            going &= ~arrived & ~beside & ~fast
             at = np.where(going, there, at)
             metres = np.where(going, metres + lanes.lanes.lengths[at], metres)
             going &= metres < wanted
         found: FloatArray = np.minimum(metres, wanted)
         return found
+
+
+def _passing_speeds(lanes: LaneGraph) -> FloatArray:
+    """Speed at which each lane is driven, m/s: its limit, inside junctions less in bends."""
+    count = len(lanes.lanes.keys)
+    nodes = np.maximum(np.bincount(lanes.lane, minlength=count), 1)
+    bend = np.bincount(lanes.lane, weights=np.abs(lanes.curvature), minlength=count) / nodes
+    limit = np.full(count, np.inf)
+    known = ~np.isnan(lanes.speed_limit)
+    np.minimum.at(limit, lanes.lane[known], lanes.speed_limit[known])
+    inside = np.array([name is not None for name in lanes.lanes.junctions], dtype=np.bool_)
+    turning = np.where(inside, np.sqrt(_SIDEWAYS / np.maximum(bend, 1e-6)), np.inf)
+    found: FloatArray = np.maximum(np.minimum(limit, turning), _SLOWEST)
+    return found

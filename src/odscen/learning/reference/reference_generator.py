@@ -12,11 +12,17 @@ from odscen.base.categories import Category
 from odscen.learning.fill import VEHICLES, Fill
 from odscen.learning.reference.gap_states import GapStates
 from odscen.learning.reference.onward_goals import NO_GOAL, onward_goals
-from odscen.learning.reference.site_features import light_columns, site_of, traffic_columns
+from odscen.learning.reference.site_features import (
+    junction_columns,
+    light_columns,
+    site_of,
+    traffic_columns,
+)
 from odscen.learning.reference.small_network import logistic, softmax
 from odscen.learning.reference.traffic_model import (
     context,
     density_column,
+    least_speeds,
     model_from_bytes,
     speed_within,
     with_category,
@@ -27,14 +33,18 @@ from odscen.scenario.checks.actor_checks import SPEED_MAX
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
-    from odscen.lanegraph.graphs import LaneGraph, MapGraph
+    from odscen.lanegraph.graphs import LaneGraph, MapGraph, PedestrianGraph
     from odscen.learning.fill import Array, FillRequest
     from odscen.learning.reference.site_features import Site
     from odscen.learning.reference.traffic_model import TrafficModel
     from odscen.learning.traffic_snapshots import LightView
 
 WEIGHTS = "reference_model.npz"
-PASSES = 10
+PASSES = 13
+BEFORE = 3
+"""Passes after which what is behind junctions is as in traffic."""
+BACK = 0.6
+"""Share of the last step of the bias that the next may be, if it goes the other way."""
 MORE = 1.05
 """Share of the vehicles wanted that a pass may place at most; those too many are taken away."""
 SHARPNESS = 2.0
@@ -74,7 +84,7 @@ class ReferenceGenerator:
         none = np.zeros(len(graph.lanes.x), dtype=np.bool_)
         allowed = np.stack([request.allowed.get(one, none) for one in VEHICLES])
         lengths = np.array([request.bodies[one].length for one in VEHICLES])
-        site = _site(graph.lanes)
+        site = _site(graph.lanes, graph.walks)
         traffic = place_traffic(
             self._model, site, request.lights, allowed,
             spacing=graph.lanes.spacing, wanted=request.vehicles, lengths=lengths, rng=rng,
@@ -119,7 +129,8 @@ def place_traffic(
 ) -> PlacedTraffic:
     """Place about as many vehicles as are wanted, never more.
 
-    The whole map is placed several times, with another bias, until the number is close.
+    The whole map is placed several times, with another bias, until the number is close. What is
+    behind a junction is what the time before has put there.
 
     Parameters
     ----------
@@ -134,15 +145,20 @@ def place_traffic(
     density = np.full(len(site.limit), density_column(wanted, metres))
     fixed = np.column_stack([site.columns, light_columns(site, lights), density])
     draw = _Draw(model, site, lights, allowed, lengths, fixed)
-    bias, best = 0.0, NOBODY
-    for _ in range(PASSES if wanted else 0):
-        found = draw.traffic(bias, rng)
-        if _missing(found, wanted) < _missing(best, wanted):
+    bias, best, most, last = 0.0, NOBODY, 2.0, 0.0
+    states = GapStates.empty(len(site.limit))
+    for number in range(PASSES if wanted else 0):
+        states, found = draw.traffic(bias, states, rng)
+        if number >= BEFORE and _missing(found, wanted) < _missing(best, wanted):
             best = found
-        if wanted <= len(found.node) <= MORE * wanted + 1.0:
+        if number >= BEFORE and wanted <= len(found.node) <= MORE * wanted + 1.0:
             break
         aim = (1.0 + MORE) / 2.0 * wanted
-        bias += float(np.clip(1.2 * np.log((aim + 0.5) / (len(found.node) + 0.5)), -2.0, 2.0))
+        step = 1.2 * np.log((aim + 0.5) / (len(found.node) + 0.5))
+        # Vehicles attract others, so that a little more may be many more: go back by less.
+        most = most * BACK if step * last < 0.0 else most
+        last = float(np.clip(step, -most, most))
+        bias += last
     keep = np.sort(rng.permutation(len(best.node))[:wanted])
     return PlacedTraffic(best.node[keep], best.category[keep], best.speed[keep])
 
@@ -163,9 +179,15 @@ class _Draw(NamedTuple):
     lengths: FloatArray
     fixed: FloatArray
 
-    def traffic(self, bias: float, rng: np.random.Generator) -> PlacedTraffic:
-        """Place vehicles row after row, from the stop lines backwards."""
+    def traffic(
+        self, bias: float, before: GapStates, rng: np.random.Generator
+    ) -> tuple[GapStates, PlacedTraffic]:
+        """Place vehicles row after row, from the stop lines backwards.
+
+        ``before`` is traffic as it may be behind junctions.
+        """
         site, states = self.site, GapStates.empty(len(self.site.limit))
+        fixed = np.column_stack([self.fixed, junction_columns(site, before)])
         anywhere = np.asarray(self.allowed.any(axis=0))
         found: list[PlacedTraffic] = []
         for row in site.strips.rows:
@@ -173,7 +195,7 @@ class _Draw(NamedTuple):
             free = row[anywhere[row] & (states.gap[row] > self.lengths.min() / 2.0 + GAP)]
             if not len(free):
                 continue
-            x = np.column_stack([self.fixed[free], traffic_columns(site, states, free)])
+            x = np.column_stack([fixed[free], traffic_columns(site, states, free)])
             chance = logistic(self.model.occupied(x)[:, 0] + bias)
             hit = np.flatnonzero(rng.random(len(free)) < chance)
             if len(hit):
@@ -181,12 +203,8 @@ class _Draw(NamedTuple):
                 states.put(placed.node, placed.category, placed.speed)
                 found.append(placed)
         if not found:
-            return NOBODY
-        return PlacedTraffic(
-            np.concatenate([one.node for one in found]),
-            np.concatenate([one.category for one in found]),
-            np.concatenate([one.speed for one in found]),
-        )
+            return states, NOBODY
+        return states, PlacedTraffic(*(np.concatenate(one) for one in zip(*found, strict=True)))
 
     def _vehicles(
         self, nodes: IntArray, x: FloatArray, states: GapStates, rng: np.random.Generator
@@ -199,9 +217,12 @@ class _Draw(NamedTuple):
         some = shares.sum(axis=1) > 0
         nodes, x, limit, shares = nodes[some], x[some], limit[some], shares[some]
         category = _drawn(shares, rng)
-        odds = _sharpened(softmax(self.model.speed(with_category(x, category))))
-        speed = speed_within(_drawn(odds, rng), limit, rng.random(len(nodes)))
         most = np.minimum(self._stoppable(nodes, category), self._safe(nodes, category, states))
+        odds = _sharpened(softmax(self.model.speed(with_category(x, category))))
+        # Those who would be too fast are none of the slower ones at the limit of what is safe.
+        odds = np.where(least_speeds(limit) < most[:, None], odds, 0.0)
+        odds[:, 0] = np.maximum(odds[:, 0], 1e-9)
+        speed = speed_within(_drawn(odds, rng), limit, rng.random(len(nodes)))
         return PlacedTraffic(nodes, category, np.minimum(speed, most))
 
     def _safe(self, nodes: IntArray, category: IntArray, states: GapStates) -> FloatArray:
@@ -215,8 +236,8 @@ class _Draw(NamedTuple):
         """Krauss's safe speed before a red light, m/s: that at which SUMO's drivers approach it."""
         root = self.site.strips.root[nodes]
         red = self.lights.state[self.site.lane[root]] == SignalAhead.RED
-        metres = self.site.strips.to_end[nodes] - self.lengths[category] / 2.0
-        return np.where(red, safe_speed(metres, 0.0), np.inf)
+        metres = self.site.to_line[nodes] - self.lengths[category] / 2.0
+        return np.where(red & (metres > -1.0), safe_speed(metres, 0.0), np.inf)
 
 
 def _sharpened(odds: FloatArray) -> FloatArray:
@@ -257,5 +278,5 @@ def _walkers(request: FillRequest, rng: np.random.Generator) -> IntArray:
 
 
 @lru_cache(maxsize=4)
-def _site(lanes: LaneGraph) -> Site:
-    return site_of(lanes)
+def _site(lanes: LaneGraph, walks: PedestrianGraph) -> Site:
+    return site_of(lanes, walks)

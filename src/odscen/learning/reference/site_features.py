@@ -12,21 +12,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.lanegraph.graphs import Relation
+from odscen.learning.reference.beyond_junctions import Ways, beyond_columns
 from odscen.learning.reference.expected_flow import expected_flow
+from odscen.learning.reference.junction_approaches import approaches
 from odscen.learning.reference.road_strips import Strips, road_strips
+from odscen.learning.reference.stop_lines import setbacks
 from odscen.learning.traffic_snapshots import SignalAhead
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
-    from odscen.lanegraph.graphs import LaneGraph
+    from odscen.lanegraph.graphs import LaneGraph, PedestrianGraph
     from odscen.learning.reference.gap_states import GapStates
     from odscen.learning.traffic_snapshots import LightView
 
 UNKNOWN_LIMIT = 13.89
 """m/s, where the map gives no speed limit."""
-_TO_END = (6.0, 15.0, 30.0, 60.0, 120.0, 250.0)
+_TO_END = (4.0, 8.0, 15.0, 30.0, 60.0, 120.0, 250.0)
 _FROM_START = (15.0, 60.0, 200.0)
 _SINCE = (4.0, 12.0, 30.0)
+_TO_LINE = (4.0, 7.0, 13.0, 30.0)
 _GAPS = (3.0, 5.0, 8.0, 12.0, 20.0, 40.0, 80.0, 150.0)
 
 
@@ -48,6 +52,13 @@ class Site:
         Shape ``(N,)``: row of the lane.
     columns
         Shape ``(N, K)``: features of the road.
+    ways
+        Where strips lead through junctions.
+    beside_ahead
+        Shape ``(N, 2)``: on the lanes to the left and right the nearest nodes that are placed
+        before this one, -1 without any.
+    to_line
+        Shape ``(N,)``: metres to the end of the strip or the crosswalk before it, 0 behind that.
     """
 
     strips: Strips
@@ -56,20 +67,28 @@ class Site:
     outer: BoolArray
     lane: IntArray
     columns: FloatArray
+    ways: Ways
+    beside_ahead: IntArray
+    to_line: FloatArray
 
 
-def site_of(lanes: LaneGraph) -> Site:
+def site_of(lanes: LaneGraph, walks: PedestrianGraph | None = None) -> Site:
     """Look at a map once; many fills are made of it."""
     strips = road_strips(lanes)
+    setback = setbacks(lanes, strips, walks)
+    to_line = np.maximum(strips.to_end - setback, 0.0)
     limit = np.where(np.isnan(lanes.speed_limit), UNKNOWN_LIMIT, lanes.speed_limit)
     limit = np.maximum(limit, 1.0)
     flow = expected_flow(lanes)[lanes.lane]
     rights, lefts = _lanes_beside(lanes)
     ends = _ends(lanes, strips, flow)
+    ways, more = approaches(lanes, strips.on_road, limit=limit, flow=flow)
     bend = _bend_ahead(lanes, strips)
     columns = np.column_stack(
         [
-            *_hinges(strips.to_end, _TO_END),
+            *_hinges(to_line, _TO_END),
+            np.minimum(setback, 8.0) / 8.0,
+            (setback > 0.0) & (strips.to_end < setback),
             *_hinges(strips.from_start, _FROM_START),
             limit / 15.0,
             np.isnan(lanes.speed_limit),
@@ -80,23 +99,25 @@ def site_of(lanes: LaneGraph) -> Site:
             np.minimum(np.abs(lanes.curvature) * 30.0, 1.0),
             np.minimum(bend * 30.0, 1.0),
             np.log(0.1 + flow) / 2.0,
-            *(one[strips.root] for one in ends),
+            *(one[strips.root] for one in (*ends, *more)),
         ]
     ).astype(np.float64)
     beside = np.column_stack(
         [_nodes_beside(lanes, lanes.left_lane), _nodes_beside(lanes, lanes.right_lane)]
     )
-    return Site(strips, limit, beside, rights == 0, lanes.lane.astype(np.int64), columns)
+    return Site(strips, limit, beside, rights == 0, lanes.lane.astype(np.int64), columns, ways,
+                _placed_before(strips, beside), to_line)  # fmt: skip
 
 
 def light_columns(site: Site, lights: LightView) -> FloatArray:
-    """Features of the light ahead, shape ``(N, 3 + 2 * 3)``: what it shows, and for how long."""
+    """Features of the light ahead, ``(N, 13)``: what it shows, for how long, how far red is."""
     lane = site.lane[site.strips.root]
     state, since = lights.state[lane], lights.since[lane]
     green, red = state == SignalAhead.GREEN, state == SignalAhead.RED
     shown = [green, state == SignalAhead.YELLOW, red]
     times = [on * column for on in (green, red) for column in _hinges(since, _SINCE)]
-    return np.column_stack([*shown, *times]).astype(np.float64)
+    line = [red * column for column in _hinges(site.to_line, _TO_LINE)]
+    return np.column_stack([*shown, *times, *line]).astype(np.float64)
 
 
 def traffic_columns(site: Site, states: GapStates, nodes: IntArray) -> FloatArray:
@@ -104,7 +125,7 @@ def traffic_columns(site: Site, states: GapStates, nodes: IntArray) -> FloatArra
     own = _ahead(states, nodes)
     columns = [*own]
     for side in (0, 1):
-        beside = site.beside[nodes, side]
+        beside = site.beside_ahead[nodes, side]
         there = np.maximum(beside, 0)
         on_it = ~np.isnan(states.speed[there])
         gap, leader = states.gap[there], states.leader[there]
@@ -118,6 +139,11 @@ def traffic_columns(site: Site, states: GapStates, nodes: IntArray) -> FloatArra
         ]
         columns += [np.where(beside >= 0, one, 0.0) for one in seen]
     return np.column_stack(columns).astype(np.float64)
+
+
+def junction_columns(site: Site, states: GapStates) -> FloatArray:
+    """Features of the traffic behind the junction ahead, for all nodes: ``(N, 8)``."""
+    return beyond_columns(site.ways, states)[site.strips.root]
 
 
 def _ahead(states: GapStates, nodes: IntArray) -> list[FloatArray]:
@@ -171,6 +197,20 @@ def _nodes_beside(lanes: LaneGraph, beside: Int32Array) -> IntArray:
     place = np.clip((share * count).astype(np.int64), 0, np.maximum(count - 1, 0))
     found: IntArray = np.where((beside >= 0) & (count > 0), first[lane] + place, -1)
     return found.astype(np.int64)
+
+
+def _placed_before(strips: Strips, beside: IntArray) -> IntArray:
+    """Nodes beside, or ahead of these, that have fewer nodes ahead than the node itself."""
+    hops = np.zeros(len(strips.ahead), dtype=np.int64)
+    for place, row in enumerate(strips.rows):
+        hops[row] = place
+    found = beside.copy()
+    for _ in range(len(strips.rows)):
+        late = (found >= 0) & (hops[np.maximum(found, 0)] >= hops[:, None])
+        if not late.any():
+            break
+        found[late] = strips.ahead[found[late]]
+    return found
 
 
 def _ends(lanes: LaneGraph, strips: Strips, flow: FloatArray) -> list[FloatArray]:

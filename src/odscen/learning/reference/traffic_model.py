@@ -29,7 +29,7 @@ from odscen.learning.traffic_snapshots import STOPPED
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
 
-VERSION = 2
+VERSION = 3
 STEP = 0.05
 """Of the ratio of speed to limit."""
 CLASSES = 29
@@ -79,6 +79,12 @@ def speed_within(classes: IntArray, limit: FloatArray, share: FloatArray) -> Flo
     """Speeds of classes, m/s; ``share`` says where inside the class."""
     moving = np.maximum((classes - 1 + share) * STEP * limit, STOPPED)
     found: FloatArray = np.where(classes == 0, 0.0, moving)
+    return found
+
+
+def least_speeds(limit: FloatArray) -> FloatArray:
+    """Slowest speed of each class, m/s, ``(V, CLASSES)``."""
+    found: FloatArray = np.maximum(np.arange(CLASSES) - 1, 0) * STEP * limit[:, None]
     return found
 
 

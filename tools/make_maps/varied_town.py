@@ -1,0 +1,208 @@
+"""Towns on grids that differ in everything: what the reference generator learns from.
+
+``varied_town_07`` is the town of seed 7. Streets, lanes, speeds, the size of junctions, and who
+goes first at them are drawn; the same name gives the same map.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import TYPE_CHECKING
+
+from scenariogeneration import xodr
+
+from tools.make_maps import roundabout
+from tools.make_maps.builder import Builder
+from tools.make_maps.crossing import crossing
+from tools.make_maps.geometry import Pose
+from tools.make_maps.parts import End, street
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Node = tuple[int, int]
+"""Column and row of a junction."""
+
+COUNT = 24
+"""Towns that have a name."""
+STYLES = ("lights", "none", "signs", "mixed")
+"""How junctions are ruled: each second of the unruled ones is wide."""
+EAST, NORTH, WEST, SOUTH = range(4)
+
+
+@dataclass(frozen=True)
+class VariedGrid:
+    """Layout of a town.
+
+    Attributes
+    ----------
+    columns, rows
+        Metres from the first street to each, from west to east and from south to north.
+    lanes, speeds
+        Lanes each way and limit (km/h) of each column, then of each row.
+    reach
+        Metres from the middle of a junction to the end of its arms, without what lanes add.
+    style
+        One of :data:`STYLES`.
+    closed
+        Streets between two junctions that are not there.
+    """
+
+    columns: tuple[float, ...]
+    rows: tuple[float, ...]
+    lanes: tuple[int, ...]
+    speeds: tuple[int, ...]
+    reach: float
+    style: str
+    closed: frozenset[tuple[Node, int]]
+
+    def line(self, node: Node, direction: int) -> int:
+        """Place of a street through a node in ``lanes`` and ``speeds``."""
+        return node[0] if direction % 2 else len(self.columns) + node[1]
+
+    def room(self, node: Node) -> float:
+        """Metres from the middle of a junction to the end of its arms."""
+        most = max(self.lanes[self.line(node, EAST)], self.lanes[self.line(node, NORTH)])
+        return self.reach + 4.0 * (most - 1)
+
+    def place(self, node: Node) -> Pose:
+        """Middle of a junction, looking east."""
+        return Pose(self.columns[node[0]], self.rows[node[1]], 0.0)
+
+
+def varied_town(name: str) -> Builder:
+    """Town whose seed is the number at the end of its name."""
+    seed = int(name.rpartition("_")[2])
+    rng = random.Random(f"varied town {seed}")
+    grid = _drawn(rng, seed)
+    builder = Builder(name)
+    nodes = [(i, j) for i in range(len(grid.columns)) for j in range(len(grid.rows))]
+    arms: dict[Node, dict[int, End]] = {node: {} for node in nodes}
+    for node in nodes:
+        for direction, other in ((EAST, (node[0] + 1, node[1])), (NORTH, (node[0], node[1] + 1))):
+            if other in arms and (node, direction) not in grid.closed:
+                _street(builder, grid, arms, node, other, direction)
+    for node in nodes:
+        _stubs(builder, grid, arms, node)
+        _junction(builder, grid, node, arms[node], rng)
+    return builder
+
+
+def _drawn(rng: random.Random, seed: int) -> VariedGrid:
+    columns, rows = rng.randint(3, 5), rng.randint(3, 5)
+    long = rng.choice((90.0, 130.0, 200.0))
+    style = STYLES[seed % len(STYLES)]
+    wide = style in ("none", "mixed") and seed % 8 >= 4
+    lanes, speeds = [], []
+    for _ in range(columns + rows):
+        lanes.append(2 if rng.random() < (0.6 if wide else 0.35) else 1)
+        fast = rng.random() < (0.5 if wide else 0.25)
+        speeds.append(rng.choice((70, 90, 100) if fast else (30, 40, 50, 50)))
+    inner = [
+        ((i, j), direction)
+        for i in range(columns)
+        for j in range(rows)
+        for direction in (EAST, NORTH)
+        if (0 < j < rows - 1 if direction == EAST else 0 < i < columns - 1)
+    ]
+    return VariedGrid(
+        _offsets(rng, columns, long),
+        _offsets(rng, rows, long),
+        tuple(lanes),
+        tuple(speeds),
+        rng.uniform(20.0, 28.0) if wide else rng.uniform(13.0, 17.0),
+        style,
+        _closed(rng, inner),
+    )
+
+
+def _closed(rng: random.Random, streets: Sequence[tuple[Node, int]]) -> frozenset[tuple[Node, int]]:
+    """Some of the streets, no two of which meet."""
+    found, used = [], set[Node]()
+    for (i, j), direction in rng.sample(streets, k=len(streets) // 6):
+        ends = {(i, j), (i + 1, j) if direction == EAST else (i, j + 1)}
+        if not ends & used:
+            found.append(((i, j), direction))
+            used |= ends
+    return frozenset(found)
+
+
+def _offsets(rng: random.Random, count: int, long: float) -> tuple[float, ...]:
+    steps = [rng.uniform(0.75, 1.35) * long for _ in range(count - 1)]
+    return tuple(accumulate(steps, initial=0.0))
+
+
+def _street(
+    builder: Builder,
+    grid: VariedGrid,
+    arms: dict[Node, dict[int, End]],
+    node: Node,
+    other: Node,
+    direction: int,
+) -> None:
+    """Add the street from ``node`` to its neighbour in the east or north."""
+    here, there = grid.place(node), grid.place(other)
+    length = math.hypot(there.x - here.x, there.y - here.y) - grid.room(node) - grid.room(other)
+    line = grid.line(node, direction)
+    record = builder.road(
+        here.turned(direction * math.pi / 2).ahead(grid.room(node)),
+        [xodr.Line(length)],
+        street(grid.lanes[line]),
+        speed=float(grid.speeds[line]),
+        name=f"Street {line + 1}",
+    )
+    arms[node][direction] = End(record, "start")
+    arms[other][direction + 2] = End(record, "end")
+
+
+def _stubs(
+    builder: Builder, grid: VariedGrid, arms: dict[Node, dict[int, End]], node: Node
+) -> None:
+    """Open ends of streets at every second node of the border, and where a corner needs one."""
+    i, j = node
+    outwards = [
+        direction
+        for direction, at_border in (
+            (EAST, i == len(grid.columns) - 1), (NORTH, j == len(grid.rows) - 1),
+            (WEST, i == 0), (SOUTH, j == 0),
+        )
+        if at_border
+    ]  # fmt: skip
+    needed = max(3 - len(arms[node]), int(len(outwards) == 1 and (i + j) % 2 == 0))
+    for direction in outwards[: max(needed, 0)]:
+        line = grid.line(node, direction)
+        here = grid.place(node).turned(direction * math.pi / 2).ahead(grid.room(node))
+        record = builder.road(
+            here, [xodr.Line(80.0)], street(grid.lanes[line]), speed=float(grid.speeds[line]),
+            name=f"Street {line + 1}",
+        )  # fmt: skip
+        arms[node][direction] = End(record, "start")
+
+
+def _junction(
+    builder: Builder, grid: VariedGrid, node: Node, arms: dict[int, End], rng: random.Random
+) -> None:
+    directions = sorted(arms)
+    ends = [arms[direction] for direction in directions]
+    narrow = all(grid.lanes[grid.line(node, direction)] == 1 for direction in directions)
+    if grid.style == "signs" and narrow and grid.room(node) > roundabout.REACH:
+        roundabout.roundabout_arms(builder, grid.place(node), arms)
+        return
+    style = (
+        rng.choice(("lights", "lights", "none", "signs")) if grid.style == "mixed" else (grid.style)
+    )
+    control, major = style, list[int]()
+    if style == "signs":
+        control, major = rng.choice(("yield", "stop")), _major(grid, node, directions)
+    crossing(builder, ends, control=control, major=major, speed=rng.choice((30.0, 50.0)))
+
+
+def _major(grid: VariedGrid, node: Node, directions: Sequence[int]) -> list[int]:
+    """Positions of the arms of the larger street."""
+    column, row = grid.line(node, NORTH), grid.line(node, EAST)
+    along = (grid.lanes[column], grid.speeds[column]) > (grid.lanes[row], grid.speeds[row])
+    found = [k for k, one in enumerate(directions) if one % 2 == int(along)]
+    return found if 0 < len(found) < len(directions) else [0]
