@@ -52,11 +52,13 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const handle = useRef<MapHandle | null>(null);
   // What the address kept when the run was opened.
   const [linked] = useState(() => parseKept(location.hash));
-  const { info, failure, learn } = useRun(run);
+  const { info, failure, lost, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
   const picture = usePicture(handle);
   const { show, redraw, clear, follow, followed, latest, now } = picture;
   const ended = info !== null && hasEnded(info.state);
+  const over = useRef(ended);
+  over.current = ended;
   const complete = ended && info.summary != null;
   const [crowd, setCrowd] = useState<Crowd | null>(null);
   // A run that has ended is opened as its recording; one that was watched keeps its last picture.
@@ -94,6 +96,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
       onLights: (changed) => learnLights(changed, latest()?.frame.time ?? 0),
       onDetectors: learnDetectors,
       onState: learn,
+      hasEnded: () => over.current,
     });
     return () => live.close();
   }, [run, mode, show, add, learn, learnTtc, learnLights, learnDetectors, latest]);
@@ -196,7 +199,13 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               label={mode === "replay" ? "Recording of the run" : "Live view of the run"}
               onPick={pick}
             >
-              <RunHint info={info} planned={crowd !== null} followed={followed} there={now.there} />
+              <RunHint
+                info={info}
+                lost={lost}
+                planned={crowd !== null}
+                followed={followed}
+                there={now.there}
+              />
               <Legend
                 categories={kinds}
                 ego={(known?.egos().length ?? 0) > 0}
