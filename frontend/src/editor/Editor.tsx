@@ -67,6 +67,7 @@ export function Editor({
   const openTour = useCallback(() => setTour(true), []);
   const { handle } = now;
   const picture = useCallback(() => handle.current?.picture() ?? null, [handle]);
+  const vector = useCallback(() => handle.current?.vector() ?? null, [handle]);
   const closeTour = (): void => {
     tourSeen();
     setTour(false);
@@ -126,7 +127,14 @@ export function Editor({
   });
   return (
     <div className="editor">
-      <HeadTools store={store} onFind={openFinding} onHelp={openHelp} onTour={openTour} onPicture={picture} />
+      <HeadTools
+        store={store}
+        onFind={openFinding}
+        onHelp={openHelp}
+        onTour={openTour}
+        onPicture={picture}
+        onVector={vector}
+      />
       <div className="side">
         <EditorSteps store={store} now={now} drawing={drawing} assets={assets} />
         <Problems problems={now.problems} graph={now.graph} onShow={now.showProblem} />
