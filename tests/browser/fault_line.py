@@ -45,9 +45,10 @@ class FaultLine:
         """Let new connections through."""
         self.whole = True
 
-    def restart(self) -> None:
-        """Kill the server, and start another one on the same workspace."""
-        self.server.process.kill()
+    def restart(self, *, by_force: bool = False) -> None:
+        """End the server, and start another one on the same workspace."""
+        if by_force:
+            self.server.process.kill()
         self._servers.close()
         self._start()
 

@@ -21,7 +21,7 @@ from odscen.scenario.document.json_form import dumps
 from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.fault_line import FaultLine
-from tests.browser.pages import FAILED, OdscenPage
+from tests.browser.pages import OdscenPage
 from tests.signal_case import JUNCTION
 
 OUTSIDE = "r4"
@@ -248,7 +248,7 @@ def test_a_server_that_is_killed_and_started_again_takes_nothing_away(
 ) -> None:
     before = editor.document()
     work.begin(editor)
-    line.restart()
+    line.restart(by_force=True)
     with editor.changing():
         work.finish(editor)
     kept(before, editor.document(), work)
@@ -331,8 +331,12 @@ def second_window(user: OdscenPage, line: FaultLine, open_page: Callable[..., Od
     other.page.close()
 
 
-def killed_server(_user: OdscenPage, line: FaultLine, _open: object) -> None:
+def restarted_server(_user: OdscenPage, line: FaultLine, _open: object) -> None:
     line.restart()
+
+
+def killed_server(_user: OdscenPage, line: FaultLine, _open: object) -> None:
+    line.restart(by_force=True)
 
 
 def lost_connection(user: OdscenPage, line: FaultLine, _open: object) -> None:
@@ -354,7 +358,15 @@ def back_button(user: OdscenPage, _line: FaultLine, _open: object) -> None:
 
 
 FAULTS = pytest.mark.parametrize(
-    "fault", [second_window, killed_server, lost_connection, removed_map, back_button]
+    "fault",
+    [
+        second_window,
+        restarted_server,
+        killed_server,
+        lost_connection,
+        removed_map,
+        back_button,
+    ],
 )
 
 
@@ -371,9 +383,13 @@ def test_a_run_that_is_watched_goes_on_or_says_how_it_ended(
     editor.wait_until_moving()
     fault(editor, line, open_page)
     if fault is killed_server:
-        expect(editor.result).to_contain_text(FAILED)
+        expect(editor.page.get_by_role("heading", level=1)).to_have_text("This run is gone")
+        editor.page.get_by_role("button", name="Run again").click()
+    if fault is restarted_server:
+        expect(editor.result).to_contain_text("stopped")
     else:
         goes_on(editor)
+        run = editor.page.url.partition("?")[0].rsplit("/", 1)[1]
         editor.control("Stop").click()
         expect(editor.result).to_contain_text("stopped")
     assert editor.document() == before

@@ -183,9 +183,7 @@ export function createEditorStore(name: string): EditorStore {
       const moves = pending.every((one) => one.step !== 0);
       const steps = pending.reduce<number>((sum, one) => sum + one.step, step);
       const there = moves ? timeline.look(steps) : null;
-      // What may be added to a region is asked of the server, which has to know the region by then.
-      const foresee: Pending["foresee"] = ({ roi }) => (there?.roi === roi ? there : null);
-      return send({ step, foresee }, call);
+      return send({ step, foresee: () => there }, call);
     };
     const ask: Ask<ScenarioState> = (call) => send({ ...UNKNOWN }, call);
     const take = async (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState> => {

@@ -1,6 +1,6 @@
 import "./run.css";
 
-import { Alert, Button, Loader, Tabs, Title } from "@mantine/core";
+import { Loader, Tabs } from "@mantine/core";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { FitRow } from "../api/runs";
@@ -31,6 +31,7 @@ import { Plots } from "./Plots";
 import { Result } from "./Result";
 import { RoadUsers } from "./RoadUsers";
 import { MapTools } from "./MapTools";
+import { RunGone } from "./RunGone";
 import { RunHint } from "./RunHint";
 import { ShareMenu } from "./ShareMenu";
 import { SpeedChart } from "./SpeedChart";
@@ -166,19 +167,8 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   };
   const back = (): void => go({ view: "editor", scenario });
   const wrong = failure ?? ground.failure;
-  if (wrong) {
-    return (
-      <div className="catalogue">
-        <Title order={1} size="h3" mb="sm">
-          This run cannot be shown
-        </Title>
-        <Alert color="red">{wrong}</Alert>
-        <Button mt="md" onClick={back}>
-          Back to the editor
-        </Button>
-      </div>
-    );
-  }
+  if (wrong)
+    return <RunGone scenario={scenario} reason={wrong} watched={info !== null && failure !== null} />;
   if (!info)
     return (
       <div className="empty">
