@@ -1,5 +1,6 @@
 import "@mantine/core/styles.css";
 import "./ui/app.css";
+import "./ui/narrow.css";
 
 import { MantineProvider } from "@mantine/core";
 import { createRoot } from "react-dom/client";

@@ -8,6 +8,7 @@ import { theme } from "../src/ui/theme";
 
 afterEach(() => {
   cleanup();
+  sessionStorage.clear();
   vi.unstubAllGlobals();
 });
 

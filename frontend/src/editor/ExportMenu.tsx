@@ -5,7 +5,7 @@ import { api } from "../api/client";
 import { ExportDialog } from "../exchange/ExportDialog";
 import { type Format, FORMATS } from "../exchange/formats";
 import { IconDown } from "../ui/icons";
-import { copyLink, savePicture } from "../ui/share";
+import { copyLink, savePicture, saveVector } from "../ui/share";
 
 const DIALOGS: Format[] = ["openscenario", "sumo"];
 
@@ -13,10 +13,13 @@ const DIALOGS: Format[] = ["openscenario", "sumo"];
 export function ExportMenu({
   name,
   onPicture,
+  onVector,
 }: {
   name: string;
   /** What the map shows now. */
   onPicture: () => HTMLCanvasElement | null;
+  /** The same as SVG. */
+  onVector: () => string | null;
 }) {
   const [format, setFormat] = useState<Format | null>(null);
   return (
@@ -49,6 +52,14 @@ export function ExportMenu({
             }}
           >
             Picture of the map (PNG)
+          </Menu.Item>
+          <Menu.Item
+            onClick={() => {
+              const svg = onVector();
+              if (svg) saveVector(svg, name);
+            }}
+          >
+            Drawing of the map (SVG)
           </Menu.Item>
           <Menu.Item onClick={() => print()}>Print</Menu.Item>
         </Menu.Dropdown>

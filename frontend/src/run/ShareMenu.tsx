@@ -3,7 +3,7 @@ import { type RefObject, useEffect, useRef, useState } from "react";
 
 import type { MapHandle } from "../map/MapCanvas";
 import { tell, tellError } from "../ui/notices";
-import { copyLink, record, type Recording, saveFile, savePicture } from "../ui/share";
+import { copyLink, record, type Recording, saveFile, savePicture, saveVector } from "../ui/share";
 import { IconDown } from "../ui/icons";
 
 /** Takes away what is seen of a run: a link, a picture, a video, paper. */
@@ -67,6 +67,14 @@ export function ShareMenu({
           }}
         >
           Picture of the map (PNG)
+        </Menu.Item>
+        <Menu.Item
+          onClick={() => {
+            const svg = handle.current?.vector();
+            if (svg) saveVector(svg, run);
+          }}
+        >
+          Drawing of the map (SVG)
         </Menu.Item>
         <Menu.Item onClick={begin}>Video of the map (WebM)</Menu.Item>
         <Menu.Item onClick={() => print()}>Print</Menu.Item>
