@@ -1,6 +1,6 @@
 """``python -m tools.make_maps [--only NAME] [-o DIR]``: write the maps that ship.
 
-``large_town``, ``towns_10``, ``towns_100`` and those of ``varied_town_NN`` are written only when named.
+Others, such as ``large_town`` and ``varied_town_07``, are written only when they are named.
 """
 
 from __future__ import annotations
