@@ -1,4 +1,6 @@
 import { Button, Stack, Text, TextInput } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import type { Edit, ScenarioDocument } from "../api/types";
@@ -46,9 +48,9 @@ export function TrafficStep({
   return (
     <>
       <TextInput
-        label="Time of day at the start"
-        placeholder="Not set: times count from the start"
-        error={wrongClock && "Hours and minutes, such as 07:30 or 17:15"}
+        label={t`Time of day at the start`}
+        placeholder={t`Not set: times count from the start`}
+        error={wrongClock && t`Hours and minutes, such as 07:30 or 17:15`}
         key={demand.clock}
         defaultValue={demand.clock ? timeOfDay(demand.clock) : ""}
         onBlur={(event) => setClock(event.currentTarget.value)}
@@ -103,10 +105,10 @@ export function TrafficStep({
             onEdit({ kind: "set_background", background: freeName(demand, "background"), per_km: 5 })
           }
         >
-          Add background traffic
+          <Trans>Add background traffic</Trans>
         </Button>
         <Button variant="default" aria-expanded={adding === "input"} onClick={() => toggle("input")}>
-          Add vehicles from outside
+          <Trans>Add vehicles from outside</Trans>
         </Button>
         {adding === "input" && (
           <NewInput
@@ -120,17 +122,17 @@ export function TrafficStep({
           />
         )}
         <Button variant="default" aria-expanded={adding === "day"} onClick={() => toggle("day")}>
-          Whole day on the whole map
+          <Trans>Whole day on the whole map</Trans>
         </Button>
         {adding === "day" && <WholeDay store={store} onDone={() => setAdding(null)} />}
         <Button variant="default" aria-expanded={adding === "table"} onClick={() => toggle("table")}>
-          Import a table
+          <Trans>Import a table</Trans>
         </Button>
         {adding === "table" && <TableForm store={store} demand={demand} roads={roads} />}
       </Stack>
       <ProfileList profiles={profiles} own={demand.profiles.map(({ id }) => id)} onRemove={remove} />
       <Text size="xs" c="dimmed">
-        Road users that were placed by hand keep their start and departure.
+        <Trans>Road users that were placed by hand keep their start and departure.</Trans>
       </Text>
     </>
   );

@@ -1,3 +1,4 @@
+import { t } from "@lingui/core/macro";
 import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
@@ -189,9 +190,9 @@ export function createEditorStore(name: string): EditorStore {
         set({ saving: "saved" });
         if (!(error instanceof ApiError) || error.status !== 409) throw error;
         await get().load();
-        throw new Error("The scenario was changed in another tab. You now see its newest state; try again.");
+        throw new Error(t`The scenario was changed in another tab. You now see its newest state; try again.`);
       });
-      if (!found) throw new Error("The scenario is not loaded yet.");
+      if (!found) throw new Error(t`The scenario is not loaded yet.`);
       return found;
     };
     const refused = async (error: unknown, again: Refusal["again"]): Promise<void> => {
@@ -203,15 +204,15 @@ export function createEditorStore(name: string): EditorStore {
         } catch (failure) {
           set({
             saving: "failed",
-            refusal: { title: "The scenario cannot be read", message: reasonOf(failure), again },
+            refusal: { title: t`The scenario cannot be read`, message: reasonOf(failure), again },
           });
           return;
         }
-        const title = "Changed in another tab";
+        const title = t`Changed in another tab`;
         set({
           refusal: {
             title,
-            message: "You now see the newest state without your last change, which you can apply again.",
+            message: t`You now see the newest state without your last change, which you can apply again.`,
             again,
           },
         });
@@ -221,7 +222,7 @@ export function createEditorStore(name: string): EditorStore {
       set({
         saving: failed ? "failed" : "saved",
         refusal: {
-          title: failed ? "Your last change is not saved" : "That is not possible",
+          title: failed ? t`Your last change is not saved` : t`That is not possible`,
           message,
           again: failed ? again : null,
         },

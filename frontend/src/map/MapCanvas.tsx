@@ -1,4 +1,5 @@
 import { ActionIcon, Tooltip, useComputedColorScheme } from "@mantine/core";
+import { t } from "@lingui/core/macro";
 import {
   type KeyboardEvent,
   memo,
@@ -12,6 +13,7 @@ import {
   useState,
 } from "react";
 
+import { localized } from "../language/localized";
 import type { Bounds } from "../api/types";
 import type { Head } from "../signals/heads";
 import { type Area, inBounds, inRing } from "./areas";
@@ -80,7 +82,9 @@ interface Drag {
   line: readonly Pixels[];
 }
 
-const KEYS = "Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.";
+const KEYS = localized(
+  () => t`Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`,
+);
 const CLICK_SLACK = 4;
 const TOUCH = 14;
 
@@ -263,7 +267,7 @@ export function MapCanvas({
       data-view={`${shown.x} ${shown.y} ${shown.scale}`}
       role="application"
       tabIndex={0}
-      aria-label={`${label}. ${KEYS}`}
+      aria-label={`${label}. ${KEYS()}`}
       onKeyDown={onKeyDown}
       onBlur={() => setCrosshair(false)}
       onPointerDown={(event) => {
@@ -340,7 +344,7 @@ export function MapCanvas({
         <MapButtons onZoom={zoom} onAll={showAll} />
       </div>
       <div className="map-scale" aria-hidden="true" style={{ width: bar * shown.scale }}>
-        {bar >= 1000 ? `${bar / 1000} km` : `${bar} m`}
+        {bar >= 1000 ? t`${bar / 1000} km` : t`${bar} m`}
       </div>
       {children}
     </div>
@@ -372,13 +376,13 @@ const MapButtons = memo(function MapButtons({
 }) {
   return (
     <div className="map-buttons">
-      <MapButton label="Zoom in" onClick={() => onZoom(1.5)}>
+      <MapButton label={t`Zoom in`} onClick={() => onZoom(1.5)}>
         <IconPlus />
       </MapButton>
-      <MapButton label="Zoom out" onClick={() => onZoom(1 / 1.5)}>
+      <MapButton label={t`Zoom out`} onClick={() => onZoom(1 / 1.5)}>
         <IconMinus />
       </MapButton>
-      <MapButton label="Show the whole map" onClick={onAll}>
+      <MapButton label={t`Show the whole map`} onClick={onAll}>
         <IconFit />
       </MapButton>
     </div>

@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useId } from "react";
 
 import { nth } from "../lists";
@@ -106,7 +108,9 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
       )}
       <p>{children}</p>
       <details>
-        <summary>{title} in numbers</summary>
+        <summary>
+          <Trans>{title} in numbers</Trans>
+        </summary>
         <Numbers title={title} xLabel={xLabel} yLabel={yLabel} x={x} series={series} bars={bars} />
       </details>
     </figure>
@@ -130,7 +134,7 @@ function Numbers({
 }) {
   const rows = x.slice(0, series[0]?.values.length).map((_, k) => k);
   return (
-    <table aria-label={`${title} in numbers`} style={{ width: "100%", fontSize: 12.5, textAlign: "right" }}>
+    <table aria-label={t`${title} in numbers`} style={{ width: "100%", fontSize: 12.5, textAlign: "right" }}>
       <thead>
         <tr>
           <th scope="col">{xLabel}</th>
@@ -145,7 +149,7 @@ function Numbers({
         {(bars ? rows : thinned(rows, ROWS)).map((k) => (
           <tr key={k}>
             <th scope="row" style={{ fontWeight: 400 }}>
-              {bars ? `${round(nth(x, k))} to ${round(nth(x, k + 1))}` : round(nth(x, k))}
+              {bars ? t`${round(nth(x, k))} to ${round(nth(x, k + 1))}` : round(nth(x, k))}
             </th>
             {series.map((one) => (
               <td key={one.name}>{said(one.values[k])}</td>

@@ -1,5 +1,7 @@
 import { Text } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import { MARK_COLOR } from "../map/colors";
@@ -24,9 +26,8 @@ export function IncidentLog({
     return (
       <Text size="sm" c="dimmed">
         {over
-          ? "There were no incidents."
-          : "No incidents so far. Collisions, emergency braking and teleported vehicles " +
-            "(removed after waiting too long) appear here."}
+          ? t`There were no incidents.`
+          : t`No incidents so far. Collisions, emergency braking and teleported vehicles (removed after waiting too long) appear here.`}
       </Text>
     );
   }
@@ -34,9 +35,9 @@ export function IncidentLog({
   return (
     <>
       <Text size="sm" c="dimmed">
-        Choose one to see where it happened.
+        <Trans>Choose one to see where it happened.</Trans>
       </Text>
-      <ul className="rows" aria-label="Incidents">
+      <ul className="rows" aria-label={t`Incidents`}>
         {listed.map((one, n) => (
           <li key={incidents.length - n}>
             <button type="button" onClick={() => onShow(one)}>
@@ -49,7 +50,7 @@ export function IncidentLog({
       </ul>
       {incidents.length > LISTED && (
         <Text size="sm" c="dimmed" mt="xs">
-          {(incidents.length - LISTED).toLocaleString("en")} earlier ones are in the report.
+          <Trans>{(incidents.length - LISTED).toLocaleString("en")} earlier ones are in the report.</Trans>
         </Text>
       )}
     </>

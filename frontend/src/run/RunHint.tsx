@@ -1,5 +1,6 @@
 import { Loader } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
 import type { RunInfo } from "../api/runs";
 
 /** What is said on the map of a run: how its preparation goes, or who is followed. */
@@ -22,8 +23,8 @@ export function RunHint({
         <span className="waiting">
           <Loader size={16} aria-hidden="true" />
           {planned
-            ? "Preparing, step 2 of 2: starting the simulation …"
-            : `Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
+            ? t`Preparing, step 2 of 2: starting the simulation …`
+            : t`Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
         </span>
       </div>
     );
@@ -31,8 +32,8 @@ export function RunHint({
   return (
     <div className="map-hint" role="status">
       {there
-        ? `Following ${followed}. Click on the empty map to stop.`
-        : `${followed} is not on the road now.`}
+        ? t`Following ${followed}. Click on the empty map to stop.`
+        : t`${followed} is not on the road now.`}
     </div>
   );
 }

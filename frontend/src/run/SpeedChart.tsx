@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
 import { nth } from "../lists";
 import { clock, kmh } from "../ui/words";
 
@@ -47,18 +50,20 @@ export function SpeedChart({
   const toY = (speed: number): number => TOP + (1 - speed / most) * (HEIGHT - TOP - BOTTOM);
   const now = points.findLast((one) => one.time <= time + 1e-6);
   const there = now !== undefined && time - now.time <= gap;
-  const words = there ? kmh(now.speed) : "not on the road";
+  const words = there ? kmh(now.speed) : t`not on the road`;
   return (
     <figure className="speed-chart">
       <figcaption>
-        Speed of {name}: <b>{words}</b>
+        <Trans>
+          Speed of {name}: <b>{words}</b>
+        </Trans>
       </figcaption>
       <svg
         viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
         width={WIDTH}
         height={HEIGHT}
         role="img"
-        aria-label={`Speed of ${name} from ${clock(begin)} to ${clock(end)}, at most ${kmh(most)}`}
+        aria-label={t`Speed of ${name} from ${clock(begin)} to ${clock(end)}, at most ${kmh(most)}`}
       >
         <line className="speed-axis" x1={LEFT} x2={WIDTH - LEFT} y1={toY(0)} y2={toY(0)} />
         <line className="speed-axis" x1={LEFT} x2={WIDTH - LEFT} y1={TOP} y2={TOP} />

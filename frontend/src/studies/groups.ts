@@ -1,9 +1,11 @@
+import { t } from "@lingui/core/macro";
+
 import type { FigureGroup, StudyInfo } from "../api/studies";
 
 /** What the command line and the files call a scenario without edits. */
 const AS_DESIGNED = "as-designed";
 
-export const variantWord = (variant: string): string => (variant === AS_DESIGNED ? "as designed" : variant);
+export const variantWord = (variant: string): string => (variant === AS_DESIGNED ? t`as designed` : variant);
 
 /** `12.4 ± 0.3`, or the one value, or a dash. */
 export function meanWord({ mean, half_width: half, values }: FigureGroup): string {
@@ -25,9 +27,9 @@ export function rounded(value: number, by = value): string {
 
 /** How far a study is, in a few words. */
 export function outcomeWord({ state, runs, ended, completed }: StudyInfo): string {
-  const far = `${ended.toLocaleString("en")} of ${runs.toLocaleString("en")} runs`;
+  const far = t`${ended.toLocaleString("en")} of ${runs.toLocaleString("en")} runs`;
   if (state !== "done") return `${state}, ${far}`;
   return completed === runs
-    ? "all runs completed"
-    : `${(runs - completed).toLocaleString("en")} of ${runs.toLocaleString("en")} runs failed`;
+    ? t`all runs completed`
+    : t`${(runs - completed).toLocaleString("en")} of ${runs.toLocaleString("en")} runs failed`;
 }
