@@ -7,9 +7,12 @@ import {
   useMantineColorScheme,
 } from "@mantine/core";
 import { t } from "@lingui/core/macro";
+import { useLingui } from "@lingui/react";
 import { Trans } from "@lingui/react/macro";
 import { lazy, Suspense } from "react";
 
+import { PreferencesButton } from "./language/PreferencesButton";
+import { usePreferences } from "./language/preferences";
 import { IconMoon, IconSun } from "./ui/icons";
 import { NoticeList } from "./ui/notices";
 import { hashOf, useAddress } from "./ui/address";
@@ -33,6 +36,8 @@ export function App() {
   const address = useAddress();
   const title = useTitle("scenario" in address ? address.scenario : "");
   const { setColorScheme } = useMantineColorScheme();
+  const { i18n } = useLingui();
+  const { speed, length, hours } = usePreferences();
   const dark = useComputedColorScheme("light") === "dark";
   const toggle = dark ? t`Use light colours` : t`Use dark colours`;
   return (
@@ -127,6 +132,7 @@ export function App() {
           )}
         </nav>
         <div id="head-slot" className="head-slot" />
+        <PreferencesButton />
         <Tooltip label={toggle}>
           <ActionIcon
             variant="subtle"
@@ -140,7 +146,8 @@ export function App() {
         </Tooltip>
       </header>
       <main id="main" tabIndex={-1} className="main">
-        <Suspense fallback={<Loader m="xl" aria-label={t`Loading the page`} />}>
+        {/* A view begins anew in another language or unit; what it had is saved. */}
+        <Suspense key={`${i18n.locale} ${speed} ${length} ${hours}`} fallback={<Loader m="xl" aria-label={t`Loading the page`} />}>
           {address.view === "catalogue" && <CatalogueView />}
           {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}
           {address.view === "imported" && <ImportView key={address.scenario} scenario={address.scenario} />}

@@ -17,7 +17,7 @@ afterEach(() => {
 export function show(part: ReactNode): { user: UserEvent; again: (part: ReactNode) => void } {
   const whole = (inner: ReactNode) => (
     <I18nProvider i18n={i18n}>
-      <MantineProvider theme={theme} env="test">
+      <MantineProvider theme={theme()} env="test">
         {inner}
       </MantineProvider>
     </I18nProvider>

@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { Alert, Anchor, Loader, Modal, Text, Title } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
@@ -87,7 +88,7 @@ function Found({ finding: { text, places } }: { finding: Finding }) {
       {text}
       <details>
         <summary style={{ cursor: "pointer", fontSize: 13 }}>
-          <Trans>{places.length.toLocaleString("en")} places</Trans>
+          <Trans>{places.length.toLocaleString(i18n.locale)} places</Trans>
         </summary>
         <Text size="sm" c="dimmed">
           {places.slice(0, NAMED).join("; ")}

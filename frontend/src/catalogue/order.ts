@@ -1,5 +1,6 @@
 import { t } from "@lingui/core/macro";
 
+import { roughLength } from "../language/units";
 import { localized } from "../language/localized";
 import type { MapInfo } from "../api/types";
 
@@ -35,12 +36,12 @@ export const WISHES = localized((): { value: Wish; label: string; has: (map: Map
   { value: "left", label: t`Left-hand traffic`, has: ({ statistics }) => statistics.rule === "LHT" },
   {
     value: "small",
-    label: t`Small (up to 3 km of lanes)`,
+    label: t`Small (up to ${roughLength(3000)} of lanes)`,
     has: ({ statistics }) => statistics.driving_lane_length <= SMALL,
   },
   {
     value: "large",
-    label: t`Large (from 15 km of lanes)`,
+    label: t`Large (from ${roughLength(15_000)} of lanes)`,
     has: ({ statistics }) => statistics.driving_lane_length >= LARGE,
   },
 ]);

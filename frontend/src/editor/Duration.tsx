@@ -2,6 +2,7 @@ import { Group, NumberInput, Select } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 
+import { parsed } from "../language/numbers";
 import { localized } from "../language/localized";
 
 const UNITS = localized(() => [
@@ -26,7 +27,7 @@ export function Duration({
 }) {
   const [unit, setUnit] = useState(unitOf(seconds));
   const commit = (text: string): void => {
-    const value = Math.round(Number.parseFloat(text) * unit * 1000) / 1000;
+    const value = Math.round(parsed(text) * unit * 1000) / 1000;
     if (value > 0 && value !== seconds) onCommit(value);
   };
   return (

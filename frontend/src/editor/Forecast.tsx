@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { Alert, Button, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
@@ -50,7 +51,7 @@ export function Forecast({ wish, version }: { wish: RunWish; version: number }) 
           <Text size="sm">
             <Trans>
               <Plural value={found.planned} one="# road user" other="# road users" /> in total,{" "}
-              {found.running.toLocaleString("en")} on the road at the same time.
+              {found.running.toLocaleString(i18n.locale)} on the road at the same time.
             </Trans>
           </Text>
           <Text size="sm">

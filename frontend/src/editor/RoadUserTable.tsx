@@ -3,11 +3,12 @@ import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { type KeyboardEvent, memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 
+import { speedText } from "../language/units";
 import { localized } from "../language/localized";
 import { type Actor, CATEGORIES, type Flow } from "../api/types";
 import type { Graph } from "../map/graph";
 import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
-import { inSentence, CATEGORY_WORD, flowWord, kmh, modelWord, styleWord } from "../ui/words";
+import { inSentence, CATEGORY_WORD, flowWord, modelWord, styleWord } from "../ui/words";
 import { placeWord } from "./placeWords";
 import { isFlow } from "./placing";
 import { rowsInSight } from "./windowed";
@@ -287,6 +288,6 @@ function kindWord(one: Actor | Flow): string {
 }
 
 function speedWord(one: Actor | Flow): string {
-  if (one.speed !== null) return kmh(one.speed);
+  if (one.speed !== null) return speedText(one.speed);
   return walks(one) ? t`default` : t`speed limit`;
 }

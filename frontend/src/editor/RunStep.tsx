@@ -168,7 +168,7 @@ export function RunStep({
         disabled={blocked || empty}
         onClick={() => onRun(wish)}
       >
-        <Trans>Run</Trans>
+        <Trans context="button">Run</Trans>
       </Button>
     </>
   );

@@ -3,10 +3,11 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { parsedDayTime, dayTime } from "../language/units";
 import type { Edit, ScenarioDocument } from "../api/types";
 import { BackgroundForm } from "./BackgroundForm";
 import { InputForm, NewInput } from "./InputForm";
-import { bringsTraffic, freeName, secondsOfDay, timeOfDay } from "./demand";
+import { bringsTraffic, freeName } from "./demand";
 import { CountsList, MatrixForm, ProfileList, ZoneList } from "./DemandParts";
 import type { Profiles } from "./DayProfiles";
 import { ParkingForm } from "./ParkingForm";
@@ -39,7 +40,7 @@ export function TrafficStep({
   const [wrongClock, setWrongClock] = useState(false);
   const remove = (part: string): void => onEdit({ kind: "remove_demand", part });
   const setClock = (text: string): void => {
-    const clock = text.trim() ? secondsOfDay(text.trim()) : 0;
+    const clock = text.trim() ? parsedDayTime(text) : 0;
     setWrongClock(clock === null);
     if (clock !== null && Math.floor(clock / 60) !== Math.floor(demand.clock / 60))
       onEdit({ kind: "set_clock", clock });
@@ -50,9 +51,9 @@ export function TrafficStep({
       <TextInput
         label={t`Time of day at the start`}
         placeholder={t`Not set: times count from the start`}
-        error={wrongClock && t`Hours and minutes, such as 07:30 or 17:15`}
+        error={wrongClock && t`Hours and minutes, such as ${dayTime(27_000)} or ${dayTime(62_100)}`}
         key={demand.clock}
-        defaultValue={demand.clock ? timeOfDay(demand.clock) : ""}
+        defaultValue={demand.clock ? dayTime(demand.clock) : ""}
         onBlur={(event) => setClock(event.currentTarget.value)}
         onKeyDown={(event) => {
           if (event.key === "Enter") setClock(event.currentTarget.value);

@@ -1,8 +1,10 @@
+import { i18n } from "@lingui/core";
 import { Alert, Button, Checkbox, Group, NumberInput, SegmentedControl, Text } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { decimalSign } from "../language/numbers";
 import { localized } from "../language/localized";
 import { api } from "../api/client";
 import { demand } from "../api/demand";
@@ -34,7 +36,7 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
         return api.scenario(name);
       }
       const load = Math.round((100 * made.volume) / made.capacity);
-      const peak = Math.round(made.peak_trips).toLocaleString("en");
+      const peak = Math.round(made.peak_trips).toLocaleString(i18n.locale);
       tell(
         [
           t`${plural(Math.round(made.trips), { one: "# trip", other: "# trips" })}, ${peak} in the peak hour.`,
@@ -73,7 +75,7 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
         min={1}
         max={1e6}
         step={1000}
-        thousandSeparator=","
+        thousandSeparator={decimalSign() === "," ? "." : ","}
         allowDecimal={false}
         value={trips}
         onChange={(value) => setTrips(Number(value) || 1)}

@@ -1,5 +1,6 @@
 import { plural, t } from "@lingui/core/macro";
 
+import { dayTime } from "../language/units";
 import { localized } from "../language/localized";
 import type { Background, Demand, Matrix, Mix, TableKind } from "../api/demand";
 import { CATEGORIES } from "../api/types";
@@ -107,7 +108,7 @@ export function secondsOfDay(text: string): number | null {
 
 /** When traffic is highest and lowest. */
 export function peakWords(shares: readonly number[]): string {
-  const at = (n: number): string => timeOfDay((n * 86_400) / shares.length);
+  const at = (n: number): string => dayTime((n * 86_400) / shares.length);
   const [most, fewest] = [shares.indexOf(Math.max(...shares)), shares.indexOf(Math.min(...shares))];
   return t`most trips from ${at(most)}, fewest from ${at(fewest)}`;
 }

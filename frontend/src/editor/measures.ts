@@ -1,8 +1,9 @@
 import { plural, t } from "@lingui/core/macro";
 
+import { lengthText, speedText } from "../language/units";
 import { localized } from "../language/localized";
 import type { ScenarioDocument } from "../api/types";
-import { clock, kmh } from "../ui/words";
+import { clock } from "../ui/words";
 import type { PickBy, Picked } from "./pick";
 
 export type Measure = ScenarioDocument["measures"][number];
@@ -36,9 +37,9 @@ function detail(measure: Measure): string {
     case "closure":
       return where;
     case "incident":
-      return t`lane ${measure.lane} at s ${measure.s} m`;
+      return t`lane ${measure.lane} at s ${lengthText(measure.s)}`;
     case "speed_limit":
-      return `${kmh(measure.speed)}: ${where}`;
+      return `${speedText(measure.speed)}: ${where}`;
     case "permission":
       return measure.allowed.length > 0
         ? t`only ${measure.allowed.join(", ")}: ${where}`
@@ -48,8 +49,8 @@ function detail(measure: Measure): string {
     case "roadworks":
       return [
         measure.places.join(", "),
-        ...(measure.speed === null ? [] : [kmh(measure.speed)]),
-        ...(measure.width === null ? [] : [t`lanes ${measure.width} m wide`]),
+        ...(measure.speed === null ? [] : [speedText(measure.speed)]),
+        ...(measure.width === null ? [] : [t`lanes ${lengthText(measure.width, 2)} wide`]),
         ...(measure.closed_lanes.length > 0 ? [t`closed lanes ${measure.closed_lanes.join(", ")}`] : []),
       ].join(", ");
   }

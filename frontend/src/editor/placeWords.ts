@@ -1,9 +1,9 @@
 import { t } from "@lingui/core/macro";
 
+import { lengthText, speedText } from "../language/units";
 import { localized } from "../language/localized";
 import { nth } from "../lists";
 import type { Graph } from "../map/graph";
-import { kmh } from "../ui/words";
 
 /** A place in words: road, lane and metres along it. */
 export function placeWord(graph: Graph, id: string): string {
@@ -12,7 +12,7 @@ export function placeWord(graph: Graph, id: string): string {
   const [first] = graph.lanePlaces(place);
   const { columns } = graph;
   const metres = place.walk ? (place.index - first) * columns.spacing : nth(columns.s, place.index);
-  return t`${laneWord(graph, id)}, ${Math.round(metres)} m`;
+  return `${laneWord(graph, id)}, ${lengthText(metres)}`;
 }
 
 /** The lane of a place: `Road 4, right lane 1`. */
@@ -39,11 +39,11 @@ export function laneFacts(graph: Graph, id: string): string {
   const place = graph.place(id);
   if (!place) return "";
   const { columns } = graph;
-  if (place.walk) return t`Walkway, ${nth(columns.walks.width, place.index).toFixed(1)} m wide`;
+  if (place.walk) return t`Walkway, ${lengthText(nth(columns.walks.width, place.index), 1)} wide`;
   const kind = nth(columns.lane_types, nth(columns.lane, place.index));
-  const width = nth(columns.width, place.index).toFixed(1);
+  const width = lengthText(nth(columns.width, place.index), 1);
   const limit = nth(columns.speed_limit, place.index);
-  return t`${KIND()[kind] ?? t`Lane`}, ${width} m wide, ${limit === null ? t`no limit` : t`limit ${kmh(limit)}`}`;
+  return t`${KIND()[kind] ?? t`Lane`}, ${width} wide, ${limit === null ? t`no limit` : t`limit ${speedText(limit)}`}`;
 }
 
 const KIND = localized((): Record<string, string> => ({

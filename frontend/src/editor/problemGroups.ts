@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 
 import { localized } from "../language/localized";
@@ -32,7 +33,7 @@ export function grouped(problems: readonly Problem[], graph: Graph): ProblemGrou
 function titleOf(problems: readonly Problem[], graph: Graph): string {
   const [first] = problems;
   if (!first) return "";
-  const number = problems.length.toLocaleString("en");
+  const number = problems.length.toLocaleString(i18n.locale);
   const title = TITLE()[first.code];
   return title ? t`${number} times: ${title}` : t`${number} of a kind, the first: ${inWords(first, graph)}`;
 }

@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
@@ -124,7 +125,7 @@ function List({ title, notes }: { title: string; notes: readonly ExportNote[] })
   return (
     <section aria-label={title}>
       <Title order={3} size="h6" mt="sm">
-        {title}: {notes.length.toLocaleString("en")}
+        {title}: {notes.length.toLocaleString(i18n.locale)}
       </Title>
       <ul className="import-reasons" style={{ maxHeight: 260, overflow: "auto" }} tabIndex={0}>
         {[...reasons].slice(0, SHOWN).map(([reason, places]) => (

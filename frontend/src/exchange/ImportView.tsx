@@ -6,6 +6,7 @@ import "./exchange.css";
 import { Alert, Anchor, Button, Group, Loader, Text, Title } from "@mantine/core";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
+import { lengthText } from "../language/units";
 import { api } from "../api/client";
 import { exchange, type ImportReport, type ImportRow } from "../api/exchange";
 import type { Assets, ScenarioState } from "../api/types";
@@ -151,7 +152,7 @@ function Shown({ name, whole }: { name: string; whole: Whole }) {
           {spot && (
             <div className="map-hint" role="status">
               <Trans>
-                x = {spot.x.toFixed(1)} m, y = {spot.y.toFixed(1)} m
+                x = {lengthText(spot.x, 1)}, y = {lengthText(spot.y, 1)}
               </Trans>
             </div>
           )}

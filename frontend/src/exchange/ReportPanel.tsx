@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { Text, Title } from "@mantine/core";
 
 import { plural, t } from "@lingui/core/macro";
@@ -47,7 +48,7 @@ export function ReportPanel({ report, ...chosen }: { report: ImportReport } & Ch
         {VERDICTS.map((verdict) => (
           <div key={verdict} data-verdict={verdict}>
             <dt>{TITLES()[verdict]}</dt>
-            <dd>{report[verdict].length.toLocaleString("en")}</dd>
+            <dd>{report[verdict].length.toLocaleString(i18n.locale)}</dd>
           </div>
         ))}
       </dl>
@@ -156,7 +157,7 @@ function Taken({ rows }: { rows: readonly ImportRow[] }) {
       <ul className="import-elements">
         {kinds(rows).map(([word, number]) => (
           <li key={word}>
-            {word}: {number.toLocaleString("en")}
+            {word}: {number.toLocaleString(i18n.locale)}
           </li>
         ))}
       </ul>

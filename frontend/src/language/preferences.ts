@@ -13,7 +13,8 @@ export interface Preferences {
 }
 
 const DEFAULT: Preferences = { language: "en", speed: "km/h", length: "m", hours: 24 };
-const ALLOWED: { readonly [K in keyof Preferences]: readonly Preferences[K][] } = {
+/** The choices that there are. */
+export const ALLOWED: { readonly [K in keyof Preferences]: readonly Preferences[K][] } = {
   language: Object.keys(LANGUAGES) as Language[],
   speed: ["km/h", "mph", "m/s"],
   length: ["m", "ft"],

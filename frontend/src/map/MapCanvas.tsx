@@ -15,6 +15,7 @@ import {
 
 import { localized } from "../language/localized";
 import type { Bounds } from "../api/types";
+import { roundLength } from "../language/units";
 import type { Head } from "../signals/heads";
 import { type Area, inBounds, inRing } from "./areas";
 import type { PackedDrawing } from "./drawing";
@@ -23,7 +24,7 @@ import { Minimap } from "./Minimap";
 import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
 import type { Mark, Moving, Scene } from "./scene";
-import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, visible, zoomAt } from "./view";
+import { clampTo, fit, panBy, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 import { keep, parseKept } from "../ui/kept";
 
@@ -258,7 +259,7 @@ export function MapCanvas({
     event.preventDefault();
   };
 
-  const bar = scaleBar(shown.scale, 110);
+  const bar = roundLength(110 / shown.scale);
   return (
     <div
       ref={host}
@@ -343,8 +344,8 @@ export function MapCanvas({
         )}
         <MapButtons onZoom={zoom} onAll={showAll} />
       </div>
-      <div className="map-scale" aria-hidden="true" style={{ width: bar * shown.scale }}>
-        {bar >= 1000 ? t`${bar / 1000} km` : t`${bar} m`}
+      <div className="map-scale" aria-hidden="true" style={{ width: bar.metres * shown.scale }}>
+        {bar.text}
       </div>
       {children}
     </div>

@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useId } from "react";
@@ -50,13 +51,13 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
           <g key={v}>
             <line className="chart-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
             <text x={BOX.left - 6} y={py(v) + 4} textAnchor="end">
-              {v.toLocaleString("en")}
+              {v.toLocaleString(i18n.locale)}
             </text>
           </g>
         ))}
         {xTicks.map((v) => (
           <text key={v} x={px(v)} y={BOX.bottom + 15} textAnchor="middle">
-            {v.toLocaleString("en")}
+            {v.toLocaleString(i18n.locale)}
           </text>
         ))}
         <text x={(BOX.left + BOX.right) / 2} y={H - 3} textAnchor="middle">
@@ -161,7 +162,7 @@ function Numbers({
   );
 }
 
-const round = (v: number): string => v.toLocaleString("en", { maximumFractionDigits: 1 });
+const round = (v: number): string => v.toLocaleString(i18n.locale, { maximumFractionDigits: 1 });
 const said = (v: number | null | undefined): string => (v == null ? "–" : round(v));
 
 /** Lines through what is known; a gap where nothing is. */

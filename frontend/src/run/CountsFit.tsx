@@ -1,8 +1,10 @@
+import { i18n } from "@lingui/core";
 import { Alert, Button, List, Loader, Table, Text, Title } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
 import { useCallback, useEffect, useState } from "react";
 
+import { fixed } from "../language/numbers";
 import { type FitRow, runs } from "../api/runs";
 import { useLoaded } from "../ui/useLoaded";
 import { span } from "../ui/words";
@@ -42,8 +44,8 @@ export function CountsFit({
     <>
       <Title order={3} size="h5">
         <Trans>
-          {met.toLocaleString("en")} of <Plural value={rows.length} one="# count" other="# counts" /> met (
-          {Math.round((100 * met) / rows.length)} %)
+          {met.toLocaleString(i18n.locale)} of <Plural value={rows.length} one="# count" other="# counts" />{" "}
+          met ({Math.round((100 * met) / rows.length)} %)
         </Trans>
       </Title>
       <Text size="sm" mt={4} mb="sm">
@@ -52,7 +54,7 @@ export function CountsFit({
           less.
         </Trans>
         {hours > 0 && ` ${t`Of the whole hours that the counts make up, ${hours_met} of ${hours} are met.`}`}
-        {rmse !== null && ` ${t`The mean error is ${rmse.toFixed(1)} vehicles (root mean square).`}`}
+        {rmse !== null && ` ${t`The mean error is ${fixed(rmse, 1)} vehicles (root mean square).`}`}
       </Text>
       <Scatter rows={rows} />
       {contradictions.length > 0 && (
@@ -106,7 +108,7 @@ export function CountsFit({
       )}
       {shown.length > LISTED && (
         <Text size="sm" c="dimmed" mt="xs">
-          <Trans>and {(shown.length - LISTED).toLocaleString("en")} more</Trans>
+          <Trans>and {(shown.length - LISTED).toLocaleString(i18n.locale)} more</Trans>
         </Text>
       )}
       <Button mt="sm" variant="default" size="compact-sm" onClick={() => setAll(!all)}>
@@ -131,9 +133,9 @@ function Row({ row, onShow }: { row: FitRow; onShow: (x: number, y: number) => v
           )}
           <div className="fit-time">{span(begin, end)}</div>
         </Table.Th>
-        <Table.Td ta="right">{counted.toLocaleString("en")}</Table.Td>
-        <Table.Td ta="right">{modelled.toLocaleString("en")}</Table.Td>
-        <Table.Td ta="right">{geh.toFixed(1)}</Table.Td>
+        <Table.Td ta="right">{counted.toLocaleString(i18n.locale)}</Table.Td>
+        <Table.Td ta="right">{modelled.toLocaleString(i18n.locale)}</Table.Td>
+        <Table.Td ta="right">{fixed(geh, 1)}</Table.Td>
       </Table.Tr>
       {why && (
         <Table.Tr>

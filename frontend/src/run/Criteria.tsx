@@ -1,6 +1,7 @@
 import { Button, Text, Title } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
+import { short } from "../language/numbers";
 import type { CriterionInfo } from "../api/runs";
 import { clock } from "../ui/words";
 
@@ -46,4 +47,4 @@ export function Criteria({
   );
 }
 
-const rounded = (value: number): string => String(Number(value.toFixed(2)));
+const rounded = (value: number): string => short(value, 2);

@@ -3,10 +3,11 @@ import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useCallback } from "react";
 
+import { speedText } from "../language/units";
+import { fixed } from "../language/numbers";
 import { localized } from "../language/localized";
 import { type EgoOutcome, runs } from "../api/runs";
 import { useLoaded } from "../ui/useLoaded";
-import { kmh } from "../ui/words";
 
 const STATUS = localized((): Record<EgoOutcome["status"], string> => ({
   arrived: t`reached its goal`,
@@ -36,9 +37,9 @@ export function Egos({ run }: { run: string }) {
 function sentence(ego: EgoOutcome): string {
   const { id, status, travel_time: time, delay, mean_speed: speed } = ego;
   const facts = [
-    ...(time === null ? [] : [t`in ${time.toFixed(1)} s`]),
-    ...(delay === null ? [] : [t`${delay.toFixed(1)} s of it delay`]),
-    ...(speed === null ? [] : [t`${kmh(speed)} on average`]),
+    ...(time === null ? [] : [t`in ${fixed(time, 1)} s`]),
+    ...(delay === null ? [] : [t`${fixed(delay, 1)} s of it delay`]),
+    ...(speed === null ? [] : [t`${speedText(speed)} on average`]),
   ];
   const wrong = [
     ...(ego.collisions > 0 ? [plural(ego.collisions, { one: "# collision", other: "# collisions" })] : []),

@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { Text } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
@@ -50,7 +51,9 @@ export function IncidentLog({
       </ul>
       {incidents.length > LISTED && (
         <Text size="sm" c="dimmed" mt="xs">
-          <Trans>{(incidents.length - LISTED).toLocaleString("en")} earlier ones are in the report.</Trans>
+          <Trans>
+            {(incidents.length - LISTED).toLocaleString(i18n.locale)} earlier ones are in the report.
+          </Trans>
         </Text>
       )}
     </>

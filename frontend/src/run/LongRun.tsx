@@ -1,8 +1,10 @@
+import { i18n } from "@lingui/core";
 import { Alert, Button, Group, Progress, Table, Text, Title } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { fixed } from "../language/numbers";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
 import { hoursMinutes, span } from "../ui/words";
@@ -124,12 +126,12 @@ export function SliceTable({ summary }: { summary: Summary }) {
               <Table.Th scope="row" fw={400} style={{ whiteSpace: "nowrap" }}>
                 {span(done[n - 1]?.time ?? 0, one.time)}
               </Table.Th>
-              <Table.Td ta="right">{one.running.toLocaleString("en")}</Table.Td>
+              <Table.Td ta="right">{one.running.toLocaleString(i18n.locale)}</Table.Td>
               <Table.Td ta="right" style={{ whiteSpace: "nowrap" }}>
-                <Trans>{(one.wall_seconds - (done[n - 1]?.wall_seconds ?? 0)).toFixed(1)} s</Trans>
+                <Trans>{fixed(one.wall_seconds - (done[n - 1]?.wall_seconds ?? 0), 1)} s</Trans>
               </Table.Td>
               <Table.Td ta="right">
-                <Trans>{Math.round(one.memory_mb).toLocaleString("en")} MB</Trans>
+                <Trans>{Math.round(one.memory_mb).toLocaleString(i18n.locale)} MB</Trans>
               </Table.Td>
             </Table.Tr>
           ))}

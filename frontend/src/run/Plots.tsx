@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useCallback } from "react";
 
+import { unitFor, toShown } from "../language/units";
 import { runs } from "../api/runs";
 import { useLoaded } from "../ui/useLoaded";
 import { Chart } from "./Chart";
@@ -11,7 +12,7 @@ const BLUE = "var(--mantine-color-blue-6)";
 const GREEN = "var(--mantine-color-teal-7)";
 const ORANGE = "var(--mantine-color-orange-7)";
 const km = (values: readonly (number | null)[]): (number | null)[] =>
-  values.map((v) => (v === null ? null : v * 3.6));
+  values.map((v) => (v === null ? null : toShown(v, "speed")));
 
 /** A finished run over time. */
 export function Plots({ run }: { run: string }) {
@@ -55,7 +56,7 @@ export function Plots({ run }: { run: string }) {
       <Chart
         title={t`Speed of vehicles`}
         xLabel={t`Time, s`}
-        yLabel={t`km/h`}
+        yLabel={unitFor("speed").sign}
         x={speeds.time}
         series={[{ name: t`Mean`, color: BLUE, values: km(speeds.mean) }]}
         band={{ name: t`10th to 90th percentile`, low: km(speeds.low), high: km(speeds.high) }}
@@ -67,10 +68,10 @@ export function Plots({ run }: { run: string }) {
       {shares.share.length > 0 && (
         <Chart
           title={t`Speed distribution`}
-          xLabel={t`Speed, km/h`}
+          xLabel={t`Speed, ${unitFor("speed").sign}`}
           yLabel={t`Share of the time, %`}
           bars
-          x={shares.edges.map((v) => v * 3.6)}
+          x={shares.edges.map((v) => toShown(v, "speed"))}
           series={[{ name: t`Share`, color: BLUE, values: shares.share.map((v) => 100 * v) }]}
         >
           <Trans>

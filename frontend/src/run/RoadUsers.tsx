@@ -3,10 +3,11 @@ import { t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useState } from "react";
 
+import { speedText } from "../language/units";
 import type { Category } from "../api/types";
 import { nth } from "../lists";
 import { CategoryGlyph, IconSearch } from "../ui/icons";
-import { CATEGORY_WORD, kmh } from "../ui/words";
+import { CATEGORY_WORD } from "../ui/words";
 import type { Picture } from "./usePicture";
 
 const PAUSE = 1000;
@@ -83,7 +84,7 @@ export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boole
               <CategoryGlyph category={row.category} size={20} />
               {row.id}
               {row.ego && t` (yours)`}
-              <span className="far">{kmh(row.speed)}</span>
+              <span className="far">{speedText(row.speed)}</span>
             </button>
           </li>
         ))}

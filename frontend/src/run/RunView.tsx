@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
@@ -261,7 +262,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               </Tabs.Tab>
               <Tabs.Tab value="incidents">
                 <Trans>
-                  Incidents{incidents.length > 0 && ` (${incidents.length.toLocaleString("en")})`}
+                  Incidents{incidents.length > 0 && ` (${incidents.length.toLocaleString(i18n.locale)})`}
                 </Trans>
               </Tabs.Tab>
               {shownJunction && (

@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { Trans } from "@lingui/react/macro";
 import { useId } from "react";
 
@@ -27,10 +28,10 @@ export function Scatter({ rows }: { rows: readonly FitRow[] }) {
           <g key={v}>
             <line className="chart-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
             <text x={BOX.left - 6} y={py(v) + 4} textAnchor="end">
-              {v.toLocaleString("en")}
+              {v.toLocaleString(i18n.locale)}
             </text>
             <text x={px(v)} y={BOX.bottom + 15} textAnchor="middle">
-              {v.toLocaleString("en")}
+              {v.toLocaleString(i18n.locale)}
             </text>
           </g>
         ))}
@@ -72,7 +73,7 @@ export function Scatter({ rows }: { rows: readonly FitRow[] }) {
         <span>
           <Trans>
             <i style={{ background: MARK_COLOR.met, borderRadius: "50%", width: 9, height: 9 }} />
-            met ({(rows.length - unmet.length).toLocaleString("en")})
+            met ({(rows.length - unmet.length).toLocaleString(i18n.locale)})
           </Trans>
         </span>
         <span>
@@ -85,7 +86,7 @@ export function Scatter({ rows }: { rows: readonly FitRow[] }) {
                 height: 10,
               }}
             />
-            not met ({unmet.length.toLocaleString("en")})
+            not met ({unmet.length.toLocaleString(i18n.locale)})
           </Trans>
         </span>
       </div>

@@ -57,7 +57,7 @@ export function ShareMenu({
     <Menu position="bottom-end" withinPortal={false} withInitialFocusPlaceholder={false}>
       <Menu.Target>
         <Button size="xs" variant="default" leftSection={<IconDown size={13} />}>
-          <Trans>Share</Trans>
+          <Trans context="button">Share</Trans>
         </Button>
       </Menu.Target>
       <Menu.Dropdown>

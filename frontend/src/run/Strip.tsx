@@ -2,6 +2,7 @@ import { Button, Group, Progress, Select, Text } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
+import { fixed } from "../language/numbers";
 import { type Action, type Incident, type RunInfo, runs, type RunState } from "../api/runs";
 import { MARK_COLOR } from "../map/colors";
 import { IconBack, IconPause, IconPlay, IconStep, IconStop } from "../ui/icons";
@@ -89,7 +90,7 @@ export function LiveStrip({
         </Text>
       </div>
       <Shown label={t`Time`} value={longClock(now.time, until)} />
-      <Shown label={t`Real-time factor`} value={now.pace.toFixed(1)} />
+      <Shown label={t`Real-time factor`} value={fixed(now.pace, 1)} />
       <Shown label={t`On the road`} value={String(now.running)} />
       <Shown label={t`Arrived`} value={String(now.arrived)} />
     </div>

@@ -1,5 +1,7 @@
+import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 
+import { preferences } from "../language/preferences";
 import { localized } from "../language/localized";
 import { longClock, sentence } from "../ui/words";
 import type { FigureInfo } from "../api/figures";
@@ -28,7 +30,7 @@ function get(summary: Summary, { name, part }: FigureInfo): number | null {
 }
 
 function plain(n: number, { unit, factor, digits }: FigureInfo["display"]): string {
-  const text = (n * factor).toLocaleString("en", {
+  const text = (n * factor).toLocaleString(i18n.locale, {
     minimumFractionDigits: digits,
     maximumFractionDigits: digits,
   });
@@ -117,4 +119,8 @@ export const SPEEDS = localized((): Speed[] => [
 export const REPLAY_SPEEDS = localized((): Speed[] => SPEEDS().filter(({ speed }) => speed !== null));
 
 export const when = (seconds1970: number): string =>
-  new Date(seconds1970 * 1000).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" });
+  new Date(seconds1970 * 1000).toLocaleString(
+    // English dates begin with the day, as the day is what one looks for.
+    i18n.locale === "en" ? "en-GB" : i18n.locale,
+    { dateStyle: "medium", timeStyle: "short", hour12: preferences().hours === 12 },
+  );

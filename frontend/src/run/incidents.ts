@@ -1,5 +1,6 @@
 import { plural, t } from "@lingui/core/macro";
 
+import { fixed } from "../language/numbers";
 import { localized } from "../language/localized";
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
@@ -92,7 +93,7 @@ function values(incident: Incident): string {
   const known = Object.entries(incident.values ?? {});
   return known.length === 0
     ? ""
-    : ` (${known.map(([name, value]) => `${name} ${value.toFixed(2)}`).join(", ")})`;
+    : ` (${known.map(([name, value]) => `${name} ${fixed(value, 2)}`).join(", ")})`;
 }
 
 function named(id: string, categories: ReadonlyMap<string, Category>): string {

@@ -1,5 +1,6 @@
 import { t } from "@lingui/core/macro";
 
+import { speedText } from "../language/units";
 import { localized } from "../language/localized";
 import type { Tint } from "../map/scene";
 import { FLAG_BRAKE, FLAG_LEFT, FLAG_RIGHT } from "../map/movingLayer";
@@ -35,11 +36,25 @@ const below = (bounds: readonly number[], value: number): number => {
   return found < 0 ? bounds.length : found;
 };
 
+/** The bounds are round in km/h; in other units they are what they are. */
+function speedLegend(): string[] {
+  const [, a, b, c] = SPEEDS;
+  const [, first, second, third] = [a, a, b, c].map(speedText);
+  const from = (speed: number): string => speedText(speed).split(" ")[0] ?? "";
+  return [
+    t({ message: "Stopped", context: "a vehicle" }),
+    t`Below ${first ?? ""}`,
+    t`${from(a)} to ${second ?? ""}`,
+    t`${from(b)} to ${third ?? ""}`,
+    t`${third ?? ""} and more`,
+  ];
+}
+
 export const SCALES = localized((): Record<Exclude<ColourBy, "kind">, Scale> => ({
   speed: {
     word: t`Speed`,
     colors: [...COLD_TO_HOT].reverse(),
-    legend: [t`Stopped`, t`Below 20 km/h`, t`20 to 40 km/h`, t`40 to 60 km/h`, t`60 km/h and more`],
+    legend: speedLegend(),
     of: (frame, row) => below(SPEEDS, nth(frame.rows, 6 * row + 4)),
   },
   delay: {

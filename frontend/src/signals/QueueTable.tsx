@@ -1,6 +1,7 @@
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
+import { lengthText } from "../language/units";
 import type { Queue } from "./queues";
 
 /** Who waits now, by approach. */
@@ -25,7 +26,7 @@ export function QueueTable({ queues }: { queues: readonly Queue[] }) {
           <tr key={approach}>
             <th scope="row">{approach}</th>
             <td>{vehicles}</td>
-            <td>{vehicles > 0 ? t`${Math.round(metres)} m` : "–"}</td>
+            <td>{vehicles > 0 ? lengthText(metres) : "–"}</td>
           </tr>
         ))}
       </tbody>

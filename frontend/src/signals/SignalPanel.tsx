@@ -7,9 +7,9 @@ import "./signals.css";
 import { Alert, CloseButton, Loader, Select, Switch, Text } from "@mantine/core";
 import { type ReactNode, useCallback, useEffect, useRef, useState } from "react";
 
+import { dayTime, lengthText } from "../language/units";
 import { localized } from "../language/localized";
 import type { DayPlan, Detector, LightProgram } from "../api/signals";
-import { timeOfDay } from "../editor/demand";
 import { useLoaded } from "../ui/useLoaded";
 import { cursorAt, type Cursor, type SignalNow } from "./cursor";
 import type { SignalEditing } from "./editing";
@@ -407,8 +407,8 @@ const placeWords = (loops: readonly Detector[]): string => {
   const [first] = loops;
   if (!first || first.call) return t`where people wait`;
   const lanes = loops.length > 1 ? t`, ${loops.length} lanes` : "";
-  if (first.bus) return t`last ${Math.round(first.length)} m before the stop line${lanes}`;
-  return t`${round(first.ahead)} m before the stop line${lanes}`;
+  if (first.bus) return t`last ${lengthText(first.length)} before the stop line${lanes}`;
+  return t`${lengthText(first.ahead)} before the stop line${lanes}`;
 };
 
 function purposeOf({ call, bus, stages }: Detector): string {
@@ -451,6 +451,6 @@ const round = (value: number): string => String(Math.round(value * 10) / 10);
 const seconds = (value: number): string => t`${round(value)} s`;
 
 const planWords = ({ id, times }: DayPlan, runs: boolean): string => {
-  const from = times.length > 0 ? t`, from ${times.map(timeOfDay).join(t` and `)}` : "";
+  const from = times.length > 0 ? t`, from ${times.map(dayTime).join(t` and `)}` : "";
   return `${id}${from}${runs ? t` (runs now)` : ""}`;
 };

@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import {
   Alert,
   Anchor,
@@ -229,7 +230,7 @@ function GroupTable({ groups, label, judged }: { groups: FigureGroup[]; label: s
             <Table.Tr key={`${one.scenario}/${one.variant}`}>
               <Table.Td>{one.scenario}</Table.Td>
               <Table.Td>{variantWord(one.variant)}</Table.Td>
-              <Table.Td>{one.runs.toLocaleString("en")}</Table.Td>
+              <Table.Td>{one.runs.toLocaleString(i18n.locale)}</Table.Td>
               <Table.Td>{meanWord(one)}</Table.Td>
               {judged && <Table.Td>{matters(one) ? t`yes` : t`no`}</Table.Td>}
             </Table.Tr>

@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 
 import type { FigureGroup, StudyInfo } from "../api/studies";
@@ -21,15 +22,18 @@ export const matters = ({ mean, half_width: half }: FigureGroup): boolean =>
 export function rounded(value: number, by = value): string {
   const size = Math.abs(by) || Math.abs(value) || 1;
   const digits = Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(size))));
-  const text = value.toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  const text = value.toLocaleString(i18n.locale, {
+    minimumFractionDigits: digits,
+    maximumFractionDigits: digits,
+  });
   return text.replace("-", "−");
 }
 
 /** How far a study is, in a few words. */
 export function outcomeWord({ state, runs, ended, completed }: StudyInfo): string {
-  const far = t`${ended.toLocaleString("en")} of ${runs.toLocaleString("en")} runs`;
+  const far = t`${ended.toLocaleString(i18n.locale)} of ${runs.toLocaleString(i18n.locale)} runs`;
   if (state !== "done") return `${state}, ${far}`;
   return completed === runs
     ? t`all runs completed`
-    : t`${(runs - completed).toLocaleString("en")} of ${runs.toLocaleString("en")} runs failed`;
+    : t`${(runs - completed).toLocaleString(i18n.locale)} of ${runs.toLocaleString(i18n.locale)} runs failed`;
 }

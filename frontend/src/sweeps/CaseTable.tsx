@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { Button, Table, Text, UnstyledButton } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
@@ -61,7 +62,7 @@ export function CaseTable({ table, onOpen }: { table: SweepCases; onOpen: (name:
       </Table.ScrollContainer>
       {shown.length < rows.length && (
         <Button variant="default" mt="sm" onClick={() => setWhole(true)}>
-          <Trans>Show all {rows.length.toLocaleString("en")}</Trans>
+          <Trans>Show all {rows.length.toLocaleString(i18n.locale)}</Trans>
         </Button>
       )}
     </>

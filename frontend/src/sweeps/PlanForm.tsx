@@ -13,6 +13,7 @@ import { plural, t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useMemo, useRef, useState } from "react";
 
+import { fixed } from "../language/numbers";
 import { localized } from "../language/localized";
 import { allFigures } from "../api/figures";
 import { type PlannedSweep, sweeps } from "../api/sweeps";
@@ -211,7 +212,7 @@ export function costOf(planned: PlannedSweep): string {
   const room = t`${bytes(disk)} of disk (${bytes(free)} free)`;
   if (seconds === null)
     return t`${plural(cases, { one: "# case", other: "# cases" })}. One of them, ${tried}, was tried and takes more than ${patience} s.`;
-  const one = t`One of them, ${tried}, was tried and took ${case_seconds.toFixed(1)} s`;
+  const one = t`One of them, ${tried}, was tried and took ${fixed(case_seconds, 1)} s`;
   const together = processes === 1 ? t`one after another` : t`${processes} at a time`;
   return t`${plural(cases, { one: "# case", other: "# cases" })}. ${one}: about ${lasting(seconds)} for all, ${together}, and ${room}.`;
 }

@@ -1,5 +1,6 @@
 import { t } from "@lingui/core/macro";
 
+import { fixed } from "../language/numbers";
 import { localized } from "../language/localized";
 import type { SweepCase, SweepCases, SweepWish, VaryWish } from "../api/sweeps";
 import type { ScenarioDocument } from "../api/types";
@@ -189,7 +190,7 @@ export function marksOf(low: number, high: number, parts = 6): number[] {
 export function lasting(seconds: number): string {
   if (seconds < 90) return t`${Math.max(1, Math.round(seconds))} s`;
   if (seconds < 5400) return t`${Math.round(seconds / 60)} min`;
-  return t`${(seconds / 3600).toFixed(1)} h`;
+  return t`${fixed(seconds / 3600, 1)} h`;
 }
 
 /** Something of cases that has a number, on an axis. */

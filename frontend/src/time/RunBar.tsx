@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
@@ -6,6 +7,7 @@ import "./time.css";
 import { Button } from "@mantine/core";
 import { type MouseEvent, type ReactNode, useEffect, useMemo, useState } from "react";
 
+import { fixed } from "../language/numbers";
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import { MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
@@ -180,7 +182,7 @@ export function RunBar({
           <Row
             name="incidents"
             label={t`Incidents`}
-            note={others.length === 0 ? t`none` : others.length.toLocaleString("en")}
+            note={others.length === 0 ? t`none` : others.length.toLocaleString(i18n.locale)}
             onChoose={(event) => choose(event, others)}
           >
             <Marks marks={thinnedMarks(others, apart)} sight={sight} categories={categories} />
@@ -203,7 +205,7 @@ export function RunBar({
                   ? t`${ttc.ego}: not on the road`
                   : now.ttc === null
                     ? t`${ttc.ego}: above ${SEEN} s`
-                    : t`${ttc.ego}: ${now.ttc.toFixed(1)} s to ${now.other ?? ""}`
+                    : t`${ttc.ego}: ${fixed(now.ttc, 1)} s to ${now.other ?? ""}`
             }
             onChoose={(event) => choose(event, [])}
           >

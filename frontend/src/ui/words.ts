@@ -1,6 +1,8 @@
 import { i18n } from "@lingui/core";
 import { plural, t } from "@lingui/core/macro";
 
+import { speedText, roughLength } from "../language/units";
+import { fixed } from "../language/numbers";
 import { localized } from "../language/localized";
 import type { Category, DrivingStyle, MapStatistics, NetworkOrigin, WeatherPreset } from "../api/types";
 import { isKey } from "../lists";
@@ -79,17 +81,10 @@ export const modelWord = (id: string): string =>
     .replace(/^0/, "Person 0")
     .replace(/\b\w/g, (c) => c.toUpperCase());
 
-export function length(metres: number): string {
-  if (metres >= 10_000) return t`${(metres / 1000).toFixed(0)} km`;
-  return metres >= 1000 ? t`${(metres / 1000).toFixed(1)} km` : t`${metres.toFixed(0)} m`;
-}
-
-export const kmh = (speed: number): string => t`${Math.round(speed * 3.6)} km/h`;
-
 export function clock(seconds: number): string {
   const s = Math.max(0, seconds);
   const minutes = Math.floor(s / 60);
-  return `${minutes}:${(s - 60 * minutes).toFixed(1).padStart(4, "0")}`;
+  return `${minutes}:${fixed(s - 60 * minutes, 1).padStart(4, "0")}`;
 }
 
 /** Hours and minutes, for times of which seconds say nothing: `1 h 05 min`. */
@@ -123,7 +118,7 @@ export function span(begin: number, end: number): string {
 
 export function bytes(n: number): string {
   const [size, word] = n >= 1e9 ? [1e9, "GB"] : n >= 1e6 ? [1e6, "MB"] : [1e3, "kB"];
-  return `${(n / size).toLocaleString("en", { maximumFractionDigits: n >= 10 * size ? 0 : 1 })} ${word}`;
+  return `${(n / size).toLocaleString(i18n.locale, { maximumFractionDigits: n >= 10 * size ? 0 : 1 })} ${word}`;
 }
 
 const COUNT: Record<Category, (n: number) => string> = {
@@ -148,16 +143,16 @@ export function networkFact({ converter, source }: NetworkOrigin): string[] {
 export function mapFacts(s: MapStatistics): string[] {
   const [x0, y0, x1, y1] = s.bounds;
   const facts = [
-    `${length(x1 - x0)} × ${length(y1 - y0)}`,
-    t`${length(s.driving_lane_length)} of lanes`,
+    `${roughLength(x1 - x0)} × ${roughLength(y1 - y0)}`,
+    t`${roughLength(s.driving_lane_length)} of lanes`,
     plural(s.junctions, { one: "# junction", other: "# junctions" }),
     plural(s.crosswalks, { one: "# crosswalk", other: "# crosswalks" }),
     plural(s.traffic_lights, { one: "# traffic light", other: "# traffic lights" }),
   ];
   if (s.stop_signs) facts.push(plural(s.stop_signs, { one: "# stop sign", other: "# stop signs" }));
   if (s.speed_limit_min !== null && s.speed_limit_max !== null) {
-    const [low, high] = [kmh(s.speed_limit_min), kmh(s.speed_limit_max)];
-    facts.push(low === high ? t`limit ${low}` : t`limits ${Math.round(s.speed_limit_min * 3.6)}–${high}`);
+    const [low, high] = [speedText(s.speed_limit_min), speedText(s.speed_limit_max)];
+    facts.push(low === high ? t`limit ${low}` : t`limits ${low.split(" ")[0] ?? low}–${high}`);
   }
   if (s.rule === "LHT") facts.push(t`left-hand traffic`);
   return facts;

@@ -216,7 +216,7 @@ function TimingFields({
         onCommit={(delay) => onChange({ ...condition, delay: delay ?? 0 })}
       />
       <Select
-        label={t`Counts`}
+        label={t({ message: "Counts", context: "a condition" })}
         data={Object.entries(EDGE()).map(([value, word]) => ({ value, label: word }))}
         value={condition.edge}
         allowDeselect={false}

@@ -1,6 +1,7 @@
 import { Select, Switch, Text } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
+import { short } from "../../language/numbers";
 import { Committed } from "../Committed";
 import { CommittedText, PickButton } from "../FormParts";
 import type { PlacePick } from "../pick";
@@ -218,5 +219,5 @@ function rowsWords(rows: unknown): string {
     return t`No trajectory: odscen replay reads one from a table.`;
   const last: unknown = rows.at(-1);
   const seconds = Array.isArray(last) && typeof last[0] === "number" ? last[0] : 0;
-  return t`${rows.length} recorded rows over ${Number(seconds.toFixed(1))} s; odscen replay reads others.`;
+  return t`${rows.length} recorded rows over ${short(seconds, 1)} s; odscen replay reads others.`;
 }

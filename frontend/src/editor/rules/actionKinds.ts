@@ -132,7 +132,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
       t`brake at ${amount(v.by, "m/s²")} to a standstill` + maybe(v.hold, t` and drive on after`, "s"),
   },
   stop: {
-    label: t`Stop`,
+    label: t({ message: "Stop", context: "a vehicle" }),
     fields: [number("within", t`Within`, " m", undefined, { min: 0.1 })],
     words: (v) => (given(v.within) ? t`stop within ${amount(v.within, "m")}` : t`stop at once`),
   },
@@ -245,7 +245,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
       {
         is: "choice",
         name: "shows",
-        label: t`To`,
+        label: t({ message: "To", context: "a state" }),
         choices: { green: t`Green for a movement`, off: t`Off`, program: t`Its program` },
       },
       { ...movement(), without: (values) => values.shows === "off" || values.shows === "program" },

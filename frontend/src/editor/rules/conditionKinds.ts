@@ -60,7 +60,7 @@ export const CONDITION_KINDS = localized((): Record<ConditionKind, Kind> => ({
     fields: [
       {
         is: "one",
-        label: t`To`,
+        label: t({ message: "To", context: "a place" }),
         of: [{ is: "actor", name: "to", label: t`Other road user` }, place("place", t`Place`)],
       },
       bound(" m", 20),

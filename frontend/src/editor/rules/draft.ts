@@ -1,5 +1,6 @@
 import { t } from "@lingui/core/macro";
 
+import { short } from "../../language/numbers";
 import type { EditOf, ScenarioDocument } from "../../api/types";
 import { actionKind } from "./actionKinds";
 import { conditionKind } from "./conditionKinds";
@@ -103,7 +104,7 @@ function conditionWords(condition: Condition, actor: string, inner = false): str
     ? groupWords(condition, actor, inner)
     : (conditionKind(condition.kind)?.words(condition.values, actor) ?? condition.kind);
   const rising = edge === "rising" ? t`${words} (as it becomes true)` : words;
-  return delay > 0 ? t`${rising} (${Number(delay.toFixed(2))} s later)` : rising;
+  return delay > 0 ? t`${rising} (${short(delay, 2)} s later)` : rising;
 }
 
 function groupWords({ join, of }: ConditionGroup, actor: string, inner: boolean): string {
@@ -118,7 +119,7 @@ export function sentence({ actor, when, then, times }: Draft): string {
   const { delay, edge } = when;
   const words = conditionWords({ ...when, ...NOW }, actor);
   const first = edge === "rising" ? t`it becomes true that ${words}` : words;
-  const wait = delay > 0 ? t`, ${Number(delay.toFixed(2))} s later` : "";
+  const wait = delay > 0 ? t`, ${short(delay, 2)} s later` : "";
   const acts = then
     .map((items) =>
       items.map(({ kind, values }) => actionKind(kind)?.words(values, actor) ?? kind).join(t` and at once `),

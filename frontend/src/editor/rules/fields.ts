@@ -1,5 +1,7 @@
 import { t } from "@lingui/core/macro";
 
+import { shownAs } from "../../language/units";
+import { short } from "../../language/numbers";
 import { localized } from "../../language/localized";
 import type { PickBy } from "../pick";
 
@@ -148,8 +150,12 @@ export const text = (value: unknown): string =>
       ? value
       : "…";
 
-export const amount = (value: unknown, unit: string, scale = 1): string =>
-  typeof value !== "number" ? `… ${unit}` : `${Number((value * scale).toFixed(2))} ${unit}`;
+export function amount(value: unknown, unit: string, scale = 1): string {
+  const shown = shownAs(` ${unit}`);
+  return typeof value === "number"
+    ? `${short(value * scale * shown.scale, 2)}${shown.suffix}`
+    : `…${shown.suffix}`;
+}
 
 /** Words with an amount if there is one. */
 export const maybe = (value: unknown, words: string, unit: string, scale = 1): string =>
