@@ -10,6 +10,7 @@ import { theme } from "../src/ui/theme";
 
 afterEach(() => {
   cleanup();
+  sessionStorage.clear();
   vi.unstubAllGlobals();
 });
 

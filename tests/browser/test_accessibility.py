@@ -1,6 +1,7 @@
-"""axe finds nothing in any view, light and dark; what can be clicked can be reached by keyboard.
+"""axe finds nothing in any view, light and dark, wide and narrow; the keyboard reaches all.
 
-A picture of each view is kept under build/browser/views.
+No text is cut off, at 200 % of its size neither. A picture of each view is kept under
+build/browser/views.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from odscen.regression.comparison_page import comparison_page
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
+from tests.browser.clipped_text import clipped_texts
 from tests.browser.conftest import ARTEFACTS, CROSSING
 from tests.browser.pages import FAILED, OdscenPage, settle
 from tests.browser.test_signals import open_program, saved
@@ -38,6 +40,10 @@ UNREACHABLE = """() => [...document.querySelectorAll("a[href], button, input, se
     .map(e => e.outerHTML.slice(0, 200))"""
 
 
+SIZES = {"1440": (1440, 900), "1024": (1024, 768), "390": (390, 844), "zoomed": (720, 450)}
+"""Pixels of the windows in which each view is looked at; the last is the first at 200 %."""
+
+
 class Inspector:
     """Looks at one view after the other and collects what is wrong."""
 
@@ -47,17 +53,30 @@ class Inspector:
         self.wrong = Wrongs()
 
     def look(self, view: str) -> None:
+        """Look at what is shown now in a window of each size."""
+        usual = self.page.viewport_size
+        assert usual is not None
+        for size, (width, height) in SIZES.items():
+            self.page.set_viewport_size({"width": width, "height": height})
+            self._look(f"{view}-{size}")
+        self.page.set_viewport_size(usual)
+
+    def _look(self, view: str) -> None:
         settle(self.page)
         ARTEFACTS.joinpath("views").mkdir(parents=True, exist_ok=True)
         self.page.screenshot(path=ARTEFACTS / f"views/{view}-{self.scheme}.png")
         self.page.evaluate(AXE.read_text(encoding="utf-8"))
-        found: list[dict[str, Any]] = self.page.evaluate("async () => (await axe.run()).violations")
+        found: list[dict[str, Any]] = self.page.evaluate(
+            "async () => (await axe.run({resultTypes: ['violations']})).violations"
+        )
         for rule in found:
             for node in rule["nodes"]:
                 message = node["any"][0]["message"] if node["any"] else rule["help"]
                 self.wrong.append(view, f"{rule['id']}: {node['html'][:120]} {message}")
         for element in self.page.evaluate(UNREACHABLE):
             self.wrong.append(view, f"no keyboard reaches {element}")
+        for text in clipped_texts(self.page):
+            self.wrong.append(view, f"cut off: {text}")
 
 
 class Wrongs:
@@ -220,26 +239,22 @@ def test_the_study(visit: Callable[..., Any], served: tool.Served, sampled: str)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [1440, 390])
-def test_the_time_bar(
-    visit: Callable[..., Any], served: tool.Served, sampled: str, width: int
-) -> None:
-    user, inspector = visit(served.url, viewport={"width": width, "height": 900})
+def test_the_time_bar(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    user, inspector = visit(served.url)
     user.open_editor(sampled)
     user.step("Road users").click()
     user.open_time_bar()
-    inspector.look(f"editor-time-{width}")
+    inspector.look("editor-time")
     user.time_bar.get_by_role("slider", name="Planned moment").press("PageUp")
     expect(user.page.get_by_text("each alone on the road")).to_be_visible()
-    inspector.look(f"editor-planned-{width}")
+    inspector.look("editor-planned")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [1440, 1024, 390])
 def test_an_open_form_of_a_rule(
-    visit: Callable[..., Any], served: tool.Served, sampled: str, width: int
+    visit: Callable[..., Any], served: tool.Served, sampled: str
 ) -> None:
-    user, inspector = visit(served.url, viewport={"width": width, "height": 900})
+    user, inspector = visit(served.url)
     user.open_editor(sampled)
     user.step("Rules").click()
     user.page.get_by_role("button", name="Add a rule").click()
@@ -255,10 +270,10 @@ def test_an_open_form_of_a_rule(
     user.page.get_by_role("button", name="Then another action").click()
     user.page.get_by_role("button", name="At the same time as action 2").click()
     user.choose("Action 2, part 2", "Set its lights")
-    inspector.look(f"editor-rule-form-{width}")
+    inspector.look("editor-rule-form")
     with user.changing():
         user.page.get_by_role("button", name="Add the rule").click()
-    inspector.look(f"editor-rules-{width}")
+    inspector.look("editor-rules")
 
 
 def test_traffic_and_counts(

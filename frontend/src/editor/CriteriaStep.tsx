@@ -1,10 +1,10 @@
 import { Button, Loader, NumberInput, Select, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { useState } from "react";
 
 import { type ActorMeasureInfo, actorMeasures, allFigures, type FigureInfo } from "../api/figures";
 import type { Edit, ScenarioDocument } from "../api/types";
+import { useKeptForm } from "../ui/keptForm";
 import { useLoaded } from "../ui/useLoaded";
 import { type Criterion, criterionWords, EGO, OPERATORS, textOf, WHOLE_RUN } from "./criteria";
 import { PartCard } from "./DemandParts";
@@ -75,7 +75,7 @@ function NewCriterion({
   criteria: readonly string[];
   onAdd: (text: string) => void;
 }) {
-  const [made, setMade] = useState<Criterion>({
+  const [made, setMade] = useKeptForm<Criterion>("new criterion", {
     name: "collided",
     actor: WHOLE_RUN,
     op: "==",

@@ -24,7 +24,7 @@ import { RefusalAlert } from "./RefusalAlert";
 import { Stage } from "./Stage";
 import type { EditorStore } from "./store";
 import { firstVisit, Tour, tourSeen } from "./Tour";
-import { useFinishedOnLeaving } from "../ui/leaving";
+import { useAskBeforeClosing, useFinishedOnLeaving } from "../ui/leaving";
 import { useEditing } from "./useEditing";
 
 /** The editor of one scenario: its steps, its map and its table, and the keys that hold in all of them. */
@@ -42,7 +42,7 @@ export function Editor({
   map: MapDetails | null;
 }) {
   const now = useEditing(store, loaded, assets, map);
-  const { undo, redo, saving } = store();
+  const { undo, redo, saving, refusal } = store();
   const { scenario } = now;
   // Anew with each version of the scenario: any edit may have changed the program.
   const { name, version } = scenario;
@@ -58,6 +58,7 @@ export function Editor({
     return signalEditing(store, scenario, light, names);
   }, [store, scenario, light, map]);
   useFinishedOnLeaving();
+  useAskBeforeClosing(refusal?.again != null);
   const [help, setHelp] = useState(false);
   const [finding, setFinding] = useState(false);
   const [tour, setTour] = useState(firstVisit);
@@ -66,6 +67,7 @@ export function Editor({
   const openTour = useCallback(() => setTour(true), []);
   const { handle } = now;
   const picture = useCallback(() => handle.current?.picture() ?? null, [handle]);
+  const vector = useCallback(() => handle.current?.vector() ?? null, [handle]);
   const closeTour = (): void => {
     tourSeen();
     setTour(false);
@@ -125,7 +127,14 @@ export function Editor({
   });
   return (
     <div className="editor">
-      <HeadTools store={store} onFind={openFinding} onHelp={openHelp} onTour={openTour} onPicture={picture} />
+      <HeadTools
+        store={store}
+        onFind={openFinding}
+        onHelp={openHelp}
+        onTour={openTour}
+        onPicture={picture}
+        onVector={vector}
+      />
       <div className="side">
         <EditorSteps store={store} now={now} drawing={drawing} assets={assets} />
         <Problems problems={now.problems} graph={now.graph} onShow={now.showProblem} />

@@ -12,11 +12,11 @@ import { reasonOf } from "../ui/reason";
 import { useLearnedTitle, useTitle } from "../ui/titles";
 import { useLoaded } from "../ui/useLoaded";
 import { Editor } from "./Editor";
-import { createEditorStore } from "./store";
+import { editorStoreOf } from "./store";
 
 /** Loads what the editor needs and says what is missing. */
 export function EditorView({ scenario: name }: { scenario: string }) {
-  const [store] = useState(() => createEditorStore(name));
+  const [store] = useState(() => editorStoreOf(name));
   const map = store((state) => state.scenario?.document.map.name);
   useLearnedTitle(
     name,

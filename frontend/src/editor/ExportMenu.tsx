@@ -6,7 +6,7 @@ import { api } from "../api/client";
 import { ExportDialog } from "../exchange/ExportDialog";
 import { type Format, FORMATS } from "../exchange/formats";
 import { IconDown } from "../ui/icons";
-import { copyLink, savePicture } from "../ui/share";
+import { copyLink, savePicture, saveVector } from "../ui/share";
 
 const DIALOGS: Format[] = ["openscenario", "sumo"];
 
@@ -14,10 +14,13 @@ const DIALOGS: Format[] = ["openscenario", "sumo"];
 export function ExportMenu({
   name,
   onPicture,
+  onVector,
 }: {
   name: string;
   /** What the map shows now. */
   onPicture: () => HTMLCanvasElement | null;
+  /** The same as SVG. */
+  onVector: () => string | null;
 }) {
   const [format, setFormat] = useState<Format | null>(null);
   return (
@@ -55,6 +58,14 @@ export function ExportMenu({
           </Menu.Item>
           <Menu.Item onClick={() => print()}>
             <Trans>Print</Trans>
+          </Menu.Item>
+          <Menu.Item
+            onClick={() => {
+              const svg = onVector();
+              if (svg) saveVector(svg, name);
+            }}
+          >
+            <Trans>Drawing of the map (SVG)</Trans>
           </Menu.Item>
         </Menu.Dropdown>
       </Menu>

@@ -29,6 +29,7 @@ export const HeadTools = memo(function HeadTools({
   onHelp,
   onTour,
   onPicture,
+  onVector,
 }: {
   store: EditorStore;
   onFind: () => void;
@@ -36,6 +37,7 @@ export const HeadTools = memo(function HeadTools({
   onTour: () => void;
   /** What the map shows now. */
   onPicture: () => HTMLCanvasElement | null;
+  onVector: () => string | null;
 }) {
   const { scenario, checked, saving, undo, redo, name, edit } = store();
   const [slot, setSlot] = useState<HTMLElement | null>(null);
@@ -129,7 +131,7 @@ export const HeadTools = memo(function HeadTools({
           )}
         </Menu.Dropdown>
       </Menu>
-      <ExportMenu name={name} onPicture={onPicture} />
+      <ExportMenu name={name} onPicture={onPicture} onVector={onVector} />
       <input
         ref={file}
         type="file"

@@ -6,6 +6,7 @@ import { useState } from "react";
 import { localized } from "../language/localized";
 import type { Edit } from "../api/types";
 import { isKey } from "../lists";
+import { useKeptForm } from "../ui/keptForm";
 import { MeasureCard } from "./MeasureForm";
 import { KIND, type Measure, newMeasure, picksOf } from "./measures";
 import { namedPlace, type PlacePick, type PickBy, type Picked, useTaking } from "./pick";
@@ -83,9 +84,9 @@ function NewMeasure({
   pick: PlacePick;
   onAdd: (measure: Measure) => void;
 }) {
-  const [kind, setKind] = useState<Measure["kind"]>("closure");
+  const [kind, setKind] = useKeptForm<Measure["kind"]>("kind of measure", "closure");
   const [by, setBy] = useState<PickBy>("segment");
-  const [typed, setTyped] = useState("");
+  const [typed, setTyped] = useKeptForm("place of measure", "");
   const choices = picksOf(kind);
   const chosen = choices.includes(by) ? by : (choices[0] ?? "segment");
   const add = (picked: Picked): void => {

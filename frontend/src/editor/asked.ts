@@ -17,19 +17,24 @@ export interface Region extends Roi {
   current: boolean;
 }
 
-/** What may be added to the region and taken out of it; asked of the server, which knows the rule. */
-export function useRegion(name: string, roiKey: string): Region {
+/**
+ * What may be added to the region and taken out of it; asked of the server, which knows the rule. A region
+ * that is foreseen is asked for again with the version in which the server has it.
+ */
+export function useRegion(name: string, roiKey: string, version: number): Region {
   const [{ roi, key }, setAnswer] = useState<{ roi: Roi; key: string | null }>({ roi: NO_ROI, key: null });
+  const known = key === roiKey;
   useEffect(() => {
+    if (known) return;
     let current = true;
     api.roi(name).then((found) => {
-      if (current) setAnswer({ roi: found, key: roiKey });
+      if (current) setAnswer({ roi: found, key: found.inside.join("\n") });
     }, tellError);
     return () => {
       current = false;
     };
-  }, [name, roiKey]);
-  return useMemo(() => ({ ...roi, current: key === roiKey }), [roi, key, roiKey]);
+  }, [name, roiKey, version, known]);
+  return useMemo(() => ({ ...roi, current: known }), [roi, known]);
 }
 
 export interface Goals {

@@ -8,7 +8,7 @@ const NEW_FLOW: Omit<Flow, "id" | "spawn" | "per_hour"> = newParts.flow;
 
 /**
  * What edits will make of a document as far as the page can tell, to be shown until the server has
- * answered; null where only the server knows, as with regions and whatever hangs together.
+ * answered; null where only the server knows, as with whatever hangs together.
  */
 export function foreseen(document: ScenarioDocument, edits: readonly Edit[]): ScenarioDocument | null {
   let made: ScenarioDocument | null = document;
@@ -58,6 +58,16 @@ function afterOne(document: ScenarioDocument, edit: Edit): ScenarioDocument | nu
       const simulation = { ...document.simulation, ...without(edit, "kind") };
       return { ...document, simulation: simulation as ScenarioDocument["simulation"] };
     }
+    case "grow_roi":
+      return { ...document, roi: [...document.roi, edit.segment] };
+    case "extend_roi":
+      return { ...document, roi: [...new Set([...document.roi, ...edit.segments])] };
+    case "shrink_roi":
+      // Who starts there goes, too, or the server refuses.
+      if (edit.with_actors) return null;
+      return { ...document, roi: document.roi.filter((segment) => segment !== edit.segment) };
+    case "set_criteria":
+      return { ...document, criteria: edit.criteria };
     case "remove_measure":
       return { ...document, measures: document.measures.filter(({ id }) => id !== edit.measure) };
     case "remove_rule":

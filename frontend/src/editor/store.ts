@@ -3,6 +3,7 @@ import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
 import type { Edit, ScenarioPatch, ScenarioDocument, ScenarioState } from "../api/types";
+import { tell } from "../ui/notices";
 import { reasonOf } from "../ui/reason";
 import { patched, reused } from "./documentChanges";
 import { foreseen } from "./foreseen";
@@ -41,11 +42,12 @@ export interface EditorState {
   clearRefusal: () => void;
 }
 
-/** A change that was not made; one that was not wrong in itself can be asked for again. */
+type Again = () => Promise<ScenarioState | null>;
+/** Changes that were not made; those that were not wrong in themselves can be asked for again. */
 export interface Refusal {
   title: string;
   message: string;
-  again: (() => Promise<ScenarioState | null>) | null;
+  again: Again | null;
 }
 
 export type EditorStore = UseBoundStore<StoreApi<EditorState>>;
@@ -86,6 +88,8 @@ export function createEditorStore(name: string): EditorStore {
   /** As the server has answered last. */
   let known: ScenarioState | null = null;
   let pending: readonly Pending[] = [];
+  /** What was not made for want of a server or of the newest state, in order; it waits for its user. */
+  let unsent: readonly Again[] = [];
   let check: ReturnType<typeof setTimeout> | undefined;
   const timeline = new Timeline();
   return create<EditorState>((set, get) => {
@@ -130,7 +134,7 @@ export function createEditorStore(name: string): EditorStore {
       else if (version !== known.version) timeline.grow(document);
       const problems = whole ? answer.problems : known.problems;
       known = { ...known, name: answer.name, document, problems, version, label, undo, redo };
-      show({ saving: "saved", ...(whole && { checked: document }) });
+      show({ saving: unsent.length > 0 ? "failed" : "saved", ...(whole && { checked: document }) });
       if (!whole) checkSoon();
       return known;
     };
@@ -142,7 +146,7 @@ export function createEditorStore(name: string): EditorStore {
     ): Promise<ScenarioState | T | null> => {
       pending = [...pending, one];
       clearTimeout(check);
-      show({ saving: "saving", refusal: null });
+      show({ saving: "saving", ...calm() });
       const done = (): void => {
         pending = pending.filter((other) => other !== one);
       };
@@ -152,7 +156,7 @@ export function createEditorStore(name: string): EditorStore {
           return null;
         }
         const { saving, refusal } = get();
-        if (saving !== "saving" || refusal) set({ saving: "saving", refusal: null });
+        if (saving !== "saving" || refusal) set({ saving: "saving", ...calm() });
         try {
           const answer = await call(known.version);
           done();
@@ -180,14 +184,12 @@ export function createEditorStore(name: string): EditorStore {
       const moves = pending.every((one) => one.step !== 0);
       const steps = pending.reduce<number>((sum, one) => sum + one.step, step);
       const there = moves ? timeline.look(steps) : null;
-      // What may be added to a region is asked of the server, which has to know the region by then.
-      const foresee: Pending["foresee"] = ({ roi }) => (there?.roi === roi ? there : null);
-      return send({ step, foresee }, call);
+      return send({ step, foresee: () => there }, call);
     };
     const ask: Ask<ScenarioState> = (call) => send({ ...UNKNOWN }, call);
     const take = async (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState> => {
       const found = await turn<never>({ ...UNKNOWN }, call, async (error) => {
-        set({ saving: "saved" });
+        set({ saving: unsent.length > 0 ? "failed" : "saved" });
         if (!(error instanceof ApiError) || error.status !== 409) throw error;
         await get().load();
         throw new Error(t`The scenario was changed in another tab. You now see its newest state; try again.`);
@@ -195,7 +197,18 @@ export function createEditorStore(name: string): EditorStore {
       if (!found) throw new Error(t`The scenario is not loaded yet.`);
       return found;
     };
-    const refused = async (error: unknown, again: Refusal["again"]): Promise<void> => {
+    /** What is said stays as long as something waits to be made again. */
+    const calm = (): { refusal?: null } => (unsent.length > 0 ? {} : { refusal: null });
+    /** Keeps a change for later; what is returned makes all that are kept, in their order. */
+    const later = (again: Again): Again => {
+      unsent = [...unsent, again];
+      return async () => {
+        const all = unsent;
+        unsent = [];
+        return (await Promise.all(all.map((one) => one()))).at(-1) ?? null;
+      };
+    };
+    const refused = async (error: unknown, again: Again): Promise<void> => {
       const status = error instanceof ApiError ? error.status : -1;
       const message = reasonOf(error);
       if (status === 409) {
@@ -204,7 +217,11 @@ export function createEditorStore(name: string): EditorStore {
         } catch (failure) {
           set({
             saving: "failed",
-            refusal: { title: t`The scenario cannot be read`, message: reasonOf(failure), again },
+            refusal: {
+              title: t`The scenario cannot be read`,
+              message: reasonOf(failure),
+              again: later(again),
+            },
           });
           return;
         }
@@ -213,20 +230,26 @@ export function createEditorStore(name: string): EditorStore {
           refusal: {
             title,
             message: t`You now see the newest state without your last change, which you can apply again.`,
-            again,
+            again: later(again),
           },
         });
         return;
       }
-      const failed = status <= 0 || status >= 500;
-      set({
-        saving: failed ? "failed" : "saved",
-        refusal: {
-          title: failed ? t`Your last change is not saved` : t`That is not possible`,
-          message,
-          again: failed ? again : null,
-        },
-      });
+      // What was removed can be brought back.
+      const failed = status <= 0 || status >= 500 || status === 404;
+      const all = failed ? later(again) : null;
+      // One that can never be made does not push out those that wait.
+      if (unsent.length > 0 && !failed) {
+        set({ saving: "failed" });
+        return tell(t`That is not possible: ${message}`);
+      }
+      const title =
+        unsent.length > 1
+          ? t`Your last ${unsent.length} changes are not saved`
+          : failed
+            ? t`Your last change is not saved`
+            : t`That is not possible`;
+      set({ saving: failed ? "failed" : "saved", refusal: { title, message, again: all } });
     };
     return {
       name,
@@ -240,7 +263,7 @@ export function createEditorStore(name: string): EditorStore {
         const shown = get().scenario?.document ?? answer.document;
         known = { ...answer, document: reused(shown, answer.document) };
         timeline.begin(known.document);
-        show({ saving: "saved", checked: known.document });
+        show({ saving: unsent.length > 0 ? "failed" : "saved", checked: known.document });
       },
       edit: (edit, label) => {
         const edits = Array.isArray(edit) ? (edit as readonly Edit[]) : [edit as Edit];
@@ -252,7 +275,19 @@ export function createEditorStore(name: string): EditorStore {
       undo: () => move(-1, (version) => api.undo(name, version)),
       redo: () => move(1, (version) => api.redo(name, version)),
       select: (ids) => set({ selection: ids }),
-      clearRefusal: () => set({ refusal: null }),
+      clearRefusal: () => {
+        unsent = [];
+        set({ saving: "saved", refusal: null });
+      },
     };
   });
+}
+
+let last: EditorStore | null = null;
+
+/** The store of a scenario: a new one, or that of the last editor if changes of it wait to be made again. */
+export function editorStoreOf(name: string): EditorStore {
+  const waiting = last?.getState().name === name && last.getState().refusal?.again;
+  if (!last || !waiting) last = createEditorStore(name);
+  return last;
 }

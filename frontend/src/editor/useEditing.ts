@@ -103,13 +103,15 @@ export function useEditing(
   const [program, setProgram] = useState<LightProgram | null>(null);
 
   const roiKey = document.roi.join("\n");
-  const region = useRegion(name, roiKey);
+  const region = useRegion(name, roiKey, scenario.version);
+  // That of the server: where one can go is asked of it.
+  const saidRoi = useMemo(() => region.inside.join("\n"), [region]);
   const ones = useMemo(() => everyone(document), [document]);
   const one = useMemo(
     () => (selection.length === 1 ? (ones.find(({ id }) => id === selection[0]) ?? null) : null),
     [ones, selection],
   );
-  const { goals, legs } = useGoals(name, one, roiKey, graph);
+  const { goals, legs } = useGoals(name, one, saidRoi, graph);
   const trial = (hover?.is === "place" && hover.trial) || null;
   const tried = useTrial(name, trial);
   const route = useMemo(() => (trial ? tried.points : legs.flat()), [trial, tried, legs]);

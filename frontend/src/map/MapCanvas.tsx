@@ -25,6 +25,7 @@ import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
 import type { Mark, Moving, Scene } from "./scene";
 import { clampTo, fit, panBy, type Size, toWorld, type View, visible, zoomAt } from "./view";
+import { legendRows } from "./writtenLegend";
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 import { keep, parseKept } from "../ui/kept";
 
@@ -47,6 +48,8 @@ export interface MapHandle {
   seen(): Bounds;
   /** What is seen now, in one canvas: the given one, or a new one. */
   picture(into?: HTMLCanvasElement): HTMLCanvasElement | null;
+  /** The same as an SVG file, with the legend that lies on the map. */
+  vector(): string | null;
   /** Acts on the middle, as Enter does. */
   pickMiddle(): void;
 }
@@ -183,6 +186,7 @@ export function MapCanvas({
         apply({ x: x + aside / scale, y, scale });
       },
       picture: (into) => renderer.current?.picture(into) ?? null,
+      vector: () => renderer.current?.vector(legendRows()) ?? null,
       seen: () => visible(view.current, size.current),
       pickMiddle: () =>
         onPick?.({

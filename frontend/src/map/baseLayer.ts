@@ -2,6 +2,7 @@ import type { Bounds } from "../api/types";
 import { nth } from "../lists";
 import type { Palette } from "./colors";
 import { type Lines, type PackedDrawing, type PackedLines, tiles, unpack } from "./drawing";
+import { type PathMaker, screenPath } from "./svg";
 import { overlaps, type Size, type View, visible, worldTransform } from "./view";
 
 interface TilePath {
@@ -25,14 +26,19 @@ const CELL = 120;
 export class BaseLayer {
   private readonly items: Item[];
 
-  constructor(private readonly drawing: PackedDrawing) {
+  constructor(
+    private readonly drawing: PackedDrawing,
+    newPath: PathMaker = screenPath,
+  ) {
+    const item = (look: Look, packed: PackedLines, closed: boolean): Item =>
+      itemOf(look, packed, closed, newPath);
     const levels = new Set([...drawing.areas, ...drawing.marks].map((one) => one[0]));
     this.items = [item({ what: "building" }, drawing.buildings, true)];
     for (const level of [...levels].sort((a, b) => a - b)) {
       for (const [at, kind, rings] of drawing.areas) {
         if (at === level) this.items.push(item({ what: "area", kind }, rings, true));
       }
-      if (level === Math.min(...levels)) this.items.push(...furniture(drawing));
+      if (level === Math.min(...levels)) this.items.push(...furniture(drawing, item));
       for (const [at, color, width, dash, lines] of drawing.marks) {
         if (at === level) this.items.push(item({ what: "mark", color, width, dash }, lines, false));
       }
@@ -78,7 +84,10 @@ export class BaseLayer {
   }
 }
 
-function furniture(drawing: PackedDrawing): Item[] {
+function furniture(
+  drawing: PackedDrawing,
+  item: (look: Look, packed: PackedLines, closed: boolean) => Item,
+): Item[] {
   return [
     item({ what: "parking" }, drawing.parking_spaces, true),
     item({ what: "bar" }, drawing.bars, true),
@@ -87,16 +96,18 @@ function furniture(drawing: PackedDrawing): Item[] {
   ];
 }
 
-function item(look: Look, packed: PackedLines, closed: boolean): Item {
+function itemOf(look: Look, packed: PackedLines, closed: boolean, newPath: PathMaker): Item {
   const lines = unpack(packed);
   return {
     look,
-    tiles: tiles(lines, CELL).map(({ bounds, rows }) => ({ bounds, path: pathOf(lines, rows, closed) })),
+    tiles: tiles(lines, CELL).map(({ bounds, rows }) => ({
+      bounds,
+      path: pathOf(lines, rows, closed, newPath()),
+    })),
   };
 }
 
-function pathOf(lines: Lines, rows: number[], closed: boolean): Path2D {
-  const path = new Path2D();
+function pathOf(lines: Lines, rows: number[], closed: boolean, path: Path2D): Path2D {
   for (const k of rows) {
     for (let i = nth(lines.start, k); i < nth(lines.start, k + 1); i++) {
       if (i === lines.start[k]) path.moveTo(nth(lines.xy, 2 * i), nth(lines.xy, 2 * i + 1));

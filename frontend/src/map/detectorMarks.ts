@@ -21,21 +21,21 @@ export function drawDetectors(
   context.lineJoin = "round";
   context.setLineDash([]);
   for (const { place, bus, occupied } of detectors) {
-    const path = new Path2D();
+    context.beginPath();
     if (place.length < 2) {
       const [x, y] = place[0] ?? [];
       if (x === undefined || y === undefined) continue;
-      path.arc(x, y, WAITING, 0, 2 * Math.PI);
+      context.arc(x, y, WAITING, 0, 2 * Math.PI);
     } else {
       const ring = around(place, (bus ? BAND : LOOP) / 2);
-      ring.forEach(([x, y], n) => (n ? path.lineTo(x, y) : path.moveTo(x, y)));
-      path.closePath();
+      ring.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
+      context.closePath();
     }
     context.globalAlpha = occupied ? 0.85 : bus ? 0.15 : 0.25;
-    context.fill(path);
+    context.fill();
     context.globalAlpha = 1;
     context.lineWidth = 2 / view.scale;
-    context.stroke(path);
+    context.stroke();
   }
 }
 

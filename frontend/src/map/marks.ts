@@ -76,9 +76,9 @@ export function drawLines(context: CanvasRenderingContext2D, view: View, { lines
   for (const { points, strong, arrow } of lines) {
     if (points.length < 2) continue;
     context.globalAlpha = strong ? 1 : 0.55;
-    const path = new Path2D();
-    points.forEach(([x, y], n) => (n ? path.lineTo(x, y) : path.moveTo(x, y)));
-    if (arrow) addHead(path, points, 11 / view.scale);
+    context.beginPath();
+    points.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
+    if (arrow) addHead(context, points, 11 / view.scale);
     context.setLineDash(arrow ? [] : [6 / view.scale, 5 / view.scale]);
     for (const [color, width] of [
       ["#ffffff", strong ? 6 : 4],
@@ -86,14 +86,14 @@ export function drawLines(context: CanvasRenderingContext2D, view: View, { lines
     ] as const) {
       context.strokeStyle = color;
       context.lineWidth = width / view.scale;
-      context.stroke(path);
+      context.stroke();
     }
   }
   context.setLineDash([]);
   context.globalAlpha = 1;
 }
 
-function addHead(path: Path2D, points: readonly (readonly [number, number])[], size: number): void {
+function addHead(path: CanvasPath, points: readonly (readonly [number, number])[], size: number): void {
   const [x, y] = nth(points, points.length - 1);
   const [x0, y0] = nth(points, points.length - 2);
   const hdg = Math.atan2(y - y0, x - x0);

@@ -7,7 +7,9 @@ import { MovingLayer } from "./movingLayer";
 import type { Picker } from "./picking";
 import { SceneLayer } from "./sceneLayer";
 import { EMPTY_SCENE, type Mark, type Moving, type Scene } from "./scene";
+import { writtenPath, writtenPicture } from "./svg";
 import type { Size, View } from "./view";
+import { drawLegend, type LegendRow } from "./writtenLegend";
 
 /** What the page asks of a drawing of the map; another technique need only offer this. */
 export interface MapRenderer {
@@ -20,6 +22,8 @@ export interface MapRenderer {
   setMarks(marks: readonly Mark[]): void;
   /** What is seen now, in one canvas: the given one, or a new one. */
   picture(into?: HTMLCanvasElement): HTMLCanvasElement;
+  /** The same as an SVG file, with a legend. */
+  vector(legend: readonly LegendRow[]): string;
   /** Draws the whole map small, for the minimap. */
   drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean): void;
   destroy(): void;
@@ -52,7 +56,12 @@ export class CanvasRenderer implements MapRenderer {
   /** For the benchmark: how often something was drawn, and for how long. */
   readonly stats = { frames: 0, busy: 0 };
 
-  constructor(host: HTMLElement, drawing: PackedDrawing, graph: Graph | null, picker: Picker | null) {
+  constructor(
+    host: HTMLElement,
+    private readonly drawing: PackedDrawing,
+    private readonly graph: Graph | null,
+    private readonly picker: Picker | null,
+  ) {
     this.base = new BaseLayer(drawing);
     this.scene = new SceneLayer(graph, picker);
     this.moving = new MovingLayer();
@@ -128,6 +137,19 @@ export class CanvasRenderer implements MapRenderer {
     }
     for (const canvas of this.canvases) context?.drawImage(canvas, 0, 0);
     return into;
+  }
+
+  vector(legend: readonly LegendRow[]): string {
+    const { view, size, palette } = this;
+    // Paths for a screen cannot be read: they are made anew, as words.
+    const base = new BaseLayer(this.drawing, writtenPath);
+    const scene = new SceneLayer(this.graph, this.picker, writtenPath);
+    return writtenPicture(size, (context) => {
+      base.draw(context, view, size, 1, palette, true);
+      scene.draw(context, view, size, 1, palette, this.currentScene);
+      this.moving.draw(context, view, size, 1, palette, this.currentMoving);
+      drawLegend(context, legend, palette, size.height);
+    });
   }
 
   destroy(): void {

@@ -36,6 +36,7 @@ import {
 } from "./marks";
 import type { Picker } from "./picking";
 import type { Scene, SceneActor, SegmentStyle } from "./scene";
+import { type PathMaker, screenPath } from "./svg";
 import { overlaps, type Size, type View, visible, worldTransform } from "./view";
 import type { Bounds, Category } from "../api/types";
 
@@ -73,13 +74,14 @@ export class SceneLayer {
   constructor(
     private readonly graph: Graph | null,
     private readonly picker: Picker | null,
+    private readonly newPath: PathMaker = screenPath,
   ) {
     this.glyphs = Object.fromEntries(
-      Object.entries(GLYPHS).map(([name, path]) => [name, new Path2D(path)]),
+      Object.entries(GLYPHS).map(([name, path]) => [name, newPath(path)]),
     ) as Record<Category, Path2D>;
     if (!graph) return;
     this.bounds = segmentBounds(graph.columns);
-    this.segments = graph.columns.segments.map(() => new Path2D());
+    this.segments = graph.columns.segments.map(() => newPath());
     for (const { segment, ring } of strips(graph.columns)) addRing(nth(this.segments, segment), ring);
   }
 
@@ -153,7 +155,7 @@ export class SceneLayer {
     context.globalAlpha = SEGMENT.measure.alpha;
     context.fillStyle = SEGMENT.measure.fill;
     for (const ring of scene.lanes) {
-      const path = new Path2D();
+      const path = this.newPath();
       addRing(path, ring);
       context.fill(path);
     }
@@ -227,7 +229,7 @@ export class SceneLayer {
     const { columns } = this.graph;
     const { source, target, relation } = columns.edges;
     const paths = RELATION.map((color, n) => ({
-      path: new Path2D(),
+      path: this.newPath(),
       color: n === 0 ? palette.successor : color,
     }));
     for (let e = 0; e < source.length; e++) {

@@ -6,17 +6,29 @@ import type { RunInfo } from "../api/runs";
 /** What is said on the map of a run: how its preparation goes, or who is followed. */
 export function RunHint({
   info,
+  lost,
   planned,
   followed,
   there,
 }: {
   info: Pick<RunInfo, "state" | "preparing">;
+  /** Whether the server does not answer. */
+  lost: boolean;
   /** Whether all road users are known, for their routes are planned. */
   planned: boolean;
   followed: string | null;
   /** Whether that one is on the road. */
   there: boolean;
 }) {
+  if (lost)
+    return (
+      <div className="map-hint" role="status">
+        <span className="waiting">
+          <Loader size={16} aria-hidden="true" />
+          {t`The server does not answer. What is shown goes on as soon as it is back …`}
+        </span>
+      </div>
+    );
   if (info.state === "preparing")
     return (
       <div className="map-hint" role="status">

@@ -4,7 +4,7 @@ import { Trans } from "@lingui/react/macro";
 
 import "./run.css";
 
-import { Alert, Button, Loader, Tabs, Title } from "@mantine/core";
+import { Loader, Tabs } from "@mantine/core";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { FitRow } from "../api/runs";
@@ -35,6 +35,7 @@ import { Plots } from "./Plots";
 import { Result } from "./Result";
 import { RoadUsers } from "./RoadUsers";
 import { MapTools } from "./MapTools";
+import { RunGone } from "./RunGone";
 import { RunHint } from "./RunHint";
 import { ShareMenu } from "./ShareMenu";
 import { SpeedChart } from "./SpeedChart";
@@ -56,11 +57,13 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const handle = useRef<MapHandle | null>(null);
   // What the address kept when the run was opened.
   const [linked] = useState(() => parseKept(location.hash));
-  const { info, failure, learn } = useRun(run);
+  const { info, failure, lost, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
   const picture = usePicture(handle);
   const { show, redraw, clear, follow, followed, latest, now } = picture;
   const ended = info !== null && hasEnded(info.state);
+  const over = useRef(ended);
+  over.current = ended;
   const complete = ended && info.summary != null;
   const [crowd, setCrowd] = useState<Crowd | null>(null);
   // A run that has ended is opened as its recording; one that was watched keeps its last picture.
@@ -98,6 +101,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
       onLights: (changed) => learnLights(changed, latest()?.frame.time ?? 0),
       onDetectors: learnDetectors,
       onState: learn,
+      hasEnded: () => over.current,
     });
     return () => live.close();
   }, [run, mode, show, add, learn, learnTtc, learnLights, learnDetectors, latest]);
@@ -167,19 +171,8 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   };
   const back = (): void => go({ view: "editor", scenario });
   const wrong = failure ?? ground.failure;
-  if (wrong) {
-    return (
-      <div className="catalogue">
-        <Title order={1} size="h3" mb="sm">
-          <Trans>This run cannot be shown</Trans>
-        </Title>
-        <Alert color="red">{wrong}</Alert>
-        <Button mt="md" onClick={back}>
-          <Trans>Back to the editor</Trans>
-        </Button>
-      </div>
-    );
-  }
+  if (wrong)
+    return <RunGone scenario={scenario} reason={wrong} watched={info !== null && failure !== null} />;
   if (!info)
     return (
       <div className="empty">
@@ -200,7 +193,13 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               label={mode === "replay" ? t`Recording of the run` : t`Live view of the run`}
               onPick={pick}
             >
-              <RunHint info={info} planned={crowd !== null} followed={followed} there={now.there} />
+              <RunHint
+                info={info}
+                lost={lost}
+                planned={crowd !== null}
+                followed={followed}
+                there={now.there}
+              />
               <Legend
                 categories={kinds}
                 ego={(known?.egos().length ?? 0) > 0}

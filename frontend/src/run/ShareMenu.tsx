@@ -5,7 +5,7 @@ import { type RefObject, useEffect, useRef, useState } from "react";
 
 import type { MapHandle } from "../map/MapCanvas";
 import { tell, tellError } from "../ui/notices";
-import { copyLink, record, type Recording, saveFile, savePicture } from "../ui/share";
+import { copyLink, record, type Recording, saveFile, savePicture, saveVector } from "../ui/share";
 import { IconDown } from "../ui/icons";
 
 /** Takes away what is seen of a run: a link, a picture, a video, paper. */
@@ -77,6 +77,14 @@ export function ShareMenu({
         </Menu.Item>
         <Menu.Item onClick={() => print()}>
           <Trans>Print</Trans>
+        </Menu.Item>
+        <Menu.Item
+          onClick={() => {
+            const svg = handle.current?.vector();
+            if (svg) saveVector(svg, run);
+          }}
+        >
+          <Trans>Drawing of the map (SVG)</Trans>
         </Menu.Item>
       </Menu.Dropdown>
     </Menu>

@@ -7,32 +7,61 @@ export interface LiveEvents {
   onDetectors: (detectors: Record<string, boolean>) => void;
   onState: (state: RunState, speed?: number | null) => void;
   onIncidents: (incidents: Incident[]) => void;
+  /** Whether the run has ended, as far as is known by other ways. */
+  hasEnded: () => boolean;
   /** All that will ever be on the road are known. */
   onIntroduced: (crowd: Crowd) => void;
 }
 
-/** Listens to a run; the newest frame is drawn with the next picture, then the next one is asked for. */
+/** Milliseconds after which a connection that was lost is tried again. */
+const AGAIN = 1000;
+
+/**
+ * Listens to a run; the newest frame is drawn with the next picture, then the next one is asked for. A
+ * connection that is lost is made again until the run has ended.
+ */
 export class Live {
-  readonly crowd = new Crowd();
-  private readonly socket: WebSocket;
+  crowd = new Crowd();
+  private socket: WebSocket;
+  private over = false;
+  /** Incidents that were passed on, and that this connection has told: each tells all of them. */
+  private passed = 0;
+  private told = 0;
+  private retry = 0;
   private waiting: ArrayBuffer | null = null;
   private pending = 0;
 
   constructor(
-    run: string,
+    private readonly run: string,
     private readonly events: LiveEvents,
   ) {
-    this.socket = new WebSocket(runs.liveUrl(run));
-    this.socket.binaryType = "arraybuffer";
-    this.socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => {
-      if (typeof event.data === "string") this.read(event.data);
-      else this.take(event.data);
-    };
+    this.socket = this.connect();
   }
 
   close(): void {
+    this.over = true;
+    clearTimeout(this.retry);
     cancelAnimationFrame(this.pending);
     this.socket.close();
+  }
+
+  private connect(): WebSocket {
+    const socket = new WebSocket(runs.liveUrl(this.run));
+    socket.binaryType = "arraybuffer";
+    socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => {
+      if (typeof event.data === "string") this.read(event.data);
+      else this.take(event.data);
+    };
+    socket.onclose = () => {
+      if (this.over || this.events.hasEnded()) return;
+      this.retry = window.setTimeout(() => {
+        // All road users are introduced anew.
+        this.crowd = new Crowd();
+        this.told = 0;
+        this.socket = this.connect();
+      }, AGAIN);
+    };
+    return socket;
   }
 
   private read(text: string): void {
@@ -47,12 +76,20 @@ export class Live {
       case "detectors":
         return this.events.onDetectors(message.detectors);
       case "events":
-        return this.events.onIncidents(message.events);
+        return this.incidents(message.events);
       case "state":
         return this.events.onState(message.state, message.speed);
       case "end":
+        this.over = true;
         return this.events.onState(message.state);
     }
+  }
+
+  private incidents(told: Incident[]): void {
+    const fresh = told.slice(Math.max(0, this.passed - this.told));
+    this.told += told.length;
+    this.passed += fresh.length;
+    if (fresh.length > 0) this.events.onIncidents(fresh);
   }
 
   private take(data: ArrayBuffer): void {

@@ -1,6 +1,6 @@
 import { useCallback, useEffect, useMemo, useState } from "react";
 
-import { api } from "../api/client";
+import { api, ApiError } from "../api/client";
 import { type RunInfo, runs, type RunState } from "../api/runs";
 import type { Bounds, MapDetails } from "../api/types";
 import { insideRows, segmentsBounds } from "../editor/scene";
@@ -18,6 +18,8 @@ const ENOUGH = 20;
 export interface Run {
   info: RunInfo | null;
   failure: string | null;
+  /** Whether the server does not answer at the moment. */
+  lost: boolean;
   /** What the live picture reports sooner than one asks. */
   learn: (state: RunState, speed?: number | null) => void;
 }
@@ -26,6 +28,7 @@ export interface Run {
 export function useRun(run: string): Run {
   const [info, setInfo] = useState<RunInfo | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
+  const [lost, setLost] = useState(false);
   const ended = info !== null && hasEnded(info.state);
   // The live picture may report the end before its results, or its reason, are there.
   const complete = ended && (info.summary != null || info.error != null);
@@ -37,10 +40,17 @@ export function useRun(run: string): Run {
       if (ended && left-- <= 0) return;
       runs.info(run).then(
         (found) => {
-          if (current) setInfo(found);
+          if (!current) return;
+          setInfo(found);
+          setLost(false);
+          setFailure(null);
         },
         (error: unknown) => {
-          if (current) setFailure(reasonOf(error));
+          if (!current) return;
+          // What is seen stays until the server is back; it is asked again.
+          const gone = error instanceof ApiError && error.status > 0 && error.status < 500;
+          if (gone) setFailure(reasonOf(error));
+          else setLost(true);
         },
       );
     };
@@ -56,7 +66,7 @@ export function useRun(run: string): Run {
       setInfo((old) => old && { ...old, state, speed: speed === undefined ? old.speed : speed }),
     [],
   );
-  return { info, failure, learn };
+  return { info, failure, lost, learn };
 }
 
 export interface Ground {

@@ -16,3 +16,13 @@ export function useFinishedOnLeaving(): void {
     };
   }, []);
 }
+
+/** Lets the browser ask before the window is closed or loaded anew while something is not saved. */
+export function useAskBeforeClosing(unsaved: boolean): void {
+  useEffect(() => {
+    if (!unsaved) return;
+    const ask = (event: BeforeUnloadEvent): void => event.preventDefault();
+    addEventListener("beforeunload", ask);
+    return () => removeEventListener("beforeunload", ask);
+  }, [unsaved]);
+}

@@ -36,6 +36,11 @@ export function savePicture(canvas: HTMLCanvasElement, name: string): void {
   }, "image/png");
 }
 
+/** Saves a drawing as an SVG file. */
+export function saveVector(svg: string, name: string): void {
+  saveFile(new Blob([svg], { type: "image/svg+xml" }), `${name}.svg`);
+}
+
 const KINDS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"] as const;
 const FRAMES_PER_SECOND = 30;
 

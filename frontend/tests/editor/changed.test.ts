@@ -105,7 +105,7 @@ test("moves, goals, fields, the ego and removals are foreseen; what only the ser
   expect(made?.flows).toEqual([]);
   const unknown: Edit[] = [
     { kind: "copy_actors", copies: { n: "nobody" } },
-    { kind: "grow_roi", segment: "r2" },
+    { kind: "shrink_roi", segment: "r1", with_actors: true },
     { kind: "change_flow", flow: "f", id: "z" },
     { kind: "change_actor", actor: "a", category: "van" },
     { kind: "change_actor", actor: "a", id: "z" },
@@ -113,6 +113,32 @@ test("moves, goals, fields, the ego and removals are foreseen; what only the ser
     { kind: "set_ego", actor: "nobody" },
   ];
   for (const edit of unknown) expect(foreseen(document, [edit])).toBeNull();
+});
+
+test("a region that grows or shrinks is foreseen, as far as no road user goes with it", () => {
+  const grown = foreseen({ ...document, roi: ["r1"] }, [
+    { kind: "grow_roi", segment: "r2" },
+    { kind: "extend_roi", segments: ["r2", "r3"] },
+    { kind: "shrink_roi", segment: "r1" },
+  ]);
+  expect(grown?.roi).toEqual(["r2", "r3"]);
+  expect(grown?.actors).toBe(document.actors);
+});
+
+test("changes without a server are all kept, and made again in their order", async () => {
+  const [server, store] = await opened();
+  const { edit } = store.getState();
+  const done = [edit({ kind: "set_seed", seed: 7 }), edit({ kind: "remove_actors", actors: ["a"] })];
+  await server.answer({}, 503);
+  await server.answer({}, 503);
+  await Promise.all(done);
+  expect(store.getState()).toMatchObject({ saving: "failed", scenario: { document } });
+  const again = store.getState().refusal?.again?.();
+  await server.answer(told(1, change("replace", "/seed", 7)));
+  await server.answer(told(2, change("remove", "/actors/0")));
+  await again;
+  expect(store.getState()).toMatchObject({ saving: "saved", refusal: null, scenario: { version: 3 } });
+  expect(server.asked.filter(({ body }) => body).map(({ body }) => body?.version)).toEqual([1, 1, 1, 2]);
 });
 
 test("the documents before and after are known until something else is done", () => {

@@ -8,16 +8,18 @@ import { show } from "../page";
 
 test("a run that is being prepared says so, and how far it is, before any time passes", () => {
   const preparing = { state: "preparing", preparing: "iteration 3 of 20" } as const;
-  const { again } = show(<RunHint info={preparing} planned={false} followed={null} there={false} />);
+  const { again } = show(
+    <RunHint lost={false} info={preparing} planned={false} followed={null} there={false} />,
+  );
   expect(screen.getByRole("status").textContent).toBe(
     "Preparing, step 1 of 2: planning the routes … iteration 3 of 20",
   );
-  again(<RunHint info={preparing} planned followed={null} there={false} />);
+  again(<RunHint lost={false} info={preparing} planned followed={null} there={false} />);
   expect(screen.getByRole("status").textContent).toContain("step 2 of 2");
   const running = { state: "running", preparing: null } as const;
-  again(<RunHint info={running} planned followed={null} there={false} />);
+  again(<RunHint lost={false} info={running} planned followed={null} there={false} />);
   expect(screen.queryByRole("status")).toBeNull();
-  again(<RunHint info={running} planned followed="car-1" there={false} />);
+  again(<RunHint lost={false} info={running} planned followed="car-1" there={false} />);
   expect(screen.getByRole("status").textContent).toBe("car-1 is not on the road now.");
 });
 

@@ -39,7 +39,7 @@ beforeEach(() => {
 
 const part = (playing: boolean | null, onPlay: () => void) => {
   const picture = (into?: HTMLCanvasElement): HTMLCanvasElement => into ?? document.createElement("canvas");
-  const handle = { current: { picture } as MapHandle };
+  const handle = { current: { picture, vector: () => "<svg/>" } as MapHandle };
   return <ShareMenu run="r1" handle={handle} playing={playing} onPlay={onPlay} />;
 };
 const item = async (user: ReturnType<typeof show>["user"], name: string): Promise<void> => {
@@ -51,6 +51,12 @@ test("the picture of the map is saved under the name of the run", async () => {
   const { user } = show(part(null, vi.fn()));
   await item(user, "Picture of the map (PNG)");
   expect(saved).toEqual(["r1.png"]);
+});
+
+test("the drawing of the map is saved as a vector file", async () => {
+  const { user } = show(part(null, vi.fn()));
+  await item(user, "Drawing of the map (SVG)");
+  expect(saved).toEqual(["r1.svg"]);
 });
 
 test("a video plays the recording and is saved when that has come to its end", async () => {

@@ -1,14 +1,18 @@
 import { Button, Group, Stack, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { useEffect, useState } from "react";
+import { useEffect } from "react";
 
+import { useKeptForm } from "../../ui/keptForm";
 import { Committed } from "../Committed";
 import { CommittedText } from "../FormParts";
 import { WhenForm } from "./ConditionForm";
 import { type Draft, missing, sentence } from "./draft";
 import { type About, ChoiceInput } from "./FieldInput";
 import { ThenForm } from "./ThenForm";
+
+/** Under which an open form is kept. */
+export const RULE_FORM = "rule";
 
 /** A rule that is being made or changed: nothing is sent before it is whole. */
 export function RuleForm({
@@ -28,7 +32,7 @@ export function RuleForm({
   onSave: (draft: Draft) => void;
   onCancel: () => void;
 }) {
-  const [draft, setDraft] = useState(begun);
+  const [draft, setDraft] = useKeptForm(RULE_FORM, begun);
   useEffect(() => {
     onDraft(draft);
     return () => onDraft(null);

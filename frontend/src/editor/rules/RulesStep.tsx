@@ -1,14 +1,14 @@
 import { Button, Text } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { useState } from "react";
 
 import type { Edit, ScenarioDocument } from "../../api/types";
+import { forgetForm, useKeptForm } from "../../ui/keptForm";
 import { PartCard } from "../DemandParts";
 import { OpenAndShow } from "../FormParts";
 import type { PlacePick } from "../pick";
 import { type Draft, draftOf, newDraft, type Rule, ruleOf, sentence } from "./draft";
-import { RuleForm } from "./RuleForm";
+import { RULE_FORM, RuleForm } from "./RuleForm";
 
 /** Rules as sentences, with a form for each; where they act is on the map. */
 export function RulesStep({
@@ -26,12 +26,14 @@ export function RulesStep({
   onShow: (rule: Rule) => void;
 }) {
   /** Id of the rule whose form is open, "" for a new one. */
-  const [open, setOpen] = useState<string | null>(null);
+  const [open, setOpen] = useKeptForm<string | null>("open rule", null);
   const ids = [...actors].sort((one, other) => Number(other.ego) - Number(one.ego)).map(({ id }) => id);
-  const close = (): void => {
+  const turnTo = (id: string | null): void => {
     pick.stop();
-    setOpen(null);
+    forgetForm(RULE_FORM);
+    setOpen(id);
   };
+  const close = (): void => turnTo(null);
   const save = (draft: Draft): void => {
     const renamed = open && open !== draft.id.trim() ? { instead_of: open } : {};
     onEdit({ kind: "set_rule", rule: ruleOf(draft), ...renamed });
@@ -49,10 +51,7 @@ export function RulesStep({
       onCancel={close}
     />
   );
-  const opened = (id: string): void => {
-    pick.stop();
-    setOpen(open === id ? null : id);
-  };
+  const opened = (id: string): void => turnTo(open === id ? null : id);
   return (
     <>
       <Text size="sm">

@@ -1,0 +1,90 @@
+"""What is taken away of a view: pictures and drawings of the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+from PIL import Image
+
+from tests.browser.pages import OdscenPage
+from tests.browser.test_interruptions import MOMENT
+from tools.page import Served
+
+SVG = "{http://www.w3.org/2000/svg}"
+ALIKE = 6.0
+"""Most levels (of 255) by which two drawings of the same differ on average: edges of shapes."""
+
+
+def taken(user: OdscenPage, folder: Path, menu: str, entry: str) -> Path:
+    """Download what a menu offers."""
+    user.page.get_by_role("button", name=menu).click()
+    with user.page.expect_download() as download:
+        user.page.get_by_role("menuitem", name=entry).click()
+    path = folder / download.value.suggested_filename
+    download.value.save_as(path)
+    return path
+
+
+def difference(drawing: Path, picture: Path, user: OdscenPage) -> float:
+    """By how much the drawing, shown by a browser, differs from the picture beside its legend."""
+    with Image.open(picture) as opened:
+        wanted = np.asarray(opened.convert("RGB"), dtype=float)
+    height, width, _ = wanted.shape
+    viewer = user.page.context.new_page()
+    viewer.set_viewport_size({"width": width, "height": height})
+    viewer.goto(drawing.as_uri())
+    shown = drawing.with_suffix(".shown.png")
+    viewer.screenshot(path=shown)
+    viewer.close()
+    with Image.open(shown) as opened:
+        got = np.asarray(opened.convert("RGB"), dtype=float)
+    return float(np.abs(got - wanted)[: height // 2].mean())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_drawing_of_a_map_is_the_picture_of_it_with_a_legend(
+    open_page: Callable[..., OdscenPage],
+    served: Served,
+    sampled: str,
+    tmp_path: Path,
+    scheme: str,
+) -> None:
+    user = open_page(served.url, color_scheme=scheme)
+    user.open_editor(sampled)
+    user.step("Road users").click()
+    user.names.first.click()
+    user.map.area.press("+")
+    user.page.wait_for_timeout(500)
+    drawing = taken(user, tmp_path, "Export", "Drawing of the map (SVG)")
+    picture = taken(user, tmp_path, "Export", "Picture of the map (PNG)")
+    words = [one.text for one in etree.parse(drawing).iter(f"{SVG}text")]
+    assert {"Vehicle start", "Pedestrian start"} <= set(words)
+    assert difference(drawing, picture, user) < ALIKE
+
+
+@pytest.mark.slow
+def test_the_drawing_of_a_recording_has_its_road_users_and_says_what_colours_mean(
+    user: OdscenPage, sampled: str, tmp_path: Path
+) -> None:
+    answer = user.page.request.post("/api/runs", data={"scenario": sampled, "speed": None})
+    run = answer.json()["run"]
+    while user.get(f"/runs/{run}")["state"] != "completed":
+        user.page.wait_for_timeout(300)
+    user.page.goto(f"/#/run/{sampled}/{run}")
+    user.page.get_by_label("Moment of the run").fill(str(MOMENT))
+    empty = taken(user, tmp_path, "Share", "Drawing of the map (SVG)")
+    user.choose("Colour by", "Speed")
+    coloured = taken(user, tmp_path, "Share", "Drawing of the map (SVG)")
+    picture = taken(user, tmp_path, "Share", "Picture of the map (PNG)")
+    assert difference(coloured, picture, user) < ALIKE
+    before, after = (
+        {one.text for one in etree.parse(path).iter(f"{SVG}text")} for path in (empty, coloured)
+    )
+    assert "Car" in before
+    assert "Car" not in after
+    assert any("km/h" in str(one) for one in after)
