@@ -10,7 +10,8 @@ export default tseslint.config(
       ...hooks.configs.recommended.rules,
       "@typescript-eslint/no-explicit-any": "error",
       // What prettier does not break: texts.
-      "max-len": ["error", { code: 119, tabWidth: 2 }],
+      // A message is one literal, however long it is.
+      "max-len": ["error", { code: 119, tabWidth: 2, ignoreTemplateLiterals: true }],
     },
   },
   // Drawings are lines as long as they are; what is generated is as it is generated.

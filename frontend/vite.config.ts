@@ -1,3 +1,4 @@
+import { lingui } from "@lingui/vite-plugin";
 import react from "@vitejs/plugin-react";
 import { defineConfig } from "vitest/config";
 
@@ -6,7 +7,7 @@ const server = process.env.ODSCEN_SERVER ?? "http://127.0.0.1:8765";
 
 export default defineConfig({
   base: "./",
-  plugins: [react()],
+  plugins: [react({ babel: { plugins: ["@lingui/babel-plugin-lingui-macro"] } }), lingui()],
   build: {
     outDir: "../src/odscen/web/static",
     emptyOutDir: true,
@@ -15,5 +16,10 @@ export default defineConfig({
   },
   // Pictures of signal programs have one style, beside the code that draws them for reports.
   server: { fs: { allow: [".."] }, proxy: { "/api": { target: server, ws: true, changeOrigin: true } } },
-  test: { include: ["tests/**/*.test.{ts,tsx}"], environment: "node", testTimeout: 30_000 },
+  test: {
+    include: ["tests/**/*.test.{ts,tsx}"],
+    setupFiles: ["tests/english.ts"],
+    environment: "node",
+    testTimeout: 30_000,
+  },
 });

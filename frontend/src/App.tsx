@@ -6,8 +6,13 @@ import {
   useComputedColorScheme,
   useMantineColorScheme,
 } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { useLingui } from "@lingui/react";
+import { Trans } from "@lingui/react/macro";
 import { lazy, Suspense } from "react";
 
+import { PreferencesButton } from "./language/PreferencesButton";
+import { usePreferences } from "./language/preferences";
 import { IconMoon, IconSun } from "./ui/icons";
 import { NoticeList } from "./ui/notices";
 import { hashOf, useAddress } from "./ui/address";
@@ -31,8 +36,10 @@ export function App() {
   const address = useAddress();
   const title = useTitle("scenario" in address ? address.scenario : "");
   const { setColorScheme } = useMantineColorScheme();
+  const { i18n } = useLingui();
+  const { speed, length, hours } = usePreferences();
   const dark = useComputedColorScheme("light") === "dark";
-  const toggle = dark ? "Use light colours" : "Use dark colours";
+  const toggle = dark ? t`Use light colours` : t`Use dark colours`;
   return (
     <div className="page">
       <a
@@ -43,16 +50,16 @@ export function App() {
           document.getElementById("main")?.focus();
         }}
       >
-        Skip to the content
+        <Trans>Skip to the content</Trans>
       </a>
       <header className="head">
         <Anchor className="brand" href={hashOf({ view: "catalogue" })} underline="never">
           <img src="./icon.svg" alt="" width={26} height={26} />
           <span>odscen</span>
         </Anchor>
-        <nav aria-label="Where you are" className="crumbs">
+        <nav aria-label={t`Where you are`} className="crumbs">
           <Anchor href="#/" aria-current={address.view === "catalogue" ? "page" : undefined}>
-            Maps and scenarios
+            <Trans>Maps and scenarios</Trans>
           </Anchor>
           {"scenario" in address && (
             <>
@@ -68,19 +75,25 @@ export function App() {
           {address.view === "imported" && (
             <>
               <span aria-hidden="true">›</span>
-              <span aria-current="page">Import</span>
+              <span aria-current="page">
+                <Trans>Import</Trans>
+              </span>
             </>
           )}
           {address.view === "run" && (
             <>
               <span aria-hidden="true">›</span>
-              <span aria-current="page">Run</span>
+              <span aria-current="page">
+                <Trans>Run</Trans>
+              </span>
             </>
           )}
           {address.view === "runs" && (
             <>
               <span aria-hidden="true">›</span>
-              <span aria-current="page">Runs</span>
+              <span aria-current="page">
+                <Trans>Runs</Trans>
+              </span>
             </>
           )}
           {(address.view === "sweeps" || address.view === "sweep") && (
@@ -90,7 +103,7 @@ export function App() {
                 href={hashOf({ view: "sweeps", scenario: address.scenario })}
                 aria-current={address.view === "sweeps" ? "page" : undefined}
               >
-                Sweeps
+                <Trans>Sweeps</Trans>
               </Anchor>
             </>
           )}
@@ -101,7 +114,7 @@ export function App() {
                 href={hashOf({ view: "studies" })}
                 aria-current={address.view === "studies" ? "page" : undefined}
               >
-                Studies
+                <Trans>Studies</Trans>
               </Anchor>
             </>
           )}
@@ -119,6 +132,7 @@ export function App() {
           )}
         </nav>
         <div id="head-slot" className="head-slot" />
+        <PreferencesButton />
         <Tooltip label={toggle}>
           <ActionIcon
             variant="subtle"
@@ -132,7 +146,8 @@ export function App() {
         </Tooltip>
       </header>
       <main id="main" tabIndex={-1} className="main">
-        <Suspense fallback={<Loader m="xl" aria-label="Loading the page" />}>
+        {/* A view begins anew in another language or unit; what it had is saved. */}
+        <Suspense key={`${i18n.locale} ${speed} ${length} ${hours}`} fallback={<Loader m="xl" aria-label={t`Loading the page`} />}>
           {address.view === "catalogue" && <CatalogueView />}
           {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}
           {address.view === "imported" && <ImportView key={address.scenario} scenario={address.scenario} />}

@@ -2,17 +2,21 @@ import "@mantine/core/styles.css";
 import "./ui/app.css";
 import "./ui/narrow.css";
 
-import { MantineProvider } from "@mantine/core";
+import { i18n } from "@lingui/core";
+import { I18nProvider } from "@lingui/react";
 import { createRoot } from "react-dom/client";
 
-import { App } from "./App";
-import { contrast, theme } from "./ui/theme";
+import { Page } from "./Page";
+import { startSpeaking } from "./language/load";
 
 const root = document.getElementById("root");
 if (root) {
-  createRoot(root).render(
-    <MantineProvider theme={theme} cssVariablesResolver={contrast} defaultColorScheme="auto">
-      <App />
-    </MantineProvider>,
-  );
+  const shown = createRoot(root);
+  const show = (): void =>
+    shown.render(
+      <I18nProvider i18n={i18n}>
+        <Page />
+      </I18nProvider>,
+    );
+  void startSpeaking().then(show);
 }

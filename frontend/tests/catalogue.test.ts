@@ -5,7 +5,8 @@ import { coverage, grouped } from "../src/catalogue/conversion";
 import { arranged, type Wish } from "../src/catalogue/order";
 import { stepWords } from "../src/catalogue/steps";
 import { hashOf, parseAddress } from "../src/ui/address";
-import { clock, length, mapFacts, modelWord, networkFact } from "../src/ui/words";
+import { roughLength } from "../src/language/units";
+import { clock, mapFacts, modelWord, networkFact } from "../src/ui/words";
 import { mapInfo } from "./example";
 
 type Entry = ConversionReport["entries"][number];
@@ -42,7 +43,7 @@ test("figures are said as people say them", () => {
     "limit 50 km/h",
   ]);
   expect(clock(75.04)).toBe("1:15.0");
-  expect(length(950)).toBe("950 m");
+  expect(roughLength(950)).toBe("950 m");
   expect(modelWord("vehicle.tesla.model3")).toBe("Tesla Model3");
 });
 

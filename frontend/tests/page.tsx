@@ -1,3 +1,5 @@
+import { i18n } from "@lingui/core";
+import { I18nProvider } from "@lingui/react";
 import { MantineProvider } from "@mantine/core";
 import { cleanup, render, screen, within } from "@testing-library/react";
 import userEvent, { type UserEvent } from "@testing-library/user-event";
@@ -15,9 +17,11 @@ afterEach(() => {
 /** Shows a part of the page to a user; the answer shows another state of it in its place. */
 export function show(part: ReactNode): { user: UserEvent; again: (part: ReactNode) => void } {
   const whole = (inner: ReactNode) => (
-    <MantineProvider theme={theme} env="test">
-      {inner}
-    </MantineProvider>
+    <I18nProvider i18n={i18n}>
+      <MantineProvider theme={theme()} env="test">
+        {inner}
+      </MantineProvider>
+    </I18nProvider>
   );
   const { rerender } = render(whole(part));
   return { user: userEvent.setup(), again: (next) => rerender(whole(next)) };

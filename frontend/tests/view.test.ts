@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 
-import { clampTo, fit, panBy, scaleBar, toScreen, toWorld, visible, zoomAt } from "../src/map/view";
+import { clampTo, fit, panBy, toScreen, toWorld, visible, zoomAt } from "../src/map/view";
+import { roundLength } from "../src/language/units";
 
 const size = { width: 800, height: 600 };
 const view = { x: 12.5, y: -40, scale: 3.2 };
@@ -45,7 +46,7 @@ test("the view does not get lost beside the map", () => {
 
 test("the scale bar has a round length that fits", () => {
   for (const scale of [0.03, 0.7, 1, 3.3, 60]) {
-    const bar = scaleBar(scale, 110);
+    const bar = roundLength(110 / scale).metres;
     expect(bar * scale).toBeLessThanOrEqual(110);
     expect(String(bar)).toMatch(/^(0\.0*)?[125]0*$/);
   }

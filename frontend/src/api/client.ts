@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import type { components, paths } from "./schema";
 import type { Converter, Edit } from "./types";
 
@@ -81,7 +83,7 @@ async function refusal(response: Response): Promise<ApiError> {
   return unanswered(
     response.status,
     "http",
-    `The server answered ${response.status} ${response.statusText}.`,
+    t`The server answered ${response.status} ${response.statusText}.`,
   );
 }
 
@@ -111,7 +113,7 @@ export async function call<M extends Method, P extends Route<M>>(
       body: text ?? (body as FormData | undefined) ?? null,
     });
   } catch {
-    throw unanswered(0, "offline", "The server cannot be reached. Is it still running?");
+    throw unanswered(0, "offline", t`The server cannot be reached. Is it still running?`);
   }
   // The server was started anew and has another token: its own page says what to do.
   if (response.status === 401) location.reload();

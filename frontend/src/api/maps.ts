@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import { address, api, ApiError, call } from "./client";
 import type { ConversionReport, Job } from "./types";
 
@@ -26,6 +28,6 @@ export async function followJob(id: string, onStep: (job: Job) => void): Promise
 }
 
 function failureOf({ error }: Job): Error {
-  if (!error) return new Error("The work has failed.");
+  if (!error) return new Error(t`The work has failed.`);
   return error.kind === "ConflictError" ? new ApiError(409, error) : new Error(error.message);
 }

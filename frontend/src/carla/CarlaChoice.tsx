@@ -1,16 +1,19 @@
+import { t } from "@lingui/core/macro";
+
 import "./carla.css";
 
 import { Switch, Text } from "@mantine/core";
 import { useEffect } from "react";
 
+import { localized } from "../language/localized";
 import type { CarlaInfo } from "../api/carla";
 import { useCarla } from "./useCarla";
 
-const WORD: Record<CarlaInfo["state"], string> = {
+const WORD = localized((): Record<CarlaInfo["state"], string> => ({
   connected: "connected",
-  absent: "not connected",
-  wrong_version: "has another version",
-};
+  absent: t`not connected`,
+  wrong_version: t`has another version`,
+}));
 
 /** Whether CARLA is connected, and the offer to show the run in it. */
 export function CarlaChoice({ chosen, onChoose }: { chosen: boolean; onChoose: (chosen: boolean) => void }) {
@@ -24,12 +27,12 @@ export function CarlaChoice({ chosen, onChoose }: { chosen: boolean; onChoose: (
     <div className="carla-choice" role="group" aria-label="CARLA">
       <span className="carla-state" role="status">
         <i aria-hidden="true" data-state={info?.state ?? "unknown"} />
-        CARLA {info ? WORD[info.state] : "…"}
+        CARLA {info ? WORD()[info.state] : "…"}
       </span>
       {there ? (
         <Switch
-          label="Also show the run in CARLA"
-          description="The same road users and lights, with a picture from above"
+          label={t`Also show the run in CARLA`}
+          description={t`The same road users and lights, with a picture from above`}
           checked={chosen}
           onChange={(event) => onChoose(event.currentTarget.checked)}
         />

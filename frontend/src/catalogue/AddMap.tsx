@@ -1,4 +1,6 @@
 import { Alert, Button, FileButton, NativeSelect, Progress, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type DragEvent, useRef, useState } from "react";
 
 import { api } from "../api/client";
@@ -52,7 +54,7 @@ export function AddMap({
     start: () => Promise<{ job: string }>,
     onStep: (job: Job) => void,
   ): Promise<Job | null> => {
-    setWork({ what, step: "Sending the file", share: 0, waiting: queue.current.length });
+    setWork({ what, step: t`Sending the file`, share: 0, waiting: queue.current.length });
     try {
       const { job: id } = await start();
       return await followJob(id, (job) => {
@@ -97,14 +99,14 @@ export function AddMap({
     if (busy.current) return;
     busy.current = true;
     let last = "";
-    const job = await attempt("The example maps", addShipped, ({ step }) => {
+    const job = await attempt(t`The example maps`, addShipped, ({ step }) => {
       const map = step?.split(":")[0] ?? "";
       if (map !== last && last) onAdded();
       last = map;
     });
     busy.current = false;
     setWork(null);
-    if (job) tell("The maps are ready.");
+    if (job) tell(t`The maps are ready.`);
     onAdded();
   };
   /** Cancels the job and drops the files in the queue; the job's state says when that is done. */
@@ -124,7 +126,7 @@ export function AddMap({
   };
 
   return (
-    <section aria-label="Add a map">
+    <section aria-label={t`Add a map`}>
       <div
         className="drop"
         data-over={over}
@@ -139,7 +141,7 @@ export function AddMap({
           <div style={{ flex: 1 }} role="status">
             <Text fw={600}>
               {work.what}
-              {work.waiting > 0 && `, then ${work.waiting} more`}
+              {work.waiting > 0 && t`, then ${work.waiting} more`}
             </Text>
             <Text size="sm" c="dimmed">
               {work.step} …
@@ -148,7 +150,7 @@ export function AddMap({
               <Progress
                 value={Math.max(4, work.share * 100)}
                 animated
-                aria-label="Import progress"
+                aria-label={t`Import progress`}
                 style={{ flex: 1 }}
               />
               <Button
@@ -157,23 +159,23 @@ export function AddMap({
                 disabled={!work.job || work.cancelling}
                 onClick={() => work.job && void cancel(work.job)}
               >
-                {work.cancelling ? "Cancelling" : "Cancel"}
+                {work.cancelling ? t`Cancelling` : t`Cancel`}
               </Button>
             </div>
           </div>
         ) : (
           <>
             <div>
-              <Text fw={600}>{empty ? "No maps yet" : "Add a map of your own"}</Text>
+              <Text fw={600}>{empty ? t`No maps yet` : t`Add a map of your own`}</Text>
               <Text size="sm" c="dimmed">
                 {empty
-                  ? "Begin with the example maps, or drop an OpenDRIVE file (.xodr) of your own here."
-                  : "Drop one or more OpenDRIVE files (.xodr) here, or choose them."}
+                  ? t`Begin with the example maps, or drop an OpenDRIVE file (.xodr) of your own here.`
+                  : t`Drop one or more OpenDRIVE files (.xodr) here, or choose them.`}
               </Text>
             </div>
             <div style={{ display: "flex", gap: 10, flexWrap: "wrap", alignItems: "flex-end" }}>
               <NativeSelect
-                label="SUMO network by"
+                label={t`SUMO network by`}
                 size="xs"
                 value={converter ?? "odscen"}
                 onChange={({ currentTarget }) =>
@@ -182,12 +184,12 @@ export function AddMap({
                 data={["odscen", "netconvert"]}
               />
               <Button variant={empty ? "filled" : "default"} onClick={() => void addThose()}>
-                Add the example maps
+                <Trans>Add the example maps</Trans>
               </Button>
               <FileButton multiple accept=".xodr,.xml" onChange={(files) => void add(files)}>
                 {(props) => (
                   <Button variant="default" {...props}>
-                    Choose a file
+                    <Trans>Choose a file</Trans>
                   </Button>
                 )}
               </FileButton>
@@ -196,9 +198,9 @@ export function AddMap({
         )}
       </div>
       {added.map((name) => (
-        <Alert key={name} color="blue" mt="sm" role="status" title={`${name} is ready`}>
+        <Alert key={name} color="blue" mt="sm" role="status" title={t`${name} is ready`}>
           <Button size="compact-sm" variant="default" onClick={() => onReport(name)}>
-            Import report of {name}
+            <Trans>Import report of {name}</Trans>
           </Button>
         </Alert>
       ))}
@@ -208,18 +210,22 @@ export function AddMap({
           ref={intoSight}
           color="red"
           mt="sm"
-          title={`${file} could not be added`}
+          title={t`${file} could not be added`}
           withCloseButton
-          closeButtonLabel="Close this message"
+          closeButtonLabel={t`Close this message`}
           onClose={() => setRefusals((old) => old.filter((_, k) => k !== n))}
           style={{ overflowWrap: "anywhere" }}
         >
           <span>
-            Nothing was changed. If it is an OpenDRIVE map (.xodr), it is damaged or says something that
-            odscen does not know: export it again, or pass the message below to who made it.
+            <Trans>
+              Nothing was changed. If it is an OpenDRIVE map (.xodr), it is damaged or says something that
+              odscen does not know: export it again, or pass the message below to who made it.
+            </Trans>
           </span>
           <details className="words">
-            <summary>What is wrong with it</summary>
+            <summary>
+              <Trans>What is wrong with it</Trans>
+            </summary>
             <pre tabIndex={0}>{reason}</pre>
           </details>
         </Alert>

@@ -1,4 +1,6 @@
 import { Alert, Button, Chip, Group, Loader, Select, Text, TextInput, Title } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type DragEvent, useState } from "react";
 
 import { api } from "../api/client";
@@ -11,7 +13,6 @@ import { tell, tellError } from "../ui/notices";
 import { RemovalDialog, type ToRemove } from "../ui/RemovalDialog";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
-import { count } from "../ui/words";
 import { AddMap } from "./AddMap";
 import { BrokenMaps } from "./BrokenMaps";
 import { Conversion } from "./Conversion";
@@ -57,7 +58,7 @@ export function CatalogueView() {
     setOver(false);
     const files = [...event.dataTransfer.files];
     if (files.some(isXosc)) importing.begin(files);
-    else if (files.length > 0) tell("Maps (.xodr) go onto “Add a map of your own”, below the maps.");
+    else if (files.length > 0) tell(t`Maps (.xodr) go onto “Add a map of your own”, below the maps.`);
   };
   const all = maps.value ?? [];
   const found = arranged(all, search, order, wishes);
@@ -76,54 +77,60 @@ export function CatalogueView() {
       onDrop={dropped}
     >
       <Title order={1} size="h2">
-        Choose a map
+        <Trans>Choose a map</Trans>
       </Title>
       <Text c="dimmed">
-        Pick where your traffic scenario takes place. You can look at every map before you decide.
+        <Trans>
+          Pick where your traffic scenario takes place. You can look at every map before you decide.
+        </Trans>
       </Text>
       {maps.error && (
-        <Alert color="red" my="md" title="The maps cannot be shown">
+        <Alert color="red" my="md" title={t`The maps cannot be shown`}>
           {maps.error}
           <Button ml="md" size="compact-sm" variant="white" onClick={maps.reload}>
-            Try again
+            <Trans>Try again</Trans>
           </Button>
         </Alert>
       )}
       <BrokenMaps list={broken.value ?? []} onRemove={(name) => setRemoving({ kind: "map", name })} />
-      {!maps.value && !maps.error && <Loader my="xl" aria-label="Loading the maps" />}
+      {!maps.value && !maps.error && <Loader my="xl" aria-label={t`Loading the maps`} />}
       {all.length > 0 && (
         <>
           <div className="bar">
             <TextInput
-              label="Search"
-              placeholder="Part of the name"
+              label={t`Search`}
+              placeholder={t`Part of the name`}
               leftSection={<IconSearch />}
               value={search}
               onChange={(event) => setSearch(event.currentTarget.value)}
             />
             <Select
-              label="Sort by"
-              data={ORDERS}
+              label={t`Sort by`}
+              data={ORDERS()}
               value={order}
               allowDeselect={false}
-              onChange={(value) => setOrder(ORDERS.find((one) => one.value === value)?.value ?? "name")}
+              onChange={(value) => setOrder(ORDERS().find((one) => one.value === value)?.value ?? "name")}
             />
             <Text size="sm" c="dimmed" pb={8} role="status">
-              {count(found.length, "map")}
+              {plural(found.length, { one: "# map", other: "# maps" })}
             </Text>
           </div>
           <Chip.Group
             multiple
             value={wishes}
             onChange={(chosen) =>
-              setWishes(WISHES.map(({ value }) => value).filter((one) => chosen.includes(one)))
+              setWishes(
+                WISHES()
+                  .map(({ value }) => value)
+                  .filter((one) => chosen.includes(one)),
+              )
             }
           >
-            <Group gap={8} mb="md" role="group" aria-label="Only maps with">
+            <Group gap={8} mb="md" role="group" aria-label={t`Only maps with`}>
               <Text size="sm" aria-hidden="true">
-                Only maps with
+                <Trans>Only maps with</Trans>
               </Text>
-              {WISHES.map(({ value, label }) => (
+              {WISHES().map(({ value, label }) => (
                 <Chip key={value} value={value} size="sm" variant="outline">
                   {label}
                 </Chip>
@@ -134,20 +141,22 @@ export function CatalogueView() {
       )}
       {all.length > 0 && found.length === 0 && (
         <Text my="xl">
-          No matching maps.{" "}
-          <Button
-            variant="subtle"
-            size="compact-sm"
-            onClick={() => {
-              setSearch("");
-              setWishes([]);
-            }}
-          >
-            Show all maps
-          </Button>
+          <Trans>
+            No matching maps.{" "}
+            <Button
+              variant="subtle"
+              size="compact-sm"
+              onClick={() => {
+                setSearch("");
+                setWishes([]);
+              }}
+            >
+              Show all maps
+            </Button>
+          </Trans>
         </Text>
       )}
-      <ul className="cards" aria-label="Maps">
+      <ul className="cards" aria-label={t`Maps`}>
         {found.map((map) => (
           <li key={map.name}>
             <MapCard
@@ -178,7 +187,7 @@ export function CatalogueView() {
         leftSection={<IconTrash />}
         onClick={() => setBasket(true)}
       >
-        Wastebasket
+        <Trans>Wastebasket</Trans>
       </Button>
       {basket && <Wastebasket onClose={() => setBasket(false)} onRestored={reload} />}
       {reported && <Conversion map={reported} onClose={() => setReported(null)} />}

@@ -1,4 +1,7 @@
+import { i18n } from "@lingui/core";
 import { Alert, Anchor, Loader, Modal, Text, Title } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useCallback } from "react";
 
 import { conversionReport, reportUrl } from "../api/maps";
@@ -11,7 +14,7 @@ const NAMED = 40;
 /** The import report of a map. */
 export function Conversion({ map, onClose }: { map: string; onClose: () => void }) {
   return (
-    <Modal opened onClose={onClose} size="lg" title={`Import report of ${map}`}>
+    <Modal opened onClose={onClose} size="lg" title={t`Import report of ${map}`}>
       <Body map={map} />
     </Modal>
   );
@@ -21,29 +24,33 @@ function Body({ map }: { map: string }) {
   const { value, error } = useLoaded(useCallback(() => conversionReport(map), [map]));
   if (error)
     return (
-      <Alert color="red" title="The report cannot be shown">
+      <Alert color="red" title={t`The report cannot be shown`}>
         {error}
       </Alert>
     );
-  if (!value) return <Loader aria-label="Loading the report" />;
+  if (!value) return <Loader aria-label={t`Loading the report`} />;
   const { driving, walking } = coverage(value);
   return (
     <>
       {driving !== null && (
         <Text>
-          <b>{driving} %</b> of the lanes can be driven on in the simulation.
+          <Trans>
+            <b>{driving} %</b> of the lanes can be driven on in the simulation.
+          </Trans>
         </Text>
       )}
       {walking !== null && (
         <Text>
-          <b>{walking} %</b> of the footways can be walked on.
+          <Trans>
+            <b>{walking} %</b> of the footways can be walked on.
+          </Trans>
         </Text>
       )}
       {grouped(value).map((group) => (
         <Section key={group.outcome} group={group} />
       ))}
       <Anchor href={reportUrl(map)} target="_blank" rel="noreferrer" size="sm">
-        Everything in detail, for experts (JSON)
+        <Trans>Everything in detail, for experts (JSON)</Trans>
       </Anchor>
     </>
   );
@@ -81,11 +88,11 @@ function Found({ finding: { text, places } }: { finding: Finding }) {
       {text}
       <details>
         <summary style={{ cursor: "pointer", fontSize: 13 }}>
-          {places.length.toLocaleString("en")} places
+          <Trans>{places.length.toLocaleString(i18n.locale)} places</Trans>
         </summary>
         <Text size="sm" c="dimmed">
           {places.slice(0, NAMED).join("; ")}
-          {places.length > NAMED && ` and ${places.length - NAMED} more`}
+          {places.length > NAMED && t` and ${places.length - NAMED} more`}
         </Text>
       </details>
     </>

@@ -1,5 +1,7 @@
 import { ActionIcon, Button, Card, Group, Title, Tooltip } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import type { MapInfo } from "../api/types";
 import { IconTrash } from "../ui/icons";
 import { mapFacts, networkFact } from "../ui/words";
@@ -28,8 +30,8 @@ export function MapCard({
           <Title order={2} size="h4" style={{ overflowWrap: "anywhere" }}>
             {map.name}
           </Title>
-          <Tooltip label={`Remove ${map.name}`}>
-            <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${map.name}`} onClick={onRemove}>
+          <Tooltip label={t`Remove ${map.name}`}>
+            <ActionIcon variant="subtle" color="gray" aria-label={t`Remove ${map.name}`} onClick={onRemove}>
               <IconTrash />
             </ActionIcon>
           </Tooltip>
@@ -39,8 +41,8 @@ export function MapCard({
             <li key={fact}>{fact}</li>
           ))}
         </ul>
-        <Button fullWidth onClick={onStart} loading={starting} aria-label={`New scenario on ${map.name}`}>
-          New scenario
+        <Button fullWidth onClick={onStart} loading={starting} aria-label={t`New scenario on ${map.name}`}>
+          <Trans>New scenario</Trans>
         </Button>
         <Button
           fullWidth
@@ -48,9 +50,9 @@ export function MapCard({
           variant="subtle"
           size="compact-sm"
           onClick={onReport}
-          aria-label={`Import report of ${map.name}`}
+          aria-label={t`Import report of ${map.name}`}
         >
-          Import report
+          <Trans>Import report</Trans>
         </Button>
       </div>
     </Card>

@@ -1,4 +1,5 @@
 import { useComputedColorScheme } from "@mantine/core";
+import { t } from "@lingui/core/macro";
 import { useEffect, useRef, useState } from "react";
 
 import { BaseLayer } from "../map/baseLayer";
@@ -14,7 +15,7 @@ export function Preview({ name, picture }: { name: string; picture: string }) {
     null,
   );
   const [failed, setFailed] = useState(false);
-  const label = `The map ${name} seen from above`;
+  const label = t`The map ${name} seen from above`;
 
   useEffect(() => {
     if (!canvas.current) return;

@@ -10,6 +10,8 @@ import {
   Title,
   VisuallyHidden,
 } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import { api } from "../api/client";
@@ -47,23 +49,23 @@ export function Scenarios({
     <section aria-labelledby="scenarios" style={{ marginTop: 34 }}>
       <Group justify="space-between" mb="sm">
         <Title order={2} size="h3" id="scenarios">
-          Your scenarios
+          <Trans>Your scenarios</Trans>
         </Title>
         <Group gap="sm">
           <Button component="a" variant="default" size="sm" href={hashOf({ view: "studies" })}>
-            Studies
+            <Trans>Studies</Trans>
           </Button>
           <FileButton multiple accept={XOSC_FILES} onChange={importing.begin}>
             {(props) => (
               <Button variant="default" size="sm" disabled={importing.state?.refusal === null} {...props}>
-                Import OpenSCENARIO
+                <Trans>Import OpenSCENARIO</Trans>
               </Button>
             )}
           </FileButton>
           <FileButton accept=".json,.graphml" onChange={bring}>
             {(props) => (
               <Button variant="default" size="sm" loading={busy} {...props}>
-                Open a scenario file
+                <Trans>Open a scenario file</Trans>
               </Button>
             )}
           </FileButton>
@@ -71,17 +73,29 @@ export function Scenarios({
       </Group>
       <ImportWork work={importing} />
       {list.length === 0 ? (
-        <Text c="dimmed">None yet. Choose a map above, or open a scenario file.</Text>
+        <Text c="dimmed">
+          <Trans>None yet. Choose a map above, or open a scenario file.</Trans>
+        </Text>
       ) : (
         <Table highlightOnHover verticalSpacing="xs" aria-labelledby="scenarios">
           <Table.Thead>
             <Table.Tr>
-              <Table.Th>Name</Table.Th>
-              <Table.Th>Map</Table.Th>
-              <Table.Th>Road users</Table.Th>
-              <Table.Th>Changed</Table.Th>
               <Table.Th>
-                <VisuallyHidden>Actions</VisuallyHidden>
+                <Trans>Name</Trans>
+              </Table.Th>
+              <Table.Th>
+                <Trans>Map</Trans>
+              </Table.Th>
+              <Table.Th>
+                <Trans>Road users</Trans>
+              </Table.Th>
+              <Table.Th>
+                <Trans>Changed</Trans>
+              </Table.Th>
+              <Table.Th>
+                <VisuallyHidden>
+                  <Trans>Actions</Trans>
+                </VisuallyHidden>
               </Table.Th>
             </Table.Tr>
           </Table.Thead>
@@ -110,14 +124,14 @@ export function Scenarios({
                     <Anchor
                       size="sm"
                       href={hashOf({ view: "runs", scenario: one.name })}
-                      aria-label={`Runs of ${one.name}`}
+                      aria-label={t`Runs of ${one.name}`}
                     >
-                      Runs
+                      <Trans>Runs</Trans>
                     </Anchor>
                     <ActionIcon
                       variant="subtle"
                       color="gray"
-                      aria-label={`Remove ${one.name}`}
+                      aria-label={t`Remove ${one.name}`}
                       onClick={() => onRemove(one.name)}
                     >
                       <IconTrash />

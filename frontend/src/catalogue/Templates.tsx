@@ -1,4 +1,6 @@
 import { Alert, Button, Card, Group, Modal, NumberInput, Select, Stack, Text, Title } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import { type Template, templates } from "../api/templates";
@@ -15,10 +17,10 @@ export function Templates({ maps }: { maps: MapInfo[] }) {
   return (
     <section aria-labelledby="templates" style={{ marginTop: 34 }}>
       <Title order={2} size="h3" id="templates">
-        Start from a template
+        <Trans>Start from a template</Trans>
       </Title>
       <Text c="dimmed" mb="sm">
-        Scenes with a story, placed on a map that has room for them.
+        <Trans>Scenes with a story, placed on a map that has room for them.</Trans>
       </Text>
       <ul className="cards" aria-labelledby="templates">
         {offered.value.map((one) => (
@@ -42,9 +44,9 @@ export function Templates({ maps }: { maps: MapInfo[] }) {
                   fullWidth
                   variant="default"
                   onClick={() => setChosen(one)}
-                  aria-label={`Place on a map: ${one.title}`}
+                  aria-label={t`Place on a map: ${one.title}`}
                 >
-                  Place on a map
+                  <Trans>Place on a map</Trans>
                 </Button>
               </div>
             </Card>
@@ -83,14 +85,16 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
   return (
     <Stack gap="sm">
       <Text size="sm">
-        {template.summary} It needs {template.needs}.
+        <Trans>
+          {template.summary} It needs {template.needs}.
+        </Trans>
       </Text>
       <Text size="xs" c="dimmed">
         {template.source}
       </Text>
       <Select
-        label="Map"
-        placeholder="Choose a map"
+        label={t`Map`}
+        placeholder={t`Choose a map`}
         searchable
         data={maps.map((one) => one.name)}
         value={map}
@@ -102,7 +106,7 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
             key={one.name}
             label={`${one.name.replace(/_/g, " ")} (${one.unit})`}
             description={one.meaning}
-            placeholder="by the others"
+            placeholder={t`by the others`}
             min={one.low}
             max={one.high}
             decimalScale={3}
@@ -112,13 +116,13 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
         ))}
       </div>
       {refused && (
-        <Alert color="red" title="It cannot be placed">
+        <Alert color="red" title={t`It cannot be placed`}>
           {refused}
         </Alert>
       )}
       <Group justify="flex-end">
         <Button onClick={place} loading={busy} disabled={map === null}>
-          Place it
+          <Trans>Place it</Trans>
         </Button>
       </Group>
     </Stack>

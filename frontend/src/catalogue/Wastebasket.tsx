@@ -1,13 +1,20 @@
 import { Alert, Button, Group, Loader, Modal, Table, Text, VisuallyHidden } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { localized } from "../language/localized";
 import { type Kind, type Removed, removal } from "../api/removal";
 import { when } from "../run/figures";
 import { tell, tellError } from "../ui/notices";
 import { useLoaded } from "../ui/useLoaded";
 import { bytes } from "../ui/words";
 
-const KIND_WORD: Record<Kind, string> = { map: "Map", scenario: "Scenario", run: "Run" };
+const KIND_WORD = localized((): Record<Kind, string> => ({
+  map: t`Map`,
+  scenario: t`Scenario`,
+  run: t`Run`,
+}));
 
 /** What was removed, to be restored or deleted for good. */
 export function Wastebasket({ onClose, onRestored }: { onClose: () => void; onRestored: () => void }) {
@@ -15,7 +22,7 @@ export function Wastebasket({ onClose, onRestored }: { onClose: () => void; onRe
   const [deleting, setDeleting] = useState<string | null>(null);
   const restore = (item: Removed): void => {
     removal.restore(item.id).then(() => {
-      tell(`${item.name} is back.`);
+      tell(t`${item.name} is back.`);
       reload();
       onRestored();
     }, tellError);
@@ -23,26 +30,42 @@ export function Wastebasket({ onClose, onRestored }: { onClose: () => void; onRe
   const deleteForGood = (item: Removed): void => {
     setDeleting(null);
     removal.deleteForGood(item.id).then(() => {
-      tell(`${item.name} is deleted.`);
+      tell(t`${item.name} is deleted.`);
       reload();
     }, tellError);
   };
   return (
-    <Modal opened onClose={onClose} size="xl" title="Wastebasket">
+    <Modal opened onClose={onClose} size="xl" title={t`Wastebasket`}>
       {error && <Alert color="red">{error}</Alert>}
-      {!value && !error && <Loader aria-label="Loading the wastebasket" />}
-      {value?.length === 0 && <Text c="dimmed">The wastebasket is empty.</Text>}
+      {!value && !error && <Loader aria-label={t`Loading the wastebasket`} />}
+      {value?.length === 0 && (
+        <Text c="dimmed">
+          <Trans>The wastebasket is empty.</Trans>
+        </Text>
+      )}
       {value && value.length > 0 && (
-        <Table verticalSpacing={6} fz={14} aria-label="Wastebasket">
+        <Table verticalSpacing={6} fz={14} aria-label={t`Wastebasket`}>
           <Table.Thead>
             <Table.Tr>
-              <Table.Th>Name</Table.Th>
-              <Table.Th>Kind</Table.Th>
-              <Table.Th>Removed</Table.Th>
-              <Table.Th>Kept until</Table.Th>
-              <Table.Th>Size</Table.Th>
               <Table.Th>
-                <VisuallyHidden>Actions</VisuallyHidden>
+                <Trans>Name</Trans>
+              </Table.Th>
+              <Table.Th>
+                <Trans>Kind</Trans>
+              </Table.Th>
+              <Table.Th>
+                <Trans>Removed</Trans>
+              </Table.Th>
+              <Table.Th>
+                <Trans>Kept until</Trans>
+              </Table.Th>
+              <Table.Th>
+                <Trans>Size</Trans>
+              </Table.Th>
+              <Table.Th>
+                <VisuallyHidden>
+                  <Trans>Actions</Trans>
+                </VisuallyHidden>
               </Table.Th>
             </Table.Tr>
           </Table.Thead>
@@ -50,7 +73,7 @@ export function Wastebasket({ onClose, onRestored }: { onClose: () => void; onRe
             {value.map((item) => (
               <Table.Tr key={item.id}>
                 <Table.Td style={{ overflowWrap: "anywhere", minWidth: 160 }}>{item.name}</Table.Td>
-                <Table.Td>{KIND_WORD[item.kind]}</Table.Td>
+                <Table.Td>{KIND_WORD()[item.kind]}</Table.Td>
                 <Table.Td>{when(item.removed)}</Table.Td>
                 <Table.Td>{when(item.until)}</Table.Td>
                 <Table.Td style={{ whiteSpace: "nowrap" }}>{bytes(item.size)}</Table.Td>
@@ -64,15 +87,15 @@ export function Wastebasket({ onClose, onRestored }: { onClose: () => void; onRe
                           data-autofocus
                           onClick={() => setDeleting(null)}
                         >
-                          Keep it
+                          <Trans>Keep it</Trans>
                         </Button>
                         <Button
                           size="compact-sm"
                           color="red"
-                          aria-label={`Delete ${item.name} for good`}
+                          aria-label={t`Delete ${item.name} for good`}
                           onClick={() => deleteForGood(item)}
                         >
-                          Delete for good
+                          <Trans>Delete for good</Trans>
                         </Button>
                       </>
                     ) : (
@@ -80,19 +103,19 @@ export function Wastebasket({ onClose, onRestored }: { onClose: () => void; onRe
                         <Button
                           size="compact-sm"
                           variant="light"
-                          aria-label={`Restore ${item.name}`}
+                          aria-label={t`Restore ${item.name}`}
                           onClick={() => restore(item)}
                         >
-                          Restore
+                          <Trans>Restore</Trans>
                         </Button>
                         <Button
                           size="compact-sm"
                           variant="subtle"
                           color="red"
-                          aria-label={`Delete ${item.name}`}
+                          aria-label={t`Delete ${item.name}`}
                           onClick={() => setDeleting(item.id)}
                         >
-                          Delete
+                          <Trans>Delete</Trans>
                         </Button>
                       </>
                     )}

@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../language/localized";
 import type { ConversionReport, ElementOutcome } from "../api/types";
 import { sentence } from "../ui/words";
 
@@ -13,53 +16,52 @@ export interface Group {
   findings: Finding[];
 }
 
-const TITLES: [outcome: ElementOutcome, title: string][] = [
-  ["lost", "Could not be used"],
-  ["repaired", "Repaired"],
-  ["guessed", "Adapted or completed"],
-  ["kept", "Imported unchanged"],
-];
+const TITLES = localized((): [outcome: ElementOutcome, title: string][] => [
+  ["lost", t`Could not be used`],
+  ["repaired", t`Repaired`],
+  ["guessed", t`Adapted or completed`],
+  ["kept", t`Imported unchanged`],
+]);
 
 /** The commonest findings in plain sentences. */
-const PLAIN: [RegExp, string][] = [
+const PLAIN = localized((): [RegExp, string][] => [
   [
     /of a connecting road have no SUMO lane: nothing leads there/,
-    "Short pieces of lanes inside junctions are left out, as no lane leads there",
+    t`Short pieces of lanes inside junctions are left out, as no lane leads there`,
   ],
-  [/have no SUMO lane: nothing leads there/, "Short pieces of lanes are left out, as no lane leads there"],
+  [/have no SUMO lane: nothing leads there/, t`Short pieces of lanes are left out, as no lane leads there`],
   [
     /lanes of type (\w+) are open to no(?:body| road user) and left out/,
-    "Lanes of the kind “$1” are not driven on and are left out",
+    t`Lanes of the kind “$1” are not driven on and are left out`,
   ],
   [
     /every crossing of a junction with lights has a light/,
-    "Every crosswalk of a junction with traffic lights got a light for pedestrians",
+    t`Every crosswalk of a junction with traffic lights got a light for pedestrians`,
   ],
-  [/of [\d.]+ m have no SUMO lane$/, "Lanes or parts of lanes that are missing in the simulation"],
-  [/^SUMO's lane lies up to/, "Lanes that lie a little beside their place in the simulation"],
-  [/^no connection to lane/, "Connections between lanes that are missing in the simulation"],
-  [/^SUMO connects it to lane/, "Connections between lanes that only the simulation has"],
-  [/^crosswalk: crossings of the network/, "Crosswalks that lie elsewhere in the simulation"],
-  [/netconvert does not read it/, "Signs of right of way, which netconvert does not read"],
+  [/of [\d.]+ m have no SUMO lane$/, t`Lanes or parts of lanes that are missing in the simulation`],
+  [/^SUMO's lane lies up to/, t`Lanes that lie a little beside their place in the simulation`],
+  [/^no connection to lane/, t`Connections between lanes that are missing in the simulation`],
+  [/^SUMO connects it to lane/, t`Connections between lanes that only the simulation has`],
+  [/^crosswalk: crossings of the network/, t`Crosswalks that lie elsewhere in the simulation`],
+  [/netconvert does not read it/, t`Signs of right of way, which netconvert does not read`],
   [
     /traffic lights have the network's programs/,
-    "The map does not say when its lights turn green: the programs of the network are used",
+    t`The map does not say when its lights turn green: the programs of the network are used`,
   ],
-  [/its width varies from/, "Lanes whose width changes have one width in the simulation"],
+  [/its width varies from/, t`Lanes whose width changes have one width in the simulation`],
   [
     /traffic lights? have programs of odscen's own/,
-    "The map does not say when its lights turn green: they got a timing of their own, " +
-      "in which no two conflicting connections have green at the same time",
+    t`The map does not say when its lights turn green: they got a timing of their own, in which no two conflicting connections have green at the same time`,
   ],
-  [/^crosswalk, as a crossing/, "Crosswalks, with place and width"],
-  [/^yield, as right of way/, "Signs to give way"],
-  [/^traffic light, as right of way/, "Traffic lights"],
-  [/^stop, as right of way/, "Stop signs"],
-];
+  [/^crosswalk, as a crossing/, t`Crosswalks, with place and width`],
+  [/^yield, as right of way/, t`Signs to give way`],
+  [/^traffic light, as right of way/, t`Traffic lights`],
+  [/^stop, as right of way/, t`Stop signs`],
+]);
 
 /** One sentence without the numbers of a single place. */
 export function plainFinding(reason: string): string {
-  for (const [pattern, text] of PLAIN) {
+  for (const [pattern, text] of PLAIN()) {
     const match = pattern.exec(reason);
     if (match) return text.replace("$1", match[1] ?? "");
   }
@@ -69,7 +71,7 @@ export function plainFinding(reason: string): string {
 
 /** What became of a map, what matters most first; elements of which the same is said are together. */
 export function grouped(report: ConversionReport): Group[] {
-  return TITLES.flatMap(([outcome, title]) => {
+  return TITLES().flatMap(([outcome, title]) => {
     const found = new Map<string, string[]>();
     for (const entry of report.entries) {
       if (entry.fate !== outcome) continue;

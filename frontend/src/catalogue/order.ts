@@ -1,15 +1,19 @@
+import { t } from "@lingui/core/macro";
+
+import { roughLength } from "../language/units";
+import { localized } from "../language/localized";
 import type { MapInfo } from "../api/types";
 
 export type Order = "name" | "large" | "small" | "junctions" | "crosswalks" | "lights" | "fast";
-export const ORDERS: { value: Order; label: string }[] = [
-  { value: "name", label: "Name" },
-  { value: "large", label: "Largest" },
-  { value: "small", label: "Smallest" },
-  { value: "junctions", label: "Most junctions" },
-  { value: "crosswalks", label: "Most crosswalks" },
-  { value: "lights", label: "Most traffic lights" },
-  { value: "fast", label: "Highest speed limit" },
-];
+export const ORDERS = localized((): { value: Order; label: string }[] => [
+  { value: "name", label: t`Name` },
+  { value: "large", label: t`Largest` },
+  { value: "small", label: t`Smallest` },
+  { value: "junctions", label: t`Most junctions` },
+  { value: "crosswalks", label: t`Most crosswalks` },
+  { value: "lights", label: t`Most traffic lights` },
+  { value: "fast", label: t`Highest speed limit` },
+]);
 
 const FIGURE: Record<Exclude<Order, "name">, (map: MapInfo) => number> = {
   large: (map) => map.statistics.driving_lane_length,
@@ -25,22 +29,22 @@ const SMALL = 3_000;
 const LARGE = 15_000;
 
 export type Wish = "lights" | "crosswalks" | "junctions" | "left" | "small" | "large";
-export const WISHES: { value: Wish; label: string; has: (map: MapInfo) => boolean }[] = [
-  { value: "lights", label: "Traffic lights", has: ({ statistics }) => statistics.traffic_lights > 0 },
-  { value: "crosswalks", label: "Crosswalks", has: ({ statistics }) => statistics.crosswalks > 0 },
-  { value: "junctions", label: "Junctions", has: ({ statistics }) => statistics.junctions > 0 },
-  { value: "left", label: "Left-hand traffic", has: ({ statistics }) => statistics.rule === "LHT" },
+export const WISHES = localized((): { value: Wish; label: string; has: (map: MapInfo) => boolean }[] => [
+  { value: "lights", label: t`Traffic lights`, has: ({ statistics }) => statistics.traffic_lights > 0 },
+  { value: "crosswalks", label: t`Crosswalks`, has: ({ statistics }) => statistics.crosswalks > 0 },
+  { value: "junctions", label: t`Junctions`, has: ({ statistics }) => statistics.junctions > 0 },
+  { value: "left", label: t`Left-hand traffic`, has: ({ statistics }) => statistics.rule === "LHT" },
   {
     value: "small",
-    label: "Small (up to 3 km of lanes)",
+    label: t`Small (up to ${roughLength(3000)} of lanes)`,
     has: ({ statistics }) => statistics.driving_lane_length <= SMALL,
   },
   {
     value: "large",
-    label: "Large (from 15 km of lanes)",
+    label: t`Large (from ${roughLength(15_000)} of lanes)`,
     has: ({ statistics }) => statistics.driving_lane_length >= LARGE,
   },
-];
+]);
 
 /** The maps whose name has all words of `search` and that have all that is wished for, in order. */
 export function arranged(
@@ -50,7 +54,7 @@ export function arranged(
   wishes: readonly Wish[] = [],
 ): MapInfo[] {
   const words = search.toLowerCase().split(/\s+/).filter(Boolean);
-  const wanted = WISHES.filter(({ value }) => wishes.includes(value));
+  const wanted = WISHES().filter(({ value }) => wishes.includes(value));
   const found = maps.filter(
     (map) =>
       words.every((word) => map.name.toLowerCase().includes(word)) && wanted.every(({ has }) => has(map)),

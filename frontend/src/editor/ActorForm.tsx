@@ -1,5 +1,6 @@
 import { Checkbox, Group, Select, Stack } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
 import type { Actor, Assets, Edit } from "../api/types";
 import { modelWord, styleChoices } from "../ui/words";
 import { Committed } from "./Committed";
@@ -29,30 +30,30 @@ export function ActorForm({
     <Stack gap="sm">
       <Silhouette actor={actor} length={length} width={width} />
       <Select
-        label="Model"
+        label={t`Model`}
         searchable
         clearable
-        placeholder="Any"
+        placeholder={t`Any`}
         data={models}
         value={actor.model}
-        nothingFoundMessage="No such model"
-        clearButtonProps={{ "aria-label": "Any model" }}
+        nothingFoundMessage={t`No such model`}
+        clearButtonProps={{ "aria-label": t`Any model` }}
         onChange={(model) => change({ model })}
       />
       <Group grow align="flex-start">
         <Committed
-          label={walks ? "Walking speed" : "Desired speed"}
-          suffix=" km/h"
+          label={walks ? t`Walking speed` : t`Desired speed`}
+          suffix={" km/h"}
           min={1}
           max={walks ? 15 : 250}
           digits={1}
-          placeholder={walks ? "default" : "speed limit"}
+          placeholder={walks ? t`default` : t`speed limit`}
           value={actor.speed === null ? "" : actor.speed * 3.6}
           onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })}
         />
         <Committed
-          label="Departs after"
-          suffix=" s"
+          label={t`Departs after`}
+          suffix={" s"}
           min={0}
           max={86_400}
           digits={1}
@@ -63,8 +64,8 @@ export function ActorForm({
       {!walks && (
         <Group grow align="flex-start">
           <Committed
-            label="Offset to the left"
-            suffix=" m"
+            label={t`Offset to the left`}
+            suffix={" m"}
             min={-3}
             max={3}
             step={0.1}
@@ -73,7 +74,7 @@ export function ActorForm({
             onCommit={(value) => change({ lateral_offset: value ?? 0 })}
           />
           <Select
-            label="Driving style"
+            label={t`Driving style`}
             allowDeselect={false}
             value={actor.style}
             data={styleChoices(driverSets)}
@@ -85,7 +86,7 @@ export function ActorForm({
       )}
       {!walks && (
         <Checkbox
-          label="Ego: my vehicle under test"
+          label={t`Ego: my vehicle under test`}
           checked={actor.ego}
           onChange={(event) =>
             onEdit({ kind: "set_ego", actor: event.currentTarget.checked ? actor.id : null })
@@ -94,15 +95,15 @@ export function ActorForm({
       )}
       {walks && (
         <Checkbox
-          label="Crosses the road anywhere"
-          description="Where it is shortest, not at crosswalks only"
+          label={t`Crosses the road anywhere`}
+          description={t`Where it is shortest, not at crosswalks only`}
           checked={actor.crosses_anywhere}
           onChange={(event) => change({ crosses_anywhere: event.currentTarget.checked })}
         />
       )}
       {walks && (
         <Checkbox
-          label="Ignores red lights"
+          label={t`Ignores red lights`}
           checked={actor.ignores_red}
           onChange={(event) => change({ ignores_red: event.currentTarget.checked })}
         />
@@ -129,34 +130,34 @@ export function ManyForm({
     <Stack gap="sm">
       <Group grow align="flex-start">
         <Committed
-          label="Desired speed of all"
-          suffix=" km/h"
+          label={t`Desired speed of all`}
+          suffix={" km/h"}
           min={1}
           max={250}
           digits={1}
-          placeholder={speed === undefined ? "different" : "default"}
+          placeholder={speed === undefined ? t`different` : t`default`}
           value={speed ? speed * 3.6 : ""}
-          onCommit={(value) => onChange({ speed: value === null ? null : value / 3.6 }, "Speed")}
+          onCommit={(value) => onChange({ speed: value === null ? null : value / 3.6 }, t`Speed`)}
         />
         <Committed
-          label="All depart after"
-          suffix=" s"
+          label={t`All depart after`}
+          suffix={" s"}
           min={0}
           max={86_400}
           digits={1}
-          placeholder="different"
+          placeholder={t`different`}
           value={same("depart") ?? ""}
-          onCommit={(value) => onChange({ depart: value ?? 0 }, "Departure")}
+          onCommit={(value) => onChange({ depart: value ?? 0 }, t`Departure`)}
         />
       </Group>
       <Select
-        label="Driving style of all"
-        placeholder="different"
+        label={t`Driving style of all`}
+        placeholder={t`different`}
         allowDeselect={false}
         value={same("style") ?? null}
         data={styleChoices(driverSets)}
         onChange={(style) => {
-          if (style) onChange({ style }, "Driving style");
+          if (style) onChange({ style }, t`Driving style`);
         }}
       />
     </Stack>

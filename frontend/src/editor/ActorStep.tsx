@@ -1,4 +1,6 @@
 import { Button, Collapse, Group, Stack, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useState } from "react";
 
 import type { Filler } from "../api/generators";
@@ -52,15 +54,15 @@ export function ActorStep(props: Props) {
   const actors = selected.filter((each): each is Actor => !isFlow(each));
   return (
     <>
-      <div className="palette" role="group" aria-label="Kind of road user to place">
+      <div className="palette" role="group" aria-label={t`Kind of road user to place`}>
         {CATEGORIES.map((category) => (
           <ToolButton key={category} of={placeTool(category)} tool={tool} onTool={onTool}>
             <CategoryGlyph category={category} size={32} />
-            {CATEGORY_WORD[category]}
+            {CATEGORY_WORD()[category]}
           </ToolButton>
         ))}
       </div>
-      <div className="palette flows" role="group" aria-label="Flow to place">
+      <div className="palette flows" role="group" aria-label={t`Flow to place`}>
         {[false, true].map((walks) => (
           <ToolButton key={String(walks)} of={flowTool(walks)} tool={tool} onTool={onTool}>
             <IconFlow size={22} />
@@ -73,12 +75,12 @@ export function ActorStep(props: Props) {
         <Stack
           gap="sm"
           component="section"
-          aria-label={one ? `Settings of ${one.id}` : `Settings of ${selected.length} road users`}
+          aria-label={one ? t`Settings of ${one.id}` : t`Settings of ${selected.length} road users`}
         >
           <Group gap={8} wrap="nowrap">
             {one &&
               (isFlow(one) ? <IconFlow size={24} /> : <CategoryGlyph category={one.category} size={26} />)}
-            <Text fw={700}>{one ? one.id : `${selected.length} selected`}</Text>
+            <Text fw={700}>{one ? one.id : t`${selected.length} selected`}</Text>
           </Group>
           <Group gap={6}>
             {actors.length > 0 && (
@@ -87,7 +89,7 @@ export function ActorStep(props: Props) {
                 variant="default"
                 onClick={() => onTool(copyTool(actors.map((each) => each.id)))}
               >
-                Copy
+                <Trans>Copy</Trans>
               </Button>
             )}
             <Button
@@ -95,7 +97,7 @@ export function ActorStep(props: Props) {
               variant="default"
               onClick={() => onTool(moveTool(selected.map((each) => each.id)))}
             >
-              Move
+              <Trans>Move</Trans>
             </Button>
             <Button
               size="compact-sm"
@@ -104,10 +106,10 @@ export function ActorStep(props: Props) {
               leftSection={<IconTrash size={15} />}
               onClick={props.onRemove}
             >
-              Remove
+              <Trans>Remove</Trans>
             </Button>
             <Button size="compact-sm" variant="subtle" onClick={() => props.onSelect([])}>
-              Clear selection
+              <Trans>Clear selection</Trans>
             </Button>
           </Group>
           {one && (
@@ -154,7 +156,7 @@ export function ActorStep(props: Props) {
               onChange={(fields, what) =>
                 onEdit(
                   actors.map((each) => ({ kind: "change_actor", actor: each.id, ...fields })),
-                  `${what} of ${actors.length} road users`,
+                  t`${what} of ${actors.length} road users`,
                 )
               }
             />
@@ -168,7 +170,7 @@ export function ActorStep(props: Props) {
         aria-expanded={filling}
         onClick={() => setFilling(!filling)}
       >
-        {filling ? "Hide random fill" : "Fill the region at random"}
+        {filling ? t`Hide random fill` : t`Fill the region at random`}
       </Button>
       <Collapse in={filling}>
         {filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}
@@ -201,7 +203,7 @@ function ToolHint({ tool, onPlaceSomewhere }: { tool: Tool | null; onPlaceSomewh
   return (
     <>
       <Text size="sm" c="dimmed" aria-live="polite">
-        {tool ? tool.help : "Choose a kind, then click on the map to place it."}
+        {tool ? tool.help : t`Choose a kind, then click on the map to place it.`}
       </Text>
       {tool && (
         <Button size="compact-sm" variant="default" onClick={onPlaceSomewhere}>

@@ -1,5 +1,7 @@
 import { Button, Group, Text } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import type { Actor, Edit } from "../api/types";
 import type { Graph } from "../map/graph";
 import { abreast, evenly, inTurn } from "./arrange";
@@ -27,41 +29,41 @@ export function ArrangeForm({
   };
   const even = evenly(graph, starts, actors);
   return (
-    <div role="group" aria-label="Arrange">
+    <div role="group" aria-label={t`Arrange`}>
       <Text size="sm" fw={500}>
-        Arrange
+        <Trans>Arrange</Trans>
       </Text>
       <Group gap={6} mt={4}>
         <Button
           size="compact-sm"
           variant="default"
-          onClick={() => move(abreast(graph, starts, actors), `Align ${actors.length} road users`)}
+          onClick={() => move(abreast(graph, starts, actors), t`Align ${actors.length} road users`)}
         >
-          Beside the first
+          <Trans>Beside the first</Trans>
         </Button>
         <Button
           size="compact-sm"
           variant="default"
           disabled={even === null}
-          title={even === null ? "At least three on the same lane" : undefined}
-          onClick={() => move(even ?? [], `Distribute ${actors.length} road users`)}
+          title={even === null ? t`At least three on the same lane` : undefined}
+          onClick={() => move(even ?? [], t`Distribute ${actors.length} road users`)}
         >
-          Evenly along the lane
+          <Trans>Evenly along the lane</Trans>
         </Button>
       </Group>
       <Committed
-        label="Depart one after another, every"
-        suffix=" s"
+        label={t`Depart one after another, every`}
+        suffix={" s"}
         min={0}
         max={3600}
         digits={1}
-        placeholder="not set"
+        placeholder={t`not set`}
         value=""
         onCommit={(apart) => {
           if (apart !== null)
             onEdit(
               inTurn(actors, apart).map(([actor, depart]) => ({ kind: "change_actor", actor, depart })),
-              `Departures of ${actors.length} road users`,
+              t`Departures of ${actors.length} road users`,
             );
         }}
       />

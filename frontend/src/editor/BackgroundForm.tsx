@@ -1,5 +1,6 @@
 import { Select } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
 import type { Background } from "../api/demand";
 import type { Edit, FieldsOf } from "../api/types";
 import { Committed } from "./Committed";
@@ -23,14 +24,14 @@ export function BackgroundForm({
   const change = (fields: FieldsOf<"set_background", "background">): void =>
     onEdit({ kind: "set_background", background: background.id, ...fields });
   return (
-    <PartCard name={background.id} what="Background traffic" onRemove={onRemove}>
+    <PartCard name={background.id} what={t`Background traffic`} onRemove={onRemove}>
       <Select
-        label="Amount given as"
-        data={AMOUNTS.map(({ key, word }) => ({ value: key, label: word }))}
+        label={t`Amount given as`}
+        data={AMOUNTS().map(({ key, word }) => ({ value: key, label: word }))}
         value={amount.key}
         allowDeselect={false}
         onChange={(key) => {
-          const chosen = AMOUNTS.find((one) => one.key === key);
+          const chosen = AMOUNTS().find((one) => one.key === key);
           if (chosen && chosen !== amount) change({ [chosen.key]: chosen.begin });
         }}
       />

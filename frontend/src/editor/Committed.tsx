@@ -1,10 +1,19 @@
 import { NumberInput } from "@mantine/core";
 
-/** A number that is sent when it is finished, not with every key. */
+import { shownAs } from "../language/units";
+import { parsed } from "../language/numbers";
+
+/**
+ * A number that is sent when it is finished, not with every key. Its suffix says the unit of the value;
+ * speeds in km/h and lengths in metres are shown in the unit of the reader.
+ */
 export function Committed({
   label,
   value,
   digits,
+  suffix,
+  min,
+  max,
   onCommit,
   ...rest
 }: {
@@ -18,18 +27,24 @@ export function Committed({
   placeholder?: string;
   onCommit: (value: number | null) => void;
 }) {
-  const shown = value === "" ? "" : Number(value.toFixed(digits));
+  const unit = shownAs(suffix);
+  const places = digits + unit.digits;
+  const shown = value === "" ? "" : Number((value * unit.scale).toFixed(places));
   const commit = (text: string): void => {
-    const found = Number.parseFloat(text);
-    const next = Number.isNaN(found) ? null : Math.min(Math.max(found, rest.min), rest.max);
-    if (next !== (shown === "" ? null : shown)) onCommit(next);
+    const found = parsed(text);
+    // What is shown is rounded: left as it is, it changes nothing.
+    if ((Number.isNaN(found) ? "" : found) === shown) return;
+    onCommit(Number.isNaN(found) ? null : Math.min(Math.max(found / unit.scale, min), max));
   };
   return (
     <NumberInput
       key={String(shown)}
       label={label}
       defaultValue={shown}
-      decimalScale={digits}
+      decimalScale={places}
+      suffix={unit.suffix}
+      min={min * unit.scale}
+      max={max * unit.scale}
       {...rest}
       onBlur={(event) => commit(event.currentTarget.value)}
       onKeyDown={(event) => {

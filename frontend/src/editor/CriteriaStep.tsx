@@ -1,4 +1,6 @@
 import { Button, Loader, NumberInput, Select, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 
 import { type ActorMeasureInfo, actorMeasures, allFigures, type FigureInfo } from "../api/figures";
 import type { Edit, ScenarioDocument } from "../api/types";
@@ -17,7 +19,7 @@ export function CriteriaStep({
 }) {
   const run = useLoaded(allFigures).value;
   const single = useLoaded(actorMeasures).value;
-  if (!run || !single) return <Loader size="sm" aria-label="Loading what can be measured" />;
+  if (!run || !single) return <Loader size="sm" aria-label={t`Loading what can be measured`} />;
   const change = (next: readonly string[], label: string): void =>
     onEdit({ kind: "set_criteria", criteria: [...next] }, label);
   const egos = actors.some(({ ego }) => ego);
@@ -26,20 +28,22 @@ export function CriteriaStep({
   return (
     <>
       <Text size="sm">
-        What must come out of a run for it to pass. Each is judged when the run has ended, and suites of tests
-        expect it.
+        <Trans>
+          What must come out of a run for it to pass. Each is judged when the run has ended, and suites of
+          tests expect it.
+        </Trans>
       </Text>
       {criteria.map((text, n) => {
         const words = criterionWords(text, { run, actors: single });
         return (
           <PartCard
             key={`${n} ${text}`}
-            name={`criterion ${n + 1}`}
+            name={t`criterion ${n + 1}`}
             what=""
             onRemove={() =>
               change(
                 criteria.filter((_, at) => at !== n),
-                "Remove a criterion",
+                t`Remove a criterion`,
               )
             }
           >
@@ -52,7 +56,7 @@ export function CriteriaStep({
         single={single}
         ids={named}
         criteria={criteria}
-        onAdd={(text) => change([...criteria, text], "Add a criterion")}
+        onAdd={(text) => change([...criteria, text], t`Add a criterion`)}
       />
     </>
   );
@@ -88,10 +92,10 @@ function NewCriterion({
   };
   const text = textOf({ ...made, unit: withUnit(unit) });
   return (
-    <section className="fold" aria-label="New criterion">
+    <section className="fold" aria-label={t`New criterion`}>
       <Select
-        label="About"
-        data={[{ value: WHOLE_RUN, label: "The whole run" }, ...ids.map((id) => ({ value: id, label: id }))]}
+        label={t`About`}
+        data={[{ value: WHOLE_RUN, label: t`The whole run` }, ...ids.map((id) => ({ value: id, label: id }))]}
         value={made.actor}
         allowDeselect={false}
         searchable={ids.length > 10}
@@ -101,7 +105,7 @@ function NewCriterion({
         }}
       />
       <Select
-        label="What"
+        label={t`What`}
         description={measure?.definition}
         data={measures.map(({ name, label }) => ({ value: name, label }))}
         value={made.name}
@@ -112,8 +116,8 @@ function NewCriterion({
         }}
       />
       <Select
-        label="Is"
-        data={OPERATORS.map(([value, label]) => ({ value, label }))}
+        label={t`Is`}
+        data={OPERATORS().map(([value, label]) => ({ value, label }))}
         value={made.op}
         allowDeselect={false}
         onChange={(op) => {
@@ -121,7 +125,7 @@ function NewCriterion({
         }}
       />
       <NumberInput
-        label="Number"
+        label={t`Number`}
         suffix={unit ? ` ${unit}` : ""}
         value={made.bound}
         decimalScale={3}
@@ -130,7 +134,7 @@ function NewCriterion({
         }}
       />
       <Button variant="default" disabled={criteria.includes(text)} onClick={() => onAdd(text)}>
-        Add the criterion
+        <Trans>Add the criterion</Trans>
       </Button>
     </section>
   );

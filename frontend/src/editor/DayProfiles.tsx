@@ -1,5 +1,7 @@
 import { Select } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { localized } from "../language/localized";
 import type { Demand } from "../api/demand";
 import { peakWords } from "./demand";
 
@@ -7,8 +9,8 @@ export type Profiles = Readonly<Record<string, readonly number[]>>;
 
 const W = 288;
 const H = 44;
-const WORD: Record<string, string> = { weekday: "Weekday", weekend: "Weekend" };
-export const profileWord = (id: string): string => WORD[id] ?? id;
+const WORD = localized((): Record<string, string> => ({ weekday: t`Weekday`, weekend: t`Weekend` }));
+export const profileWord = (id: string): string => WORD()[id] ?? id;
 
 /** All day profiles that a scenario can use: the built-in ones and its own. */
 export const profilesOf = (demand: Demand, builtIn: Profiles): Profiles => ({
@@ -27,13 +29,13 @@ export function ProfileChoice({
   onChange: (profile: string | null) => void;
 }) {
   const data = [
-    { value: "", label: "Uniform" },
+    { value: "", label: t`Uniform` },
     ...Object.keys(profiles).map((id) => ({ value: id, label: profileWord(id) })),
   ];
   return (
     <div>
       <Select
-        label="Day profile"
+        label={t`Day profile`}
         data={data}
         value={value ?? ""}
         allowDeselect={false}
@@ -55,7 +57,7 @@ export function ProfileChart({ name, shares }: { name: string; shares: readonly 
       className="profile"
       viewBox={`0 0 ${W} ${H + 14}`}
       role="img"
-      aria-label={`${name} over the day: ${peakWords(shares)}`}
+      aria-label={t`${name} over the day: ${peakWords(shares)}`}
     >
       {shares.map((share, n) => (
         <rect

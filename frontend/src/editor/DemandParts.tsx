@@ -1,10 +1,12 @@
 import { ActionIcon, Button, Collapse, Group, Text } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useState } from "react";
 
 import type { Counts, Matrix, Mix, Zone } from "../api/demand";
 import type { Edit, FieldsOf } from "../api/types";
 import { IconTrash } from "../ui/icons";
-import { count, span } from "../ui/words";
+import { span } from "../ui/words";
 import { Committed } from "./Committed";
 import { ProfileChart, ProfileChoice, type Profiles, profileWord } from "./DayProfiles";
 import { mixWords, timeOfDay, tripsOf } from "./demand";
@@ -35,7 +37,7 @@ export function PartCard({
             {note ? `${name}: ${note}` : name}
           </Text>
         </div>
-        <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${name}`} onClick={onRemove}>
+        <ActionIcon variant="subtle" color="gray" aria-label={t`Remove ${name}`} onClick={onRemove}>
           <IconTrash />
         </ActionIcon>
       </Group>
@@ -57,8 +59,8 @@ export function WindowFields({
   return (
     <Group grow align="flex-start">
       <Committed
-        label="From"
-        suffix=" min"
+        label={t`From`}
+        suffix={" min"}
         min={0}
         max={1e5}
         digits={1}
@@ -66,12 +68,12 @@ export function WindowFields({
         onCommit={(value) => onChange({ begin: (value ?? 0) * 60 })}
       />
       <Committed
-        label="Until"
-        suffix=" min"
+        label={t`Until`}
+        suffix={" min"}
         min={0.1}
         max={1e5}
         digits={1}
-        placeholder="the end"
+        placeholder={t`the end`}
         value={end === null ? "" : end / 60}
         onCommit={(value) => onChange({ end: value === null ? null : value * 60 })}
       />
@@ -94,7 +96,7 @@ export function MixFold({
     <div>
       <Text size="sm">{mixWords(mix)}</Text>
       <Button variant="subtle" size="compact-sm" px={0} aria-expanded={open} onClick={() => setOpen(!open)}>
-        {open ? "Hide the mix" : "Change the mix"}
+        {open ? t`Hide the mix` : t`Change the mix`}
       </Button>
       <Collapse in={open}>
         {open && <MixForm mix={mix} pedestrians={pedestrians} onChange={onChange} />}
@@ -117,10 +119,10 @@ export function MatrixForm({
   const change = (fields: FieldsOf<"set_matrix", "matrix">): void =>
     onEdit({ kind: "set_matrix", matrix: matrix.id, ...fields });
   const when =
-    matrix.end === null ? "until the end of the run" : `${span(matrix.begin, matrix.end)} of the run`;
-  const note = `${count(Math.round(tripsOf(matrix)), "trip")} in ${count(matrix.trips.length, "row")}, ${when}`;
+    matrix.end === null ? t`until the end of the run` : t`${span(matrix.begin, matrix.end)} of the run`;
+  const note = t`${plural(Math.round(tripsOf(matrix)), { one: "# trip", other: "# trips" })} in ${plural(matrix.trips.length, { one: "# row", other: "# rows" })}, ${when}`;
   return (
-    <PartCard name={matrix.id} what="Trips between zones" note={note} onRemove={onRemove}>
+    <PartCard name={matrix.id} what={t`Trips between zones`} note={note} onRemove={onRemove}>
       <WindowFields begin={matrix.begin} end={matrix.end} onChange={change} />
       <ProfileChoice value={matrix.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
       <MixFold mix={matrix.mix} pedestrians onChange={(mix) => change({ mix })} />
@@ -141,12 +143,12 @@ export function CountsList({
 }) {
   const stations = [...new Set(counts.rows.map(([station]) => station))];
   const total = counts.rows.reduce((sum, [, , , number]) => sum + number, 0);
-  const where = `${count(counts.rows.length, "count")} at ${count(stations.length, "count station")}`;
-  const note = `${where}, ${count(Math.round(total), "vehicle")} in total`;
+  const where = t`${plural(counts.rows.length, { one: "# count", other: "# counts" })} at ${plural(stations.length, { one: "# count station", other: "# count stations" })}`;
+  const note = t`${where}, ${plural(Math.round(total), { one: "# vehicle", other: "# vehicles" })} in total`;
   return (
     <PartCard
       name={counts.id}
-      what={counts.use === "compare" ? "Counts to compare with" : "Counts to be reproduced"}
+      what={counts.use === "compare" ? t`Counts to compare with` : t`Counts to be reproduced`}
       note={note}
       onRemove={onRemove}
     >
@@ -157,7 +159,7 @@ export function CountsList({
           variant="default"
           onClick={() => onShow(stations.flatMap((station) => station.split(">")))}
         >
-          Show the count stations
+          <Trans>Show the count stations</Trans>
         </Button>
       </Group>
     </PartCard>
@@ -174,28 +176,28 @@ export function ZoneList({
   onRemove: (zone: string) => void;
 }) {
   return (
-    <section className="fold" aria-label="Zones">
+    <section className="fold" aria-label={t`Zones`}>
       <Text fw={600} size="sm">
-        Zones
+        <Trans>Zones</Trans>
       </Text>
       {zones.map(({ id, segments }) => (
         <Group key={id} justify="space-between" wrap="nowrap" gap={6}>
           <Text size="sm" style={{ overflowWrap: "anywhere" }}>
-            {id}: {count(segments.length, "segment")}
+            {id}: {plural(segments.length, { one: "# segment", other: "# segments" })}
           </Text>
           <Group gap={4} wrap="nowrap">
             <Button
               size="compact-sm"
               variant="default"
-              aria-label={`Show ${id}`}
+              aria-label={t`Show ${id}`}
               onClick={() => onShow(segments)}
             >
-              Show
+              <Trans>Show</Trans>
             </Button>
             <ActionIcon
               variant="subtle"
               color="gray"
-              aria-label={`Remove ${id}`}
+              aria-label={t`Remove ${id}`}
               onClick={() => onRemove(id)}
             >
               <IconTrash />
@@ -221,7 +223,7 @@ export function ProfileList({
   return (
     <div>
       <Button variant="subtle" size="compact-sm" px={0} aria-expanded={open} onClick={() => setOpen(!open)}>
-        {open ? "Hide the day profiles" : "Show the day profiles"}
+        {open ? t`Hide the day profiles` : t`Show the day profiles`}
       </Button>
       {open &&
         Object.entries(profiles).map(([id, shares]) => (
@@ -234,14 +236,14 @@ export function ProfileList({
                 <ActionIcon
                   variant="subtle"
                   color="gray"
-                  aria-label={`Remove ${id}`}
+                  aria-label={t`Remove ${id}`}
                   onClick={() => onRemove(id)}
                 >
                   <IconTrash />
                 </ActionIcon>
               ) : (
                 <Text size="xs" c="dimmed">
-                  one bar per {timeOfDay(86_400 / shares.length) === "01:00" ? "hour" : "slice"}
+                  {timeOfDay(86_400 / shares.length) === "01:00" ? t`one bar per hour` : t`one bar per slice`}
                 </Text>
               )}
             </Group>

@@ -1,11 +1,15 @@
 import { Group, NumberInput, Select } from "@mantine/core";
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 
-const UNITS = [
-  { value: "1", label: "seconds" },
-  { value: "60", label: "minutes" },
-  { value: "3600", label: "hours" },
-];
+import { parsed } from "../language/numbers";
+import { localized } from "../language/localized";
+
+const UNITS = localized(() => [
+  { value: "1", label: t`seconds` },
+  { value: "60", label: t`minutes` },
+  { value: "3600", label: t`hours` },
+]);
 
 /** The largest unit in which a time is a whole number, in seconds. */
 export const unitOf = (seconds: number): number =>
@@ -23,7 +27,7 @@ export function Duration({
 }) {
   const [unit, setUnit] = useState(unitOf(seconds));
   const commit = (text: string): void => {
-    const value = Math.round(Number.parseFloat(text) * unit * 1000) / 1000;
+    const value = Math.round(parsed(text) * unit * 1000) / 1000;
     if (value > 0 && value !== seconds) onCommit(value);
   };
   return (
@@ -43,8 +47,8 @@ export function Duration({
       />
       <Select
         w={112}
-        aria-label={`${label}: unit`}
-        data={UNITS}
+        aria-label={t`${label}: unit`}
+        data={UNITS()}
         value={String(unit)}
         allowDeselect={false}
         onChange={(value) => setUnit(Number(value))}

@@ -1,11 +1,12 @@
 import { Button, Loader, Text } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { memo, useMemo, useState } from "react";
 
 import type { Filler } from "../api/generators";
 import type { Assets, Edit } from "../api/types";
 import { inBounds, inCircle } from "../map/areas";
 import type { PackedDrawing } from "../map/drawing";
-import { count } from "../ui/words";
 import { ActorStep } from "./ActorStep";
 import { useStarter } from "./asked";
 import { criteriaNote } from "./criteria";
@@ -80,7 +81,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
   const addNeighbours = (): void =>
     changes.change(
       region.candidates.map((segment): Edit => ({ kind: "grow_roi", segment })),
-      `Add ${count(region.candidates.length, "segment")}`,
+      t`Add ${plural(region.candidates.length, { one: "# segment", other: "# segments" })}`,
     );
   const fill = async (share: number, seed: number, filler: Filler | null): Promise<void> => {
     setFilling(true);
@@ -92,15 +93,17 @@ function AllSteps({ store, now, drawing, assets }: Props) {
       onOpen={openStep}
       steps={{
         map: {
-          title: "Map",
+          title: t`Map`,
           done: true,
           note: map.name,
           body: <MapStep name={map.name} onShow={() => sights.bounds(drawing.bounds)} />,
         },
         region: {
-          title: "Region",
+          title: t`Region`,
           done: roi.length > 0,
-          note: roi.length ? count(roi.length, "segment") : "Where does it happen?",
+          note: roi.length
+            ? plural(roi.length, { one: "# segment", other: "# segments" })
+            : t`Where does it happen?`,
           body: (
             <RegionStep
               segments={roi.length}
@@ -122,27 +125,33 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         environment: {
-          title: "Weather and time",
+          title: t`Weather and time`,
           done: roi.length > 0,
           note: weatherNote(assets, environment.preset),
           body: assets ? (
             <>
               <EnvironmentStep assets={assets} document={document} onEdit={changes.change} />
-              <Button onClick={() => openStep("actors")}>Next: road users</Button>
+              <Button onClick={() => openStep("actors")}>
+                <Trans>Next: road users</Trans>
+              </Button>
             </>
           ) : (
-            <Loader size="sm" aria-label="Loading the weather" />
+            <Loader size="sm" aria-label={t`Loading the weather`} />
           ),
         },
         actors: {
-          title: "Road users",
+          title: t`Road users`,
           done: ones.length > 0,
           note: actorNote(document),
           body:
             roi.length === 0 ? (
               <>
-                <Text size="sm">Road users start inside the region. Choose the region first.</Text>
-                <Button onClick={() => openStep("region")}>Choose the region</Button>
+                <Text size="sm">
+                  <Trans>Road users start inside the region. Choose the region first.</Trans>
+                </Text>
+                <Button onClick={() => openStep("region")}>
+                  <Trans>Choose the region</Trans>
+                </Button>
               </>
             ) : (
               <>
@@ -171,14 +180,14 @@ function AllSteps({ store, now, drawing, assets }: Props) {
                 />
                 {ones.length > 0 && (
                   <Button variant="default" onClick={() => openStep("traffic")}>
-                    Next: traffic
+                    <Trans>Next: traffic</Trans>
                   </Button>
                 )}
               </>
             ),
         },
         traffic: {
-          title: "Traffic",
+          title: t`Traffic`,
           done: bringsTraffic(demand),
           note: trafficNote(demand),
           body: (
@@ -191,12 +200,14 @@ function AllSteps({ store, now, drawing, assets }: Props) {
                 onEdit={changes.change}
                 onShow={sights.segments}
               />
-              <Button onClick={() => openStep("run")}>Next: run</Button>
+              <Button onClick={() => openStep("run")}>
+                <Trans>Next: run</Trans>
+              </Button>
             </>
           ),
         },
         transit: {
-          title: "Public transport",
+          title: t`Public transport`,
           done: transit.lines.length > 0,
           note: transitNote(transit),
           body: (
@@ -210,7 +221,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         measures: {
-          title: "Measures",
+          title: t`Measures`,
           done: measures.length > 0,
           note: measureNote(measures),
           body: (
@@ -224,7 +235,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         rules: {
-          title: "Rules",
+          title: t`Rules`,
           done: document.rules.length > 0,
           note: ruleNote(document.rules),
           body: (
@@ -238,7 +249,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         parameters: {
-          title: "Parameters",
+          title: t`Parameters`,
           done: Object.keys(document.parameters).length > 0,
           note: parameterNote(document.parameters),
           body: (
@@ -256,8 +267,8 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         study: {
-          title: "Study",
-          done: studyNote(study) !== WHOLE_RUN,
+          title: t`Study`,
+          done: studyNote(study) !== WHOLE_RUN(),
           note: studyNote(study),
           body: (
             <StudyStep
@@ -270,15 +281,17 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         criteria: {
-          title: "Criteria",
+          title: t`Criteria`,
           done: document.criteria.length > 0,
           note: criteriaNote(document.criteria),
           body: <CriteriaStep document={document} onEdit={changes.change} />,
         },
         run: {
-          title: "Run",
+          title: t`Run`,
           done: false,
-          note: errors ? `${count(errors, "problem")} to solve first` : "Watch it live",
+          note: errors
+            ? t`${plural(errors, { one: "# problem", other: "# problems" })} to solve first`
+            : t`Watch it live`,
           body: (
             <RunStep
               name={name}

@@ -1,4 +1,6 @@
 import { Alert, Button, Loader, Text, Title } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useEffect, useState } from "react";
 
 import { api } from "../api/client";
@@ -45,11 +47,11 @@ export function EditorView({ scenario: name }: { scenario: string }) {
     return (
       <div className="catalogue">
         <Title order={1} size="h3" mb="md">
-          “{title}” cannot be opened
+          <Trans>“{title}” cannot be opened</Trans>
         </Title>
         <Alert color="red">{failure}</Alert>
         <Button mt="md" onClick={() => go({ view: "catalogue" })}>
-          Back to the maps
+          <Trans>Back to the maps</Trans>
         </Button>
       </div>
     );
@@ -57,8 +59,10 @@ export function EditorView({ scenario: name }: { scenario: string }) {
   if (!drawing || !loaded || !map) {
     return (
       <div className="empty">
-        <Loader aria-label="Opening the scenario" />
-        <Text mt="sm">Opening {title} …</Text>
+        <Loader aria-label={t`Opening the scenario`} />
+        <Text mt="sm">
+          <Trans>Opening {title} …</Trans>
+        </Text>
       </div>
     );
   }

@@ -1,14 +1,17 @@
 import { Button, Collapse, SegmentedControl, Slider, Switch, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { localized } from "../language/localized";
 import type { Assets, Edit, ScenarioDocument, WeatherPreset } from "../api/types";
 import { kindWord, PARAMETERS, weatherWord } from "../ui/words";
 
-const TIMES = [
-  { value: "day", label: "Day" },
-  { value: "sunset", label: "Sunset" },
-  { value: "night", label: "Night" },
-];
+const TIMES = localized(() => [
+  { value: "day", label: t`Day` },
+  { value: "sunset", label: t`Sunset` },
+  { value: "night", label: t`Night` },
+]);
 const KINDS = ["clear", "cloudy", "wet", "rain_light", "rain_medium", "rain_heavy", "fog", "dust"];
 
 /** One preset for each kind of weather at one time of day. */
@@ -36,8 +39,14 @@ export function EnvironmentStep({ assets, document, onEdit }: Props) {
   };
   return (
     <>
-      <SegmentedControl fullWidth data={TIMES} value={time} onChange={changeTime} aria-label="Time of day" />
-      <div className="weather" role="radiogroup" aria-label="Weather">
+      <SegmentedControl
+        fullWidth
+        data={TIMES()}
+        value={time}
+        onChange={changeTime}
+        aria-label={t`Time of day`}
+      />
+      <div className="weather" role="radiogroup" aria-label={t`Weather`}>
         {presetsAt(assets.weather, time).map((preset) => (
           <button
             type="button"
@@ -53,12 +62,14 @@ export function EnvironmentStep({ assets, document, onEdit }: Props) {
       </div>
       {chosen && (
         <Text size="sm">
-          Now: <b>{weatherWord(chosen)}</b>
-          {Object.keys(environment.parameters).length > 0 && ", fine-tuned"}
+          <Trans>
+            Now: <b>{weatherWord(chosen)}</b>
+            {Object.keys(environment.parameters).length > 0 ? t`, fine-tuned` : ""}
+          </Trans>
         </Text>
       )}
       <Switch
-        label="Weather affects driver behaviour"
+        label={t`Weather affects driver behaviour`}
         checked={environment.affects_driving}
         onChange={(event) =>
           onEdit({ kind: "set_environment", affects_driving: event.currentTarget.checked })
@@ -71,10 +82,10 @@ export function EnvironmentStep({ assets, document, onEdit }: Props) {
         aria-expanded={fine}
         onClick={() => setFine(!fine)}
       >
-        {fine ? "Hide fine-tuning" : "Fine-tune"}
+        {fine ? t`Hide fine-tuning` : t`Fine-tune`}
       </Button>
       <Collapse in={fine}>
-        {PARAMETERS.map(({ name, word }) => {
+        {PARAMETERS().map(({ name, word }) => {
           const value = values[name];
           return (
             value !== undefined && (

@@ -1,4 +1,5 @@
 import { Button, Menu } from "@mantine/core";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import { api } from "../api/client";
@@ -27,31 +28,36 @@ export function ExportMenu({
       <Menu position="bottom-end" withinPortal={false} withInitialFocusPlaceholder={false}>
         <Menu.Target>
           <Button variant="default" leftSection={<IconDown size={15} />}>
-            Export
+            <Trans>Export</Trans>
           </Button>
         </Menu.Target>
         <Menu.Dropdown>
           {DIALOGS.map((one) => (
             <Menu.Item key={one} onClick={() => setFormat(one)}>
-              {FORMATS[one].title} …
+              {FORMATS()[one].title} …
             </Menu.Item>
           ))}
           <Menu.Divider />
           <Menu.Item component="a" href={api.downloadUrl(name, "json")} download>
-            Document (JSON)
+            <Trans>Document (JSON)</Trans>
           </Menu.Item>
           <Menu.Item component="a" href={api.downloadUrl(name, "graphml")} download>
-            Graph (GraphML)
+            <Trans>Graph (GraphML)</Trans>
           </Menu.Item>
           <Menu.Divider />
-          <Menu.Item onClick={copyLink}>Copy the link to this view</Menu.Item>
+          <Menu.Item onClick={copyLink}>
+            <Trans>Copy the link to this view</Trans>
+          </Menu.Item>
           <Menu.Item
             onClick={() => {
               const canvas = onPicture();
               if (canvas) savePicture(canvas, name);
             }}
           >
-            Picture of the map (PNG)
+            <Trans>Picture of the map (PNG)</Trans>
+          </Menu.Item>
+          <Menu.Item onClick={() => print()}>
+            <Trans>Print</Trans>
           </Menu.Item>
           <Menu.Item
             onClick={() => {
@@ -59,9 +65,8 @@ export function ExportMenu({
               if (svg) saveVector(svg, name);
             }}
           >
-            Drawing of the map (SVG)
+            <Trans>Drawing of the map (SVG)</Trans>
           </Menu.Item>
-          <Menu.Item onClick={() => print()}>Print</Menu.Item>
         </Menu.Dropdown>
       </Menu>
       {format && <ExportDialog name={name} format={format} onClose={() => setFormat(null)} />}

@@ -1,9 +1,10 @@
 import { ActionIcon, Button, Group, NumberInput, Slider, Text, Tooltip } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import type { Filler } from "../api/generators";
 import { IconDice } from "../ui/icons";
-import { count } from "../ui/words";
 import { GeneratorForm } from "./GeneratorForm";
 
 /** Road users, random ones or those of a generator, in the place of all that were placed; flows stay. */
@@ -19,16 +20,12 @@ export function FillForm({
   const [share, setShare] = useState(30);
   const [seed, setSeed] = useState(1);
   const [filler, setFiller] = useState<Filler | null>(null);
-  const replaced =
-    actors === 1
-      ? "the road user of the scenario; undo restores it"
-      : `the ${count(actors, "road user")} of the scenario; undo restores them`;
   return (
     <div className="fold">
       <GeneratorForm filler={filler} onChange={setFiller} />
       <div>
         <Text size="sm" fw={500}>
-          Density: {share} % of the maximum
+          <Trans>Density: {share} % of the maximum</Trans>
         </Text>
         <Slider
           min={5}
@@ -37,24 +34,24 @@ export function FillForm({
           label={null}
           value={share}
           onChange={setShare}
-          thumbLabel="Density, percent of the maximum"
+          thumbLabel={t`Density, percent of the maximum`}
         />
       </div>
       <Group gap={6} align="flex-end" wrap="nowrap">
         <NumberInput
           style={{ flex: 1 }}
-          label="Random seed"
+          label={t`Random seed`}
           min={0}
           max={2 ** 31 - 1}
           allowDecimal={false}
           value={seed}
           onChange={(value) => setSeed(Number(value) || 0)}
         />
-        <Tooltip label="New random seed">
+        <Tooltip label={t`New random seed`}>
           <ActionIcon
             variant="default"
             size={36}
-            aria-label="New random seed"
+            aria-label={t`New random seed`}
             onClick={() => setSeed(Math.floor(Math.random() * 100_000))}
           >
             <IconDice />
@@ -62,11 +59,18 @@ export function FillForm({
         </Tooltip>
       </Group>
       <Text size="sm" c="dimmed">
-        The same seed gives the same road users.{actors > 0 && ` They replace ${replaced}.`}
+        {t`The same seed gives the same road users.`}
+        {actors > 0 && ` ${replacedWords(actors)}`}
       </Text>
       <Button variant="light" loading={busy} onClick={() => onFill(share / 100, seed, filler)}>
-        Fill the region
+        <Trans>Fill the region</Trans>
       </Button>
     </div>
   );
 }
+
+const replacedWords = (actors: number): string =>
+  plural(actors, {
+    one: "They replace the road user of the scenario; undo restores it.",
+    other: "They replace the # road users of the scenario; undo restores them.",
+  });

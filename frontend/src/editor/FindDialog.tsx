@@ -1,4 +1,6 @@
 import { Modal, Text, TextInput } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type KeyboardEvent, useId, useMemo, useState } from "react";
 
 import type { Actor, Flow } from "../api/types";
@@ -36,12 +38,12 @@ export function FindDialog({
     event.preventDefault();
   };
   return (
-    <Modal opened onClose={onClose} title="Find a road, a junction or a road user" yOffset="12vh">
+    <Modal opened onClose={onClose} title={t`Find a road, a junction or a road user`} yOffset="12vh">
       <TextInput
         data-autofocus
         leftSection={<IconSearch />}
-        aria-label="Name"
-        placeholder="Such as 12, junction 5, car-3 or bus"
+        aria-label={t`Name`}
+        placeholder={t`Such as 12, junction 5, car-3 or bus`}
         value={search}
         role="combobox"
         aria-expanded={found.length > 0}
@@ -53,7 +55,7 @@ export function FindDialog({
         }}
         onKeyDown={onKeyDown}
       />
-      <div className="found" role="listbox" id={list} aria-label="Found">
+      <div className="found" role="listbox" id={list} aria-label={t`Found`}>
         {found.map((one, n) => (
           <div
             key={`${one.is} ${one.id}`}
@@ -69,7 +71,7 @@ export function FindDialog({
       </div>
       {search.trim() && found.length === 0 && (
         <Text size="sm" role="status">
-          Nothing on this map or in this scenario is called “{search.trim()}”.
+          <Trans>Nothing on this map or in this scenario is called “{search.trim()}”.</Trans>
         </Text>
       )}
     </Modal>

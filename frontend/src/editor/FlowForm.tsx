@@ -1,5 +1,6 @@
 import { Group, Stack } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
 import type { Edit, Flow } from "../api/types";
 import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
@@ -20,7 +21,7 @@ export function FlowForm({
   return (
     <Stack gap="sm">
       <Committed
-        label={walks ? "Pedestrians per hour" : "Vehicles per hour"}
+        label={walks ? t`Pedestrians per hour` : t`Vehicles per hour`}
         suffix=""
         min={1}
         max={20_000}
@@ -32,8 +33,8 @@ export function FlowForm({
       <ProfileChoice value={flow.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
       <Group grow align="flex-start">
         <Committed
-          label="From"
-          suffix=" s"
+          label={t`From`}
+          suffix={" s"}
           min={0}
           max={1e6}
           step={10}
@@ -42,8 +43,8 @@ export function FlowForm({
           onCommit={(value) => change({ begin: value ?? 0 })}
         />
         <Committed
-          label="Until"
-          suffix=" s"
+          label={t`Until`}
+          suffix={" s"}
           min={1}
           max={1e6}
           step={10}
@@ -53,12 +54,12 @@ export function FlowForm({
         />
       </Group>
       <Committed
-        label={walks ? "Walking speed" : "Desired speed"}
-        suffix=" km/h"
+        label={walks ? t`Walking speed` : t`Desired speed`}
+        suffix={" km/h"}
         min={1}
         max={walks ? 15 : 250}
         digits={1}
-        placeholder={walks ? "default" : "speed limit"}
+        placeholder={walks ? t`default` : t`speed limit`}
         value={flow.speed === null ? "" : flow.speed * 3.6}
         onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })}
       />

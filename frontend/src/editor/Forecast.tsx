@@ -1,9 +1,12 @@
+import { i18n } from "@lingui/core";
 import { Alert, Button, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useRef, useState } from "react";
 
 import { type Forecast as Found, runs, type RunWish } from "../api/runs";
 import { reasonOf } from "../ui/reason";
-import { bytes, count } from "../ui/words";
+import { bytes } from "../ui/words";
 
 /** What the run will need; asked for on demand, as it takes as long as preparing a run. */
 export function Forecast({ wish, version }: { wish: RunWish; version: number }) {
@@ -31,10 +34,10 @@ export function Forecast({ wish, version }: { wish: RunWish; version: number }) 
   return (
     <>
       <Button variant="default" loading={busy} onClick={ask}>
-        Estimate disk and memory
+        <Trans>Estimate disk and memory</Trans>
       </Button>
       {failure && (
-        <Alert color="red" title="The estimate failed">
+        <Alert color="red" title={t`The estimate failed`}>
           {failure}
         </Alert>
       )}
@@ -43,14 +46,18 @@ export function Forecast({ wish, version }: { wish: RunWish; version: number }) 
           ref={answer}
           color={found.disk > found.free ? "red" : "blue"}
           role="status"
-          title={found.disk > found.free ? "Not enough disk space" : "Estimate"}
+          title={found.disk > found.free ? t`Not enough disk space` : t`Estimate`}
         >
           <Text size="sm">
-            {count(found.planned, "road user")} in total, {found.running.toLocaleString("en")} on the road at
-            the same time.
+            <Trans>
+              <Plural value={found.planned} one="# road user" other="# road users" /> in total,{" "}
+              {found.running.toLocaleString(i18n.locale)} on the road at the same time.
+            </Trans>
           </Text>
           <Text size="sm">
-            {bytes(found.disk)} of disk ({bytes(found.free)} free) and {bytes(found.memory)} of memory.
+            <Trans>
+              {bytes(found.disk)} of disk ({bytes(found.free)} free) and {bytes(found.memory)} of memory.
+            </Trans>
           </Text>
         </Alert>
       )}

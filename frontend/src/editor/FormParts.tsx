@@ -1,5 +1,7 @@
 import { ActionIcon, Button, type ButtonProps, Group, TextInput, Tooltip } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { IconTrash } from "../ui/icons";
 import { type PickBy, type Picked, type PlacePick, useTaking } from "./pick";
 
@@ -21,13 +23,13 @@ export function OpenAndShow({
         size="compact-sm"
         variant="default"
         aria-expanded={open}
-        aria-label={`${open ? "Close" : "Change"} ${part}`}
+        aria-label={`${open ? t`Close` : t`Change`} ${part}`}
         onClick={onOpen}
       >
-        {open ? "Close" : "Change"}
+        {open ? t`Close` : t`Change`}
       </Button>
-      <Button size="compact-sm" variant="default" aria-label={`Show where ${part} is`} onClick={onShow}>
-        Show where
+      <Button size="compact-sm" variant="default" aria-label={t`Show where ${part} is`} onClick={onShow}>
+        <Trans>Show where</Trans>
       </Button>
     </Group>
   );
@@ -97,11 +99,11 @@ export function PickButton({
       size="compact-sm"
       variant={active ? "filled" : "default"}
       aria-pressed={active}
-      aria-label={active ? "Stop choosing" : name}
+      aria-label={active ? t`Stop choosing` : name}
       onClick={() => (active ? pick.stop() : pick.start(pickKey, by))}
       {...rest}
     >
-      {active ? "Stop choosing" : children}
+      {active ? t`Stop choosing` : children}
     </Button>
   );
 }
@@ -125,7 +127,7 @@ export function ListButtons({
 }) {
   return (
     <Group gap={6} wrap="nowrap" style={{ flexShrink: 0 }}>
-      <Tooltip label="Earlier in the order">
+      <Tooltip label={t`Earlier in the order`}>
         <ActionIcon variant="default" size="lg" disabled={first} aria-label={earlier} onClick={onEarlier}>
           <span aria-hidden="true">↑</span>
         </ActionIcon>

@@ -1,3 +1,4 @@
+import { t } from "@lingui/core/macro";
 import { Alert, Checkbox, NumberInput, Select, Text, TextInput } from "@mantine/core";
 
 import {
@@ -25,10 +26,10 @@ export function GeneratorForm({
   return (
     <>
       <Select
-        label="Placed by"
+        label={t`Placed by`}
         data={[
-          { value: AT_RANDOM, label: "Random" },
-          ...offered.value.map(({ name }) => ({ value: name, label: `Generator ${name}` })),
+          { value: AT_RANDOM, label: t`Random` },
+          ...offered.value.map(({ name }) => ({ value: name, label: t`Generator ${name}` })),
         ]}
         value={filler?.generator ?? AT_RANDOM}
         allowDeselect={false}
@@ -50,7 +51,7 @@ function Options({
 }) {
   if (generator.error)
     return (
-      <Alert color="red" title="This generator cannot be used">
+      <Alert color="red" title={t`This generator cannot be used`}>
         {generator.error}
       </Alert>
     );

@@ -1,7 +1,10 @@
 import { ActionIcon, Button, Menu, Tooltip } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { memo, useEffect, useRef, useState } from "react";
 import { createPortal } from "react-dom";
 
+import { localized } from "../language/localized";
 import { api } from "../api/client";
 import { exchange } from "../api/exchange";
 import { isXosc } from "../exchange/useImport";
@@ -12,7 +15,9 @@ import { ExportMenu } from "./ExportMenu";
 import { NameDialog, OpenDialog } from "./fileDialogs";
 import type { EditorStore } from "./store";
 
-const SAVED = { saved: "All changes saved", saving: "Saving …", failed: "Not saved" } as const;
+const SAVED = localized(
+  () => ({ saved: t`All changes saved`, saving: t`Saving …`, failed: t`Not saved` }) as const,
+);
 const named = (label: unknown): string => (typeof label === "string" && label ? `: ${label}` : "");
 
 type Dialog = "rename" | "copy" | "open" | null;
@@ -43,8 +48,8 @@ export const HeadTools = memo(function HeadTools({
   if (!slot || !scenario) return null;
   const close = (): void => setDialog(null);
   const tools = [
-    { word: "Undo", keys: "Ctrl+Z", label: scenario.undo, act: undo, icon: <IconUndo /> },
-    { word: "Redo", keys: "Ctrl+Y", label: scenario.redo, act: redo, icon: <IconRedo /> },
+    { word: t`Undo`, keys: t`Ctrl+Z`, label: scenario.undo, act: undo, icon: <IconUndo /> },
+    { word: t`Redo`, keys: t`Ctrl+Y`, label: scenario.redo, act: redo, icon: <IconRedo /> },
   ];
   const upload = (chosen: File | undefined): void => {
     if (!chosen) return;
@@ -52,7 +57,7 @@ export const HeadTools = memo(function HeadTools({
       api.uploadScenario(chosen).then((made) => go({ view: "editor", scenario: made.name }), tellError);
       return;
     }
-    tell(`Importing ${chosen.name} …`);
+    tell(t`Importing ${chosen.name} …`);
     exchange
       .bring([chosen], () => undefined)
       .then((made) => made !== null && go({ view: "imported", scenario: made }), tellError);
@@ -67,7 +72,7 @@ export const HeadTools = memo(function HeadTools({
   return createPortal(
     <>
       <span className="saving" role="status" data-checked={checked === scenario?.document}>
-        {SAVED[saving]}
+        {SAVED()[saving]}
       </span>
       {tools.map(({ word, keys, label, act, icon }) => (
         <Tooltip key={word} label={`${word}${named(label)} (${keys})`}>
@@ -82,11 +87,11 @@ export const HeadTools = memo(function HeadTools({
           </ActionIcon>
         </Tooltip>
       ))}
-      <Tooltip label="Find a road, a junction or a road user (Ctrl+K)">
+      <Tooltip label={t`Find a road, a junction or a road user (Ctrl+K)`}>
         <ActionIcon
           variant="default"
           size="lg"
-          aria-label="Find a road, a junction or a road user"
+          aria-label={t`Find a road, a junction or a road user`}
           onClick={onFind}
         >
           <IconSearch />
@@ -100,18 +105,28 @@ export const HeadTools = memo(function HeadTools({
       >
         <Menu.Target>
           <Button variant="default" leftSection={<IconMenu />}>
-            Scenario
+            <Trans>Scenario</Trans>
           </Button>
         </Menu.Target>
         <Menu.Dropdown>
-          <Menu.Item onClick={() => setDialog("rename")}>Rename …</Menu.Item>
-          <Menu.Item onClick={() => setDialog("copy")}>Save as …</Menu.Item>
-          <Menu.Item onClick={() => setDialog("open")}>Open another …</Menu.Item>
-          <Menu.Item onClick={() => file.current?.click()}>Upload a file …</Menu.Item>
-          <Menu.Item onClick={() => go({ view: "runs", scenario: name })}>Earlier runs</Menu.Item>
+          <Menu.Item onClick={() => setDialog("rename")}>
+            <Trans>Rename …</Trans>
+          </Menu.Item>
+          <Menu.Item onClick={() => setDialog("copy")}>
+            <Trans>Save as …</Trans>
+          </Menu.Item>
+          <Menu.Item onClick={() => setDialog("open")}>
+            <Trans>Open another …</Trans>
+          </Menu.Item>
+          <Menu.Item onClick={() => file.current?.click()}>
+            <Trans>Upload a file …</Trans>
+          </Menu.Item>
+          <Menu.Item onClick={() => go({ view: "runs", scenario: name })}>
+            <Trans>Earlier runs</Trans>
+          </Menu.Item>
           {imported && (
             <Menu.Item onClick={() => go({ view: "imported", scenario: name })}>
-              Report of the import
+              <Trans>Report of the import</Trans>
             </Menu.Item>
           )}
         </Menu.Dropdown>
@@ -122,23 +137,23 @@ export const HeadTools = memo(function HeadTools({
         type="file"
         accept=".json,.graphml,.xml,.xosc"
         hidden
-        aria-label="Scenario file to upload"
+        aria-label={t`Scenario file to upload`}
         onChange={(event) => {
           upload(event.currentTarget.files?.[0]);
           event.currentTarget.value = "";
         }}
       />
-      <Tooltip label="Short tour">
-        <ActionIcon variant="subtle" color="gray" size="lg" aria-label="Short tour" onClick={onTour}>
+      <Tooltip label={t`Short tour`}>
+        <ActionIcon variant="subtle" color="gray" size="lg" aria-label={t`Short tour`} onClick={onTour}>
           <IconTour />
         </ActionIcon>
       </Tooltip>
-      <Tooltip label="Help: keyboard shortcuts and glossary (?)">
+      <Tooltip label={t`Help: keyboard shortcuts and glossary (?)`}>
         <ActionIcon
           variant="subtle"
           color="gray"
           size="lg"
-          aria-label="Help: keyboard shortcuts and glossary"
+          aria-label={t`Help: keyboard shortcuts and glossary`}
           onClick={onHelp}
         >
           <IconHelp />
@@ -146,10 +161,10 @@ export const HeadTools = memo(function HeadTools({
       </Tooltip>
       {dialog === "rename" && (
         <NameDialog
-          title="Rename the scenario"
-          label="Name"
+          title={t`Rename the scenario`}
+          label={t`Name`}
           value={scenario.document.name}
-          action="Rename"
+          action={t`Rename`}
           onClose={close}
           onName={async (title) => {
             if (await edit({ kind: "rename", name: title })) close();
@@ -158,15 +173,15 @@ export const HeadTools = memo(function HeadTools({
       )}
       {dialog === "copy" && (
         <NameDialog
-          title="Save under another name"
-          label="Name of the copy"
+          title={t`Save under another name`}
+          label={t`Name of the copy`}
           value={`${name}-copy`}
-          action="Save"
+          action={t`Save`}
           onClose={close}
           onName={async (to) => {
             const made = await api.copyScenario(name, to);
             close();
-            tell(`“${name}” stays as it is. You now work on the copy “${made.name}”.`);
+            tell(t`“${name}” stays as it is. You now work on the copy “${made.name}”.`);
             go({ view: "editor", scenario: made.name });
           }}
         />

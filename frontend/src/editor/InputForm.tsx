@@ -1,10 +1,11 @@
 import { Button, Group, Select, Text } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useState } from "react";
 
 import { type Demand, demand as api, type Entry, type VehicleInput } from "../api/demand";
 import type { Edit, FieldsOf } from "../api/types";
 import { reasonOf } from "../ui/reason";
-import { count } from "../ui/words";
 import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { freeName } from "./demand";
@@ -30,19 +31,28 @@ export function InputForm({
 }) {
   const change = (fields: FieldsOf<"set_input", "inflow">): void =>
     onEdit({ kind: "set_input", inflow: input.id, ...fields });
-  const lanes = input.lanes.length ? ` on ${count(input.lanes.length, "lane")}` : "";
-  const note = `on ${input.segment}${input.direction ? `, ${input.direction}` : ""}${lanes}`;
+  const lanes = input.lanes.length
+    ? t` on ${plural(input.lanes.length, { one: "# lane", other: "# lanes" })}`
+    : "";
+  const note = t`on ${input.segment}${input.direction ? `, ${input.direction}` : ""}${lanes}`;
   return (
-    <PartCard name={input.id} what="Vehicles from outside" note={note} onRemove={onRemove}>
+    <PartCard name={input.id} what={t`Vehicles from outside`} note={note} onRemove={onRemove}>
       {input.per_hour === null ? (
         <Text size="sm">
-          {count(Math.round(input.volumes.reduce((sum, one) => sum + one, 0)), "vehicle")} in{" "}
-          {count(input.volumes.length, "slice")} of {input.interval / 60} min
+          <Trans>
+            <Plural
+              value={Math.round(input.volumes.reduce((sum, one) => sum + one, 0))}
+              one="# vehicle"
+              other="# vehicles"
+            />{" "}
+            in <Plural value={input.volumes.length} one="# slice" other="# slices" /> of {input.interval / 60}{" "}
+            min
+          </Trans>
         </Text>
       ) : (
         <>
           <Committed
-            label="Vehicles per hour"
+            label={t`Vehicles per hour`}
             suffix=""
             min={1}
             max={40_000}
@@ -63,7 +73,7 @@ export function InputForm({
       <MixFold mix={input.mix} onChange={(mix) => change({ mix })} />
       <Group>
         <Button size="compact-sm" variant="default" onClick={() => onShow([input.segment])}>
-          Show where
+          <Trans>Show where</Trans>
         </Button>
       </Group>
     </PartCard>
@@ -90,19 +100,29 @@ export function NewInput({
     api.entries(name).then(setEntries, (error: unknown) => setReason(reasonOf(error)));
   }, [name]);
   if (reason) return <Text size="sm">{reason}</Text>;
-  if (!entries) return <Text size="sm">Looking for lanes that lead into the region ...</Text>;
-  if (!entries.length) return <Text size="sm">No lane leads into the region: it has no open end.</Text>;
+  if (!entries)
+    return (
+      <Text size="sm">
+        <Trans>Looking for lanes that lead into the region ...</Trans>
+      </Text>
+    );
+  if (!entries.length)
+    return (
+      <Text size="sm">
+        <Trans>No lane leads into the region: it has no open end.</Trans>
+      </Text>
+    );
   const both = (segment: string): boolean => entries.filter((one) => one.segment === segment).length > 1;
   const entry = entries.find((one) => keyOf(one) === chosen);
   return (
     <div className="fold">
       <Select
-        label="Where they drive in"
-        placeholder="Choose a segment"
+        label={t`Where they drive in`}
+        placeholder={t`Choose a segment`}
         data={entries.map((one) => ({
           value: keyOf(one),
           label:
-            `${one.segment}, ${count(one.lanes.length, "lane")}` +
+            `${one.segment}, ${plural(one.lanes.length, { one: "# lane", other: "# lanes" })}` +
             (both(one.segment) ? `, ${one.direction}` : ""),
         }))}
         value={chosen}
@@ -127,7 +147,7 @@ export function NewInput({
             });
         }}
       >
-        Add
+        <Trans>Add</Trans>
       </Button>
     </div>
   );

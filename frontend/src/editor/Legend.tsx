@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../language/localized";
 import {
   ELIGIBLE,
   FLOW,
@@ -15,27 +18,27 @@ import type { Step } from "./scene";
 /** What is a point on the map has its shape here, too; everything else is a patch of its colour. */
 type Shape = "round" | "diamond";
 
-const ROWS: Partial<Record<Step, [color: string, word: string, shape?: Shape][]>> = {
+const ROWS = localized((): Partial<Record<Step, [color: string, word: string, shape?: Shape][]>> => ({
   region: [
-    [ROI_BASE, "First segment"],
-    [ROI_MEMBER, "Region"],
-    [ELIGIBLE, "Can be added"],
+    [ROI_BASE, t`First segment`],
+    [ROI_MEMBER, t`Region`],
+    [ELIGIBLE, t`Can be added`],
   ],
-  transit: [[TRANSIT, "Stop, begin or end of a line"]],
-  study: [[TRANSIT, "D detector, S section, C cordon"]],
-  measures: [[MEASURE, "Measure"]],
-  rules: [[MARK_COLOR.rule, "Where rules act"]],
+  transit: [[TRANSIT, t`Stop, begin or end of a line`]],
+  study: [[TRANSIT, t`D detector, S section, C cordon`]],
+  measures: [[MEASURE, t`Measure`]],
+  rules: [[MARK_COLOR.rule, t`Where rules act`]],
   actors: [
-    [VEHICLE_NODE, "Vehicle start", "round"],
-    [PEDESTRIAN_NODE, "Pedestrian start", "round"],
-    ["#8b949d", "No start possible", "round"],
-    [GOAL, "Suggested goal", "diamond"],
-    [FLOW, "Vehicle flow"],
+    [VEHICLE_NODE, t`Vehicle start`, "round"],
+    [PEDESTRIAN_NODE, t`Pedestrian start`, "round"],
+    ["#8b949d", t`No start possible`, "round"],
+    [GOAL, t`Suggested goal`, "diamond"],
+    [FLOW, t`Vehicle flow`],
   ],
-};
+}));
 
 export function Legend({ step }: { step: Step }) {
-  const rows = ROWS[step];
+  const rows = ROWS()[step];
   if (!rows) return null;
   return (
     <div className="map-legend" aria-hidden="true">

@@ -1,8 +1,10 @@
 import { Group, Select, Text } from "@mantine/core";
 
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type FieldsOf, CATEGORIES } from "../api/types";
 import { isKey, nth } from "../lists";
-import { CATEGORY_WORD, clock, count } from "../ui/words";
+import { inSentence, CATEGORY_WORD, clock } from "../ui/words";
 import { Committed } from "./Committed";
 import { PartCard, WindowFields } from "./DemandParts";
 import { ListButtons, OpenAndShow, PickButton } from "./FormParts";
@@ -26,12 +28,12 @@ export function LineCard({
   const key = `line ${id}`;
   const change = (fields: FieldsOf<"set_line", "line">): void =>
     onEdit({ kind: "set_line", line: id, ...fields });
-  const word = CATEGORY_WORD[line.category].toLowerCase();
+  const word = inSentence(CATEGORY_WORD()[line.category]);
   return (
     <PartCard
       name={id}
-      what="Line"
-      note={`${word}, ${timetableWord(line)}, ${count(line.stops.length, "stop")}`}
+      what={t`Line`}
+      note={`${word}, ${timetableWord(line)}, ${plural(line.stops.length, { one: "# stop", other: "# stops" })}`}
       onRemove={() => onRemove(id)}
     >
       <OpenAndShow part={id} open={open} onShow={onShow} onOpen={() => onOpen(open ? null : key)} />
@@ -52,12 +54,14 @@ function TimetableFields({ line, onChange }: { line: Line; onChange: Change }) {
   return (
     <>
       {line.headway === null ? (
-        <Text size="sm">Departs at {line.departures.map((time) => clock(time)).join(", ")} of the run</Text>
+        <Text size="sm">
+          <Trans>Departs at {line.departures.map((time) => clock(time)).join(", ")} of the run</Trans>
+        </Text>
       ) : (
         <>
           <Committed
-            label="A trip every"
-            suffix=" min"
+            label={t`A trip every`}
+            suffix={" min"}
             min={0.2}
             max={1440}
             digits={1}
@@ -72,8 +76,8 @@ function TimetableFields({ line, onChange }: { line: Line; onChange: Change }) {
       <Group grow align="flex-start">
         {typeof line.dwell === "number" ? (
           <Committed
-            label="Dwell time"
-            suffix=" s"
+            label={t`Dwell time`}
+            suffix={" s"}
             min={0}
             max={3600}
             digits={0}
@@ -81,18 +85,20 @@ function TimetableFields({ line, onChange }: { line: Line; onChange: Change }) {
             onCommit={(value) => onChange({ dwell: { kind: "constant", value: value ?? 20 } })}
           />
         ) : (
-          <Text size="sm">Dwell time by a distribution: {String(line.dwell.kind)}</Text>
+          <Text size="sm">
+            <Trans>Dwell time by a distribution: {String(line.dwell.kind)}</Trans>
+          </Text>
         )}
         <Select
-          label="Vehicles"
+          label={t`Vehicles`}
           allowDeselect={false}
           data={CATEGORIES.filter((one) => one !== "pedestrian").map((value) => ({
             value,
-            label: CATEGORY_WORD[value],
+            label: CATEGORY_WORD()[value],
           }))}
           value={line.category}
           onChange={(category) => {
-            if (isKey(CATEGORY_WORD, category)) onChange({ category, model: null });
+            if (isKey(CATEGORY_WORD(), category)) onChange({ category, model: null });
           }}
         />
       </Group>
@@ -117,21 +123,21 @@ interface EndProps extends Pick<CardProps, "graph" | "pick"> {
 
 function End({ end, line, graph, pick, onChange }: EndProps) {
   const node = line[end];
-  const word = end === "start" ? "Begins" : "Ends";
+  const word = end === "start" ? t`Begins` : t`Ends`;
   return (
     <Group gap={6} justify="space-between" wrap="nowrap">
       <Text size="sm">
-        {word}: {node === null ? "at an end of the region" : placeWord(graph, node)}
+        {word}: {node === null ? t`at an end of the region` : placeWord(graph, node)}
       </Text>
       <PickButton
         pick={pick}
         pickKey={`${end} of ${line.id}`}
         by="node"
         style={{ flexShrink: 0 }}
-        name={`Choose where it ${word.toLowerCase()}`}
+        name={t`Choose where it ${inSentence(word)}`}
         onTake={({ name }) => onChange({ [end]: name })}
       >
-        Choose
+        {t`Choose`}
       </PickButton>
     </Group>
   );
@@ -150,26 +156,26 @@ function Served({ line, stops, onChange }: { line: Line; stops: readonly Stop[];
     onServed(next.map((one, k) => ({ ...one, after: nth(line.stops, k).after })));
   };
   return (
-    <section aria-label={`Stops of line ${line.id}`}>
+    <section aria-label={t`Stops of line ${line.id}`}>
       {line.stops.map(({ stop, after }, n) => {
         const name = known.get(stop);
         return (
           <Group key={`${n} ${stop}`} gap={6} align="flex-end" wrap="nowrap" mb={6}>
             <div style={{ flex: 1 }}>
               <Committed
-                label={`${n + 1}. ${name ? stopWord(name) : stop}, departs after`}
-                suffix=" s"
+                label={t`${n + 1}. ${name ? stopWord(name) : stop}, departs after`}
+                suffix={" s"}
                 min={0}
                 max={1e6}
                 digits={0}
-                placeholder="no timetable"
+                placeholder={t`no timetable`}
                 value={after ?? ""}
                 onCommit={(value) => put(n, { after: value })}
               />
             </div>
             <ListButtons
-              earlier={`Serve ${stop} earlier`}
-              removal={`Leave out ${stop}`}
+              earlier={t`Serve ${stop} earlier`}
+              removal={t`Leave out ${stop}`}
               first={n === 0}
               only={line.stops.length === 1}
               onEarlier={() => swap(n)}
@@ -179,8 +185,8 @@ function Served({ line, stops, onChange }: { line: Line; stops: readonly Stop[];
         );
       })}
       <Select
-        label="Serve one more stop"
-        placeholder="Choose a stop"
+        label={t`Serve one more stop`}
+        placeholder={t`Choose a stop`}
         value={null}
         searchable
         data={stops.map((stop) => ({ value: stop.id, label: stopWord(stop) }))}

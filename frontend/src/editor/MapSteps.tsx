@@ -1,10 +1,12 @@
 import { Button, Group, NumberInput, Text } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useCallback, useState } from "react";
 
 import { api } from "../api/client";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
-import { count, mapFacts } from "../ui/words";
+import { mapFacts } from "../ui/words";
 import type { Region } from "./asked";
 
 /** Metres that are suggested for the surroundings of a place. */
@@ -18,10 +20,10 @@ export function MapStep({ name, onShow }: { name: string; onShow: () => void }) 
       <Text size="sm">{value ? mapFacts(value.statistics).join(" · ") : "…"}</Text>
       <Group>
         <Button size="compact-sm" variant="default" onClick={onShow}>
-          Show the whole map
+          <Trans>Show the whole map</Trans>
         </Button>
         <Button size="compact-sm" variant="subtle" onClick={() => go({ view: "catalogue" })}>
-          Choose another map
+          <Trans>Choose another map</Trans>
         </Button>
       </Group>
     </>
@@ -56,10 +58,10 @@ export function RegionStep({
   const many = (
     <>
       <Button size="compact-sm" variant="default" onClick={onWhole}>
-        Take the whole map
+        <Trans>Take the whole map</Trans>
       </Button>
       <Button size="compact-sm" variant="default" onClick={onSeen}>
-        Take all that I see
+        <Trans>Take all that I see</Trans>
       </Button>
       <Group gap={6} align="center">
         <Button
@@ -68,13 +70,13 @@ export function RegionStep({
           disabled={typeof metres !== "number"}
           onClick={() => onWithin(Number(metres))}
         >
-          Take all within
+          <Trans>Take all within</Trans>
         </Button>
         <NumberInput
           size="xs"
           w={92}
-          aria-label="Distance from the middle of what is in sight"
-          suffix=" m"
+          aria-label={t`Distance from the middle of what is in sight`}
+          suffix={" m"}
           min={10}
           max={20_000}
           step={50}
@@ -82,7 +84,9 @@ export function RegionStep({
           value={metres}
           onChange={setMetres}
         />
-        <Text size="sm">of the middle</Text>
+        <Text size="sm">
+          <Trans>of the middle</Trans>
+        </Text>
       </Group>
     </>
   );
@@ -90,12 +94,14 @@ export function RegionStep({
     return (
       <>
         <Text size="sm">
-          Click the road or junction where your scenario begins. It turns dark blue; then let the region grow
-          around it. Or drag a rectangle with Shift held down, or a line around it with Ctrl.
+          <Trans>
+            Click the road or junction where your scenario begins. It turns dark blue; then let the region
+            grow around it. Or drag a rectangle with Shift held down, or a line around it with Ctrl.
+          </Trans>
         </Text>
         <Group>
           <Button size="compact-sm" variant="default" onClick={onBegin}>
-            Begin in the middle of what I see
+            <Trans>Begin in the middle of what I see</Trans>
           </Button>
           {many}
         </Group>
@@ -105,23 +111,31 @@ export function RegionStep({
   return (
     <>
       <Text size="sm">
-        Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again. A
-        rectangle, dragged with Shift held down, adds all in it; so does a line around it, with Ctrl.
+        <Trans>
+          Click a{" "}
+          <b>
+            <Trans>light-blue</Trans>
+          </b>{" "}
+          segment to add it, or a segment of the region to take it out again. A rectangle, dragged with Shift
+          held down, adds all in it; so does a line around it, with Ctrl.
+        </Trans>
       </Text>
       <Group>
         {(!region.current || region.candidates.length > 0) && (
           <Button size="compact-sm" variant="default" disabled={!region.current} onClick={onAll}>
             {region.current
-              ? `Add all ${count(region.candidates.length, "neighbour")}`
-              : "Add all neighbours"}
+              ? t`Add all ${plural(region.candidates.length, { one: "# neighbour", other: "# neighbours" })}`
+              : t`Add all neighbours`}
           </Button>
         )}
         {many}
         <Button size="compact-sm" variant="subtle" onClick={onShow}>
-          Show the region
+          <Trans>Show the region</Trans>
         </Button>
       </Group>
-      <Button onClick={onNext}>Next: weather and time</Button>
+      <Button onClick={onNext}>
+        <Trans>Next: weather and time</Trans>
+      </Button>
     </>
   );
 }

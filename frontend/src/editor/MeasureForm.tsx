@@ -1,5 +1,6 @@
 import { Group, MultiSelect, SegmentedControl, TagsInput } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
 import { CATEGORIES, type Category, type Edit } from "../api/types";
 import { CATEGORY_WORD } from "../ui/words";
 import { Committed } from "./Committed";
@@ -35,13 +36,13 @@ export function MeasureCard({
   const change: Change = (next, label) => onEdit({ kind: "set_measure", measure: next }, label);
   const rename = (next: string): void => {
     if (!next || taken.includes(next)) return;
-    onEdit({ kind: "set_measure", measure: { ...measure, id: next }, instead_of: id }, `Rename ${id}`);
+    onEdit({ kind: "set_measure", measure: { ...measure, id: next }, instead_of: id }, t`Rename ${id}`);
     onOpen(next);
   };
   return (
     <PartCard
       name={id}
-      what={KIND[measure.kind]}
+      what={KIND()[measure.kind]}
       note={`${detail}; ${when}`}
       onRemove={() => {
         pick.stop();
@@ -59,7 +60,7 @@ export function MeasureCard({
       />
       {open && (
         <>
-          <CommittedText label="Name" value={id} maxLength={60} onCommit={rename} />
+          <CommittedText label={t`Name`} value={id} maxLength={60} onCommit={rename} />
           <WindowFields
             begin={measure.begin}
             end={measure.end}
@@ -85,8 +86,8 @@ function PlaceFields({ measure, pick, onChange }: { measure: Measure; pick: Plac
     <>
       {"places" in measure && (
         <TagsInput
-          label="Places"
-          description="at least one"
+          label={t`Places`}
+          description={t`at least one`}
           inputWrapperOrder={["label", "input", "description"]}
           value={[...measure.places]}
           splitChars={[",", ";", " "]}
@@ -95,10 +96,10 @@ function PlaceFields({ measure, pick, onChange }: { measure: Measure; pick: Plac
           }}
         />
       )}
-      <Group gap={6} role="group" aria-label={`Choose places of ${measure.id} on the map`}>
+      <Group gap={6} role="group" aria-label={t`Choose places of ${measure.id} on the map`}>
         {kinds.map((kind) => (
           <PickButton key={kind} pick={pick} pickKey={key} by={kind} many onTake={take}>
-            {`${PICK_WORD[kind]} on the map`}
+            {t`${PICK_WORD()[kind]} on the map`}
           </PickButton>
         ))}
       </Group>
@@ -115,8 +116,8 @@ function KindFields({ measure, onChange }: { measure: Measure; onChange: Change 
     case "speed_limit":
       return (
         <Committed
-          label="Speed limit"
-          suffix=" km/h"
+          label={t`Speed limit`}
+          suffix={" km/h"}
           min={1}
           max={300}
           digits={0}
@@ -130,27 +131,27 @@ function KindFields({ measure, onChange }: { measure: Measure; onChange: Change 
       return (
         <>
           <Committed
-            label="Speed limit"
-            suffix=" km/h"
+            label={t`Speed limit`}
+            suffix={" km/h"}
             min={1}
             max={300}
             digits={0}
-            placeholder="as it is"
+            placeholder={t`as it is`}
             value={limit(measure.speed)}
             onCommit={(value) => onChange({ ...measure, speed: value === null ? null : value / 3.6 })}
           />
           <Committed
-            label="Width of the open lanes"
-            suffix=" m"
+            label={t`Width of the open lanes`}
+            suffix={" m"}
             min={2}
             max={6}
             digits={2}
-            placeholder="as it is"
+            placeholder={t`as it is`}
             value={measure.width ?? ""}
             onCommit={(width) => onChange({ ...measure, width })}
           />
           <TagsInput
-            label="Closed lanes"
+            label={t`Closed lanes`}
             placeholder={measure.closed_lanes.length === 0 ? "12.0.-2" : ""}
             value={[...measure.closed_lanes]}
             splitChars={[",", ";", " "]}
@@ -162,8 +163,8 @@ function KindFields({ measure, onChange }: { measure: Measure; onChange: Change 
       return (
         <Group grow align="flex-start">
           <Committed
-            label="Metres along the road"
-            suffix=" m"
+            label={t`Metres along the road`}
+            suffix={" m"}
             min={0}
             max={1e7}
             digits={1}
@@ -173,8 +174,8 @@ function KindFields({ measure, onChange }: { measure: Measure; onChange: Change 
             }}
           />
           <Committed
-            label="Length of the vehicle"
-            suffix=" m"
+            label={t`Length of the vehicle`}
+            suffix={" m"}
             min={2}
             max={25}
             digits={1}
@@ -189,10 +190,10 @@ function KindFields({ measure, onChange }: { measure: Measure; onChange: Change 
       return (
         <SegmentedControl
           fullWidth
-          aria-label="What the light shows"
+          aria-label={t`What the light shows`}
           data={[
-            { value: "off", label: "Off" },
-            { value: "flashing", label: "Flashing" },
+            { value: "off", label: t`Off` },
+            { value: "flashing", label: t`Flashing` },
           ]}
           value={measure.shows}
           onChange={(shows) => onChange({ ...measure, shows: shows === "flashing" ? shows : "off" })}
@@ -218,17 +219,17 @@ function PermissionFields({
     <>
       <SegmentedControl
         fullWidth
-        aria-label="Who is meant"
+        aria-label={t`Who is meant`}
         data={[
-          { value: "only", label: "Only these may" },
-          { value: "not", label: "These may not" },
+          { value: "only", label: t`Only these may` },
+          { value: "not", label: t`These may not` },
         ]}
         value={only ? "only" : "not"}
         onChange={(next) => put(next === "only", who)}
       />
       <MultiSelect
-        label="Vehicles"
-        data={VEHICLES.map((value) => ({ value, label: CATEGORY_WORD[value] }))}
+        label={t`Vehicles`}
+        data={VEHICLES.map((value) => ({ value, label: CATEGORY_WORD()[value] }))}
         value={who}
         onChange={(next) => {
           const ones = VEHICLES.filter((one) => next.includes(one));

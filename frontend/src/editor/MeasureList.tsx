@@ -1,5 +1,6 @@
 import { Text } from "@mantine/core";
 
+import { Trans } from "@lingui/react/macro";
 import type { Measure } from "./measures";
 import { inWords } from "./measures";
 
@@ -9,7 +10,7 @@ export function MeasureList({ measures }: { measures: readonly Measure[] }) {
   return (
     <section aria-labelledby="measures">
       <Text id="measures" size="sm" fw={500}>
-        Measures
+        <Trans>Measures</Trans>
       </Text>
       <ul style={{ margin: 0, paddingLeft: 18 }}>
         {measures.map((measure) => {

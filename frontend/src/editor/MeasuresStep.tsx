@@ -1,6 +1,9 @@
 import { Button, Group, SegmentedControl, Select, Stack, Text, TextInput } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { localized } from "../language/localized";
 import type { Edit } from "../api/types";
 import { isKey } from "../lists";
 import { useKeptForm } from "../ui/keptForm";
@@ -8,19 +11,19 @@ import { MeasureCard } from "./MeasureForm";
 import { KIND, type Measure, newMeasure, picksOf } from "./measures";
 import { namedPlace, type PlacePick, type PickBy, type Picked, useTaking } from "./pick";
 
-const NEW = "new measure";
+const NEW = localized(() => t`new measure`);
 
-export const PICK_WORD: Record<PickBy, string> = {
-  segment: "Road",
-  lane: "Lane",
-  turn: "Turn",
-  point: "Point of a lane",
-  light: "Traffic light",
-  node: "Point of a lane",
-  goal: "Goal",
-  place: "Place",
-  ground: "Point",
-};
+export const PICK_WORD = localized((): Record<PickBy, string> => ({
+  segment: t`Road`,
+  lane: t`Lane`,
+  turn: t`Turn`,
+  point: t`Point of a lane`,
+  light: t`Traffic light`,
+  node: t`Point of a lane`,
+  goal: t`Goal`,
+  place: t`Place`,
+  ground: t`Point`,
+}));
 
 /** Closures, roadworks and the like: a list with a form for each, and the places on the map. */
 export function MeasuresStep({
@@ -40,7 +43,9 @@ export function MeasuresStep({
   const [open, setOpen] = useState<string | null>(null);
   return (
     <>
-      <Text size="sm">What traffic may do is changed for a time; the map stays as it is.</Text>
+      <Text size="sm">
+        <Trans>What traffic may do is changed for a time; the map stays as it is.</Trans>
+      </Text>
       {measures.map((measure) => (
         <MeasureCard
           key={measure.id}
@@ -58,7 +63,7 @@ export function MeasuresStep({
         lights={lights}
         pick={pick}
         onAdd={(measure) => {
-          onEdit({ kind: "set_measure", measure }, `Add ${measure.id}`);
+          onEdit({ kind: "set_measure", measure }, t`Add ${measure.id}`);
           pick.stop();
           setOpen(measure.id);
         }}
@@ -88,22 +93,22 @@ function NewMeasure({
     onAdd(newMeasure(kind, picked, measures));
     setTyped("");
   };
-  const active = useTaking(pick, NEW, add);
+  const active = useTaking(pick, NEW(), add);
   const arm = (choice: PickBy): void => {
-    if (active) pick.start(NEW, choice);
+    if (active) pick.start(NEW(), choice);
   };
   const type = (): void => {
     if (typed.trim()) add(namedPlace(typed.trim()));
   };
   return (
-    <section className="fold" aria-label="New measure">
+    <section className="fold" aria-label={t`New measure`}>
       <Select
-        label="Kind of measure"
-        data={Object.entries(KIND).map(([value, label]) => ({ value, label }))}
+        label={t`Kind of measure`}
+        data={Object.entries(KIND()).map(([value, label]) => ({ value, label }))}
         value={kind}
         allowDeselect={false}
         onChange={(next) => {
-          if (!isKey(KIND, next)) return;
+          if (!isKey(KIND(), next)) return;
           setKind(next);
           arm(picksOf(next)[0] ?? "segment");
         }}
@@ -112,8 +117,8 @@ function NewMeasure({
         <SegmentedControl
           fullWidth
           size="xs"
-          aria-label="What it is about"
-          data={choices.map((choice) => ({ value: choice, label: PICK_WORD[choice] }))}
+          aria-label={t`What it is about`}
+          data={choices.map((choice) => ({ value: choice, label: PICK_WORD()[choice] }))}
           value={chosen}
           onChange={(next) => {
             const choice = choices.find((one) => one === next) ?? chosen;
@@ -123,12 +128,12 @@ function NewMeasure({
         />
       )}
       <Stack gap={6}>
-        <Button aria-pressed={active} onClick={() => (active ? pick.stop() : pick.start(NEW, chosen))}>
-          {active ? "Stop choosing" : "Choose it on the map"}
+        <Button aria-pressed={active} onClick={() => (active ? pick.stop() : pick.start(NEW(), chosen))}>
+          {active ? t`Stop choosing` : t`Choose it on the map`}
         </Button>
         {kind === "signal_outage" ? (
           <Select
-            label="or its junction"
+            label={t`or its junction`}
             data={[...lights]}
             value={null}
             searchable
@@ -140,8 +145,8 @@ function NewMeasure({
           <Group gap={6} align="flex-end" wrap="nowrap">
             <TextInput
               style={{ flex: 1 }}
-              label="or type its name"
-              placeholder={kind === "incident" ? "12.0.-2" : "r12, 12.0.-2 or r12>r8"}
+              label={t`or type its name`}
+              placeholder={kind === "incident" ? "12.0.-2" : t`r12, 12.0.-2 or r12>r8`}
               value={typed}
               onChange={(event) => setTyped(event.currentTarget.value)}
               onKeyDown={(event) => {
@@ -149,7 +154,7 @@ function NewMeasure({
               }}
             />
             <Button variant="default" disabled={!typed.trim()} onClick={type}>
-              Add
+              <Trans>Add</Trans>
             </Button>
           </Group>
         )}

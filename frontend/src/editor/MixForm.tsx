@@ -1,5 +1,6 @@
 import { Text } from "@mantine/core";
 
+import { Trans } from "@lingui/react/macro";
 import type { Mix } from "../api/demand";
 import { CATEGORIES, type Category } from "../api/types";
 import { CATEGORY_WORD } from "../ui/words";
@@ -26,11 +27,13 @@ export function MixForm({
   };
   return (
     <fieldset className="mix">
-      <legend>Mix of road users</legend>
+      <legend>
+        <Trans>Mix of road users</Trans>
+      </legend>
       {(pedestrians ? CATEGORIES : VEHICLES).map((category) => (
         <Committed
           key={category}
-          label={CATEGORY_WORD[category]}
+          label={CATEGORY_WORD()[category]}
           suffix=""
           min={0}
           max={1000}

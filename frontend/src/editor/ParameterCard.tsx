@@ -1,4 +1,6 @@
 import { ActionIcon, Button, Group, Select, Slider, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useEffect, useState } from "react";
 
 import type { Edit } from "../api/types";
@@ -46,7 +48,7 @@ export function ParameterCard({
   return (
     <PartCard
       name={name}
-      what={description || "Parameter"}
+      what={description || t`Parameter`}
       note={`${shortNumber(value)}${suffix}`}
       onRemove={() => onEdit({ kind: "remove_parameter", parameter: name })}
     >
@@ -56,7 +58,7 @@ export function ParameterCard({
             <ValueSlider name={name} value={value} unit={unit} min={min} max={max} onValue={set} />
           )}
           <Committed
-            label={`Value of ${name}`}
+            label={t`Value of ${name}`}
             suffix={suffix}
             digits={6}
             min={min ?? -FAR}
@@ -68,7 +70,9 @@ export function ParameterCard({
           />
         </>
       ) : (
-        <Text size="sm">Computed: {formula}</Text>
+        <Text size="sm">
+          <Trans>Computed: {formula}</Trans>
+        </Text>
       )}
       {uses.map(({ place, label, formula: text }) => (
         <Computed
@@ -79,16 +83,20 @@ export function ParameterCard({
           onShow={onShow(place)}
         />
       ))}
-      {uses.length === 0 && <Text size="sm">Nothing is computed from it yet.</Text>}
+      {uses.length === 0 && (
+        <Text size="sm">
+          <Trans>Nothing is computed from it yet.</Trans>
+        </Text>
+      )}
       <Select
-        label={`A number to compute from ${name}`}
-        placeholder="Choose a number"
+        label={t`A number to compute from ${name}`}
+        placeholder={t`Choose a number`}
         searchable
         limit={100}
         value={null}
         data={free.map(({ place, label, value: now }) => ({
           value: place,
-          label: `${label}${now === null ? "" : `, now ${shortNumber(now)}`}`,
+          label: `${label}${now === null ? "" : t`, now ${shortNumber(now)}`}`,
         }))}
         onChange={(place) => {
           if (place !== null) onEdit({ kind: "set_formula", place, formula: `$${name}` });
@@ -99,16 +107,16 @@ export function ParameterCard({
           size="compact-sm"
           variant="default"
           aria-expanded={open}
-          aria-label={`${open ? "Close" : "Change"} ${name}`}
+          aria-label={`${open ? t`Close` : t`Change`} ${name}`}
           onClick={() => setOpen(!open)}
         >
-          {open ? "Close" : "Name, unit and bounds"}
+          {open ? t`Close` : t`Name, unit and bounds`}
         </Button>
       </Group>
       {open && (
         <>
           <CommittedText
-            label="Name"
+            label={t`Name`}
             value={name}
             maxLength={64}
             onCommit={(next) => {
@@ -116,30 +124,35 @@ export function ParameterCard({
             }}
           />
           <CommittedText
-            label="What it is"
+            label={t`What it is`}
             value={description}
             maxLength={1000}
             onCommit={(next) => set({ description: next })}
           />
-          <CommittedText label="Unit" value={unit} maxLength={40} onCommit={(next) => set({ unit: next })} />
+          <CommittedText
+            label={t`Unit`}
+            value={unit}
+            maxLength={40}
+            onCommit={(next) => set({ unit: next })}
+          />
           <Group grow align="flex-start">
             <Committed
-              label="Least"
+              label={t`Least`}
               suffix={suffix}
               digits={6}
               min={-FAR}
               max={FAR}
-              placeholder="any"
+              placeholder={t`any`}
               value={min ?? ""}
               onCommit={(next) => set({ min: next })}
             />
             <Committed
-              label="Greatest"
+              label={t`Greatest`}
               suffix={suffix}
               digits={6}
               min={-FAR}
               max={FAR}
-              placeholder="any"
+              placeholder={t`any`}
               value={max ?? ""}
               onCommit={(next) => set({ max: next })}
             />
@@ -216,15 +229,15 @@ function Computed({
         />
       </div>
       {onShow && (
-        <Button size="sm" px={8} variant="default" aria-label={`Show where ${label} is`} onClick={onShow}>
-          Show
+        <Button size="sm" px={8} variant="default" aria-label={t`Show where ${label} is`} onClick={onShow}>
+          <Trans>Show</Trans>
         </Button>
       )}
       <ActionIcon
         variant="subtle"
         color="gray"
         size="lg"
-        aria-label={`Let ${label} be a number`}
+        aria-label={t`Let ${label} be a number`}
         onClick={() => onFormula(null)}
       >
         <IconTrash />

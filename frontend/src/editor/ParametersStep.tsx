@@ -1,4 +1,6 @@
 import { Button, Group, NumberInput, Select, Text, TextInput } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useMemo, useState } from "react";
 
 import type { Edit, ScenarioDocument } from "../api/types";
@@ -44,8 +46,10 @@ export function ParametersStep({
   return (
     <>
       <Text size="sm">
-        Numbers with a name and bounds. Turn one, and everything that is computed from it follows; a sweep
-        runs the scenario with many values.
+        <Trans>
+          Numbers with a name and bounds. Turn one, and everything that is computed from it follows; a sweep
+          runs the scenario with many values.
+        </Trans>
       </Text>
       {Object.entries(parameters).map(([one, parameter]) => (
         <ParameterCard
@@ -61,7 +65,7 @@ export function ParametersStep({
       ))}
       {names.length > 0 && (
         <Button component="a" href={hashOf({ view: "sweeps", scenario: name })}>
-          Sweep the parameters
+          <Trans>Sweep the parameters</Trans>
         </Button>
       )}
       <NewParameter free={free} names={names} onEdit={onEdit} />
@@ -95,35 +99,35 @@ function NewParameter({
   };
   const [min, max] = bounds;
   const wrong = !isName(name)
-    ? name && "Letters, digits and _, beginning with a letter"
+    ? name && t`Letters, digits and _, beginning with a letter`
     : names.includes(name)
-      ? "There is one of that name"
+      ? t`There is one of that name`
       : null;
   const add = (): void => {
     const made: Edit = { kind: "set_parameter", parameter: name, value, unit, min, max };
     const computed: Edit[] = place === null ? [] : [{ kind: "set_formula", place, formula: `$${name}` }];
-    onEdit([made, ...computed], `Parameter ${name}`);
+    onEdit([made, ...computed], t`Parameter ${name}`);
     setPlace(null);
     setName("");
     setUnit("");
   };
   return (
-    <section className="fold" aria-label="New parameter">
+    <section className="fold" aria-label={t`New parameter`}>
       <Select
-        label="Number that becomes a parameter"
-        placeholder="Choose a number of the scenario"
+        label={t`Number that becomes a parameter`}
+        placeholder={t`Choose a number of the scenario`}
         searchable
         clearable
         limit={100}
         value={place}
         data={free.map((one) => ({
           value: one.place,
-          label: `${one.label}${one.value === null ? "" : `, now ${shortNumber(one.value)}`}`,
+          label: `${one.label}${one.value === null ? "" : t`, now ${shortNumber(one.value)}`}`,
         }))}
         onChange={choose}
       />
       <TextInput
-        label="Name of the parameter"
+        label={t`Name of the parameter`}
         value={name}
         error={wrong}
         maxLength={64}
@@ -131,14 +135,14 @@ function NewParameter({
       />
       <Group grow align="flex-start">
         <NumberInput
-          label="Value"
+          label={t`Value`}
           value={value}
           onChange={(next) => {
             if (typeof next === "number") setValue(next);
           }}
         />
         <TextInput
-          label="Unit"
+          label={t`Unit`}
           value={unit}
           maxLength={40}
           onChange={(event) => setUnit(event.currentTarget.value)}
@@ -146,14 +150,14 @@ function NewParameter({
       </Group>
       <Group grow align="flex-start">
         <NumberInput
-          label="From"
+          label={t`From`}
           value={min}
           onChange={(next) => {
             if (typeof next === "number") setBounds([next, max]);
           }}
         />
         <NumberInput
-          label="To"
+          label={t`To`}
           value={max}
           onChange={(next) => {
             if (typeof next === "number") setBounds([min, next]);
@@ -161,7 +165,7 @@ function NewParameter({
         />
       </Group>
       <Button variant="default" disabled={!name || Boolean(wrong)} onClick={add}>
-        Add the parameter
+        <Trans>Add the parameter</Trans>
       </Button>
     </section>
   );

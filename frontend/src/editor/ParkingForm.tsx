@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import type { TripParking } from "../api/demand";
 import type { Edit, FieldsOf } from "../api/types";
 import { Committed } from "./Committed";
@@ -9,9 +11,9 @@ const USUAL_WITHIN = 300;
 export function ParkingForm({ parking, onEdit }: { parking: TripParking; onEdit: (edit: Edit) => void }) {
   const change = (fields: FieldsOf<"set_parking", never>): void => onEdit({ kind: "set_parking", ...fields });
   return (
-    <section className="fold" aria-label="Parking of trips">
+    <section className="fold" aria-label={t`Parking of trips`}>
       <Committed
-        label="Cars that begin in a parking place"
+        label={t`Cars that begin in a parking place`}
         suffix=" %"
         min={0}
         max={100}
@@ -20,7 +22,7 @@ export function ParkingForm({ parking, onEdit }: { parking: TripParking; onEdit:
         onCommit={(share) => change({ begin: (share ?? 0) / 100 })}
       />
       <Committed
-        label="Cars that end in a parking place"
+        label={t`Cars that end in a parking place`}
         suffix=" %"
         min={0}
         max={100}
@@ -32,8 +34,8 @@ export function ParkingForm({ parking, onEdit }: { parking: TripParking; onEdit:
         <>
           <Stay stay={parking.stay} onChange={(value) => change({ stay: { kind: "constant", value } })} />
           <Committed
-            label="At most away from start or destination, between zones"
-            suffix=" m"
+            label={t`At most away from start or destination, between zones`}
+            suffix={" m"}
             min={10}
             max={10_000}
             digits={0}
@@ -51,12 +53,12 @@ function Stay({ stay, onChange }: { stay: TripParking["stay"]; onChange: (second
   const drawn = typeof stay !== "number";
   return (
     <Committed
-      label="A place is taken for"
-      suffix=" min"
+      label={t`A place is taken for`}
+      suffix={" min"}
       min={0}
       max={1440}
       digits={1}
-      placeholder={drawn ? "drawn for each trip" : "60 min"}
+      placeholder={drawn ? t`drawn for each trip` : "60 min"}
       value={drawn ? "" : stay / 60}
       onCommit={(minutes) => onChange(minutes === null ? USUAL_STAY : minutes * 60)}
     />

@@ -1,10 +1,11 @@
 import { Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import type { Problem } from "../api/types";
 import type { Graph } from "../map/graph";
 import { IconWarn } from "../ui/icons";
-import { count } from "../ui/words";
 import { grouped, inWords, type ProblemGroup } from "./problemGroups";
 
 /** Length of the list; solving some shows the rest. */
@@ -22,9 +23,11 @@ export function Problems({
 }) {
   if (problems.length === 0) return null;
   return (
-    <section className="problems" aria-label="Problems">
+    <section className="problems" aria-label={t`Problems`}>
       <Text size="sm" fw={700} px={8} pb={2} role="status">
-        {count(problems.length, "problem")} found
+        <Trans>
+          <Plural value={problems.length} one="# problem" other="# problems" /> found
+        </Trans>
       </Text>
       {grouped(problems, graph).map((group) => (
         <Group key={group.key} group={group} graph={graph} onShow={onShow} />
@@ -67,7 +70,7 @@ function Group({
           {rows}
           {problems.length > SHOWN && (
             <Text size="sm" px={8}>
-              and {problems.length - SHOWN} more
+              <Trans>and {problems.length - SHOWN} more</Trans>
             </Text>
           )}
         </div>
@@ -81,7 +84,7 @@ const Sign = ({ problem: { severity } }: { problem: Problem }) => (
     className="problem-sign"
     data-severity={severity}
     role="img"
-    aria-label={severity === "error" ? "Must be solved" : "Warning"}
+    aria-label={severity === "error" ? t`Must be solved` : t`Warning`}
   >
     <IconWarn />
   </span>

@@ -1,5 +1,7 @@
 import { Alert, Button } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import type { EditorStore } from "./store";
 
 /** Why the last change was not made; one that still makes sense can be asked for again. */
@@ -13,7 +15,7 @@ export function RefusalAlert({ store }: { store: EditorStore }) {
         variant="filled"
         title={refusal.title}
         withCloseButton
-        closeButtonLabel="Close this message"
+        closeButtonLabel={t`Close this message`}
         onClose={clearRefusal}
         role="alert"
       >
@@ -27,7 +29,7 @@ export function RefusalAlert({ store }: { store: EditorStore }) {
               color="dark"
               onClick={() => void refusal.again?.()}
             >
-              Apply my change again
+              <Trans>Apply my change again</Trans>
             </Button>
           </div>
         )}

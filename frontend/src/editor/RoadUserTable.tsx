@@ -1,10 +1,14 @@
 import { ActionIcon, Button, TextInput, Tooltip } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type KeyboardEvent, memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 
+import { speedText } from "../language/units";
+import { localized } from "../language/localized";
 import { type Actor, CATEGORIES, type Flow } from "../api/types";
 import type { Graph } from "../map/graph";
 import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
-import { CATEGORY_WORD, count, flowWord, kmh, modelWord, styleWord } from "../ui/words";
+import { inSentence, CATEGORY_WORD, flowWord, modelWord, styleWord } from "../ui/words";
 import { placeWord } from "./placeWords";
 import { isFlow } from "./placing";
 import { rowsInSight } from "./windowed";
@@ -12,7 +16,17 @@ import { rowsInSight } from "./windowed";
 const ROW = 34;
 /** From so many on it is worth searching. */
 const MANY = 8;
-const COLUMNS = ["Name", "Kind", "Model", "Start", "Goal", "Speed", "Departs", "Driving style", "Ego"];
+const COLUMNS = localized(() => [
+  t`Name`,
+  t`Kind`,
+  t`Model`,
+  t`Start`,
+  t`Goal`,
+  t`Speed`,
+  t`Departs`,
+  t`Driving style`,
+  t`Ego`,
+]);
 
 /** All road users and flows of the scenario, only the rows in sight drawn; choosing a row is choosing on the map. */
 export const RoadUserTable = memo(function RoadUserTable({
@@ -96,8 +110,8 @@ export const RoadUserTable = memo(function RoadUserTable({
       <div className="table-bar">
         {head}
         <span role="status">
-          {count(ones.length, "entry", "entries")}
-          {selection.length > 0 && `, ${selection.length} selected`}
+          {plural(ones.length, { one: "# entry", other: "# entries" })}
+          {selection.length > 0 && t`, ${selection.length} selected`}
         </span>
         <Button
           size="compact-xs"
@@ -105,13 +119,13 @@ export const RoadUserTable = memo(function RoadUserTable({
           disabled={rows.length === 0}
           onClick={() => onSelectAll(rows.map((row) => row.id))}
         >
-          Select all
+          <Trans>Select all</Trans>
         </Button>
         {searching && open && (
           <TextInput
             size="xs"
-            placeholder="Search"
-            aria-label="Search the table of road users"
+            placeholder={t`Search`}
+            aria-label={t`Search the table of road users`}
             value={filter}
             onChange={(event) => setFilter(event.currentTarget.value)}
           />
@@ -123,14 +137,14 @@ export const RoadUserTable = memo(function RoadUserTable({
           aria-expanded={open}
           onClick={() => onOpen(!open)}
         >
-          {open ? "Hide the table" : "Show the table"}
+          {open ? t`Hide the table` : t`Show the table`}
         </Button>
       </div>
       <div
         className="table"
         hidden={!open}
         role="region"
-        aria-label="Table of road users"
+        aria-label={t`Table of road users`}
         tabIndex={0}
         ref={box}
         onKeyDown={onKeyDown}
@@ -141,7 +155,7 @@ export const RoadUserTable = memo(function RoadUserTable({
         <table aria-rowcount={rows.length + 1}>
           <thead>
             <tr aria-rowindex={1}>
-              {COLUMNS.map((word) => (
+              {COLUMNS().map((word) => (
                 <th scope="col" key={word}>
                   {word}
                 </th>
@@ -166,7 +180,7 @@ export const RoadUserTable = memo(function RoadUserTable({
         </table>
         {rows.length === 0 && (
           <p className="table-empty">
-            {ones.length === 0 ? "No road users yet." : `No road user matches “${filter}”.`}
+            {ones.length === 0 ? t`No road users yet.` : t`No road user matches “${filter}”.`}
           </p>
         )}
       </div>
@@ -219,7 +233,7 @@ const Row = memo(function Row({
           {kindWord(one)}
         </span>
       </td>
-      <td>{isFlow(one) ? "–" : one.model ? modelWord(one.model) : "any"}</td>
+      <td>{isFlow(one) ? "–" : one.model ? modelWord(one.model) : t`any`}</td>
       <td>
         <Tooltip label={one.spawn}>
           <span>{placeWord(graph, one.spawn)}</span>
@@ -235,21 +249,21 @@ const Row = memo(function Row({
         )}
       </td>
       <td>{speedWord(one)}</td>
-      <td>{isFlow(one) ? `${one.begin} to ${one.end} s` : `after ${one.depart} s`}</td>
+      <td>{isFlow(one) ? t`${one.begin} to ${one.end} s` : t`after ${one.depart} s`}</td>
       <td>
         {isFlow(one)
-          ? `${Math.round(one.per_hour)} per hour`
+          ? t`${Math.round(one.per_hour)} per hour`
           : one.category === "pedestrian"
             ? "–"
             : styleWord(one.style)}
       </td>
-      <td>{!isFlow(one) && one.ego ? "yes" : ""}</td>
+      <td>{!isFlow(one) && one.ego ? t`yes` : ""}</td>
       <td>
         <ActionIcon
           size="sm"
           variant="subtle"
           color="gray"
-          aria-label={`Remove ${one.id}`}
+          aria-label={t`Remove ${one.id}`}
           onClick={(event) => {
             event.stopPropagation();
             actions.remove(one.id);
@@ -266,14 +280,14 @@ const walks = (one: Actor | Flow): boolean =>
   isFlow(one) ? "pedestrian" in one.mix : one.category === "pedestrian";
 
 function kindWord(one: Actor | Flow): string {
-  if (!isFlow(one)) return CATEGORY_WORD[one.category];
+  if (!isFlow(one)) return CATEGORY_WORD()[one.category];
   if (walks(one)) return flowWord(true);
-  return `Flow: ${CATEGORIES.filter((category) => one.mix[category])
-    .map((category) => CATEGORY_WORD[category].toLowerCase())
+  return t`Flow: ${CATEGORIES.filter((category) => one.mix[category])
+    .map((category) => inSentence(CATEGORY_WORD()[category]))
     .join(", ")}`;
 }
 
 function speedWord(one: Actor | Flow): string {
-  if (one.speed !== null) return kmh(one.speed);
-  return walks(one) ? "default" : "speed limit";
+  if (one.speed !== null) return speedText(one.speed);
+  return walks(one) ? t`default` : t`speed limit`;
 }

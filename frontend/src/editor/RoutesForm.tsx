@@ -1,20 +1,21 @@
 import { Select, Text } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import type { RouteChoice } from "../api/demand";
 import type { Edit, FieldsOf } from "../api/types";
-import { count } from "../ui/words";
 import { Committed } from "./Committed";
 
 /** How trips choose their routes: by length or travel time, and who looks for others on the way. */
 export function RoutesForm({ routes, onEdit }: { routes: RouteChoice; onEdit: (edit: Edit) => void }) {
   const change = (fields: FieldsOf<"set_routes", never>): void => onEdit({ kind: "set_routes", ...fields });
   return (
-    <section className="fold" aria-label="Routes of trips">
+    <section className="fold" aria-label={t`Routes of trips`}>
       <Select
-        label="Routes of trips"
+        label={t`Routes of trips`}
         data={[
-          { value: "length", label: "Shortest" },
-          { value: "travel_time", label: "By travel time, from repeated runs" },
+          { value: "length", label: t`Shortest` },
+          { value: "travel_time", label: t`By travel time, from repeated runs` },
         ]}
         value={routes.by}
         allowDeselect={false}
@@ -24,7 +25,7 @@ export function RoutesForm({ routes, onEdit }: { routes: RouteChoice; onEdit: (e
       />
       {routes.by === "travel_time" && (
         <Committed
-          label="Runs at most"
+          label={t`Runs at most`}
           suffix=""
           min={1}
           max={100}
@@ -34,7 +35,7 @@ export function RoutesForm({ routes, onEdit }: { routes: RouteChoice; onEdit: (e
         />
       )}
       <Committed
-        label="Drivers who look for quicker routes on the way"
+        label={t`Drivers who look for quicker routes on the way`}
         suffix=" %"
         min={0}
         max={100}
@@ -44,7 +45,10 @@ export function RoutesForm({ routes, onEdit }: { routes: RouteChoice; onEdit: (e
       />
       {routes.shares.length > 0 && (
         <Text size="xs" c="dimmed">
-          Fixed shares of routes for {count(routes.shares.length, "pair")} of places
+          <Trans>
+            Fixed shares of routes for <Plural value={routes.shares.length} one="# pair" other="# pairs" /> of
+            places
+          </Trans>
         </Text>
       )}
     </section>

@@ -1,6 +1,9 @@
 import { Button, NumberInput, SegmentedControl, Select, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { localized } from "../language/localized";
 import type { RunWish } from "../api/runs";
 import type { Edit, ScenarioDocument } from "../api/types";
 import { CarlaChoice } from "../carla/CarlaChoice";
@@ -9,20 +12,20 @@ import { Duration } from "./Duration";
 import { Forecast } from "./Forecast";
 import { MeasureList } from "./MeasureList";
 
-const CONTROLS = [
-  { value: "fixed", label: "Fixed-time" },
-  { value: "actuated", label: "Actuated" },
-];
-const PACES = [
-  { value: "real", label: "Real time" },
-  { value: "fast", label: "As fast as possible" },
-];
-const RECORDINGS = [
-  { value: "step", label: "Every step" },
-  { value: "1", label: "Every second" },
-  { value: "10", label: "Every 10 seconds" },
-  { value: "none", label: "Nothing" },
-];
+const CONTROLS = localized(() => [
+  { value: "fixed", label: t`Fixed-time` },
+  { value: "actuated", label: t`Actuated` },
+]);
+const PACES = localized(() => [
+  { value: "real", label: t`Real time` },
+  { value: "fast", label: t`As fast as possible` },
+]);
+const RECORDINGS = localized(() => [
+  { value: "step", label: t`Every step` },
+  { value: "1", label: t`Every second` },
+  { value: "10", label: t`Every 10 seconds` },
+  { value: "none", label: t`Nothing` },
+]);
 /** Longer runs are made in slices, and not watched in real time. */
 const LONG = 3600;
 
@@ -74,19 +77,21 @@ export function RunStep({
     <>
       <Duration
         key={duration}
-        label="Duration"
+        label={t`Duration`}
         seconds={duration}
         onCommit={(value) => onEdit({ kind: "set_simulation", duration: value })}
       />
       {long && (
         <Text size="xs" c="dimmed">
-          A run of more than an hour is saved after each hour: if it is interrupted, it can be resumed from
-          the last full hour.
+          <Trans>
+            A run of more than an hour is saved after each hour: if it is interrupted, it can be resumed from
+            the last full hour.
+          </Trans>
         </Text>
       )}
       <NumberInput
-        label="Random seed"
-        description="same seed, same traffic"
+        label={t`Random seed`}
+        description={t`same seed, same traffic`}
         inputWrapperOrder={["label", "input", "description"]}
         min={0}
         allowDecimal={false}
@@ -98,10 +103,10 @@ export function RunStep({
         }}
       />
       <Select
-        label="Record trajectories"
-        description="for replay, charts and counts"
+        label={t`Record trajectories`}
+        description={t`for replay, charts and counts`}
         inputWrapperOrder={["label", "input", "description"]}
-        data={RECORDINGS}
+        data={RECORDINGS()}
         value={inCarla ? "step" : recording}
         disabled={inCarla}
         allowDeselect={false}
@@ -110,49 +115,49 @@ export function RunStep({
       {lights && (
         <div>
           <Text size="sm" fw={500}>
-            Signal control
+            <Trans>Signal control</Trans>
           </Text>
           <SegmentedControl
             fullWidth
-            data={CONTROLS}
+            data={CONTROLS()}
             value={control}
-            aria-label="Signal control"
+            aria-label={t`Signal control`}
             onChange={(value) =>
               onEdit({ kind: "set_signal_control", control: value === "actuated" ? value : "fixed" })
             }
           />
           <Text size="xs" c="dimmed" mt={4}>
             {control === "fixed"
-              ? "Every signal keeps its times."
-              : "A green is extended while vehicles arrive."}
+              ? t`Every signal keeps its times.`
+              : t`A green is extended while vehicles arrive.`}
           </Text>
           <Button size="compact-sm" variant="default" mt={6} onClick={onLights}>
-            Show the signal programs
+            <Trans>Show the signal programs</Trans>
           </Button>
         </div>
       )}
       <MeasureList measures={measures} />
       <div>
         <Text size="sm" fw={500}>
-          Speed at the start
+          <Trans>Speed at the start</Trans>
         </Text>
         <SegmentedControl
           fullWidth
-          data={PACES}
+          data={PACES()}
           value={chosenPace}
-          aria-label="Speed at the start"
+          aria-label={t`Speed at the start`}
           onChange={setPace}
         />
       </div>
       <CarlaChoice chosen={inCarla} onChoose={setInCarla} />
       {empty && (
         <Text size="sm">
-          There are no road users yet. Place some in “Road users”, or add traffic in “Traffic”.
+          <Trans>There are no road users yet. Place some in “Road users”, or add traffic in “Traffic”.</Trans>
         </Text>
       )}
       {blocked && (
         <Text size="sm" c="red">
-          Solve the problems listed below first.
+          <Trans>Solve the problems listed below first.</Trans>
         </Text>
       )}
       {!blocked && !empty && <Forecast wish={wish} version={version} />}
@@ -163,7 +168,7 @@ export function RunStep({
         disabled={blocked || empty}
         onClick={() => onRun(wish)}
       >
-        Run
+        <Trans context="button">Run</Trans>
       </Button>
     </>
   );

@@ -1,3 +1,7 @@
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
+import { lengthText } from "../language/units";
 import type { Actor } from "../api/types";
 import { CATEGORY_COLOR } from "../map/colors";
 
@@ -13,7 +17,7 @@ export function Silhouette({ actor, length, width }: { actor: Actor; length: num
         className="silhouette"
         viewBox="-1 -0.300 22 4.100"
         role="img"
-        aria-label={`${length.toFixed(1)} m long, ${width.toFixed(1)} m wide, on a lane of 3.5 m`}
+        aria-label={t`${lengthText(length, 1)} long, ${lengthText(width, 1)} wide, on a lane of ${lengthText(3.5, 1)}`}
       >
         <rect x={-1} y={0} width={22} height={3.5} fill="#969ea8" />
         <path d="M-1 0h22M-1 3.500h22" stroke="#fff" strokeWidth={0.15} strokeDasharray="1.500 1" />
@@ -25,7 +29,9 @@ export function Silhouette({ actor, length, width }: { actor: Actor; length: num
         />
       </svg>
       <figcaption style={{ fontSize: 12 }}>
-        {length.toFixed(1)} m long, {width.toFixed(1)} m wide
+        <Trans>
+          {lengthText(length, 1)} long, {lengthText(width, 1)} wide
+        </Trans>
       </figcaption>
     </figure>
   );

@@ -1,6 +1,9 @@
 import { Loader, SegmentedControl } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
+import { localized } from "../language/localized";
 import type { PackedDrawing } from "../map/drawing";
 import { MapCanvas } from "../map/MapCanvas";
 import { choose } from "./handlers/select";
@@ -13,7 +16,7 @@ import { useSlow } from "../ui/useSlow";
 import type { EditorNow } from "./useEditing";
 import { useScene } from "./useScene";
 
-const NO_ROUTE = "No route leads from the start to this point inside the region";
+const NO_ROUTE = localized(() => t`No route leads from the start to this point inside the region`);
 
 /** What is below the map. */
 type Dock = "table" | "time";
@@ -41,15 +44,15 @@ export function Stage({
   const view = usePlannedView(now, dock === "time" && open);
   const starts = useScene(now);
   const scene = useMemo(() => (view.shown ? withoutStarts(starts) : starts), [starts, view.shown]);
-  const hint = view.shown ? view.hint : now.unreachable ? NO_ROUTE : (carried?.hint ?? handler.hint(hover));
+  const hint = view.shown ? view.hint : now.unreachable ? NO_ROUTE() : (carried?.hint ?? handler.hint(hover));
   const head = useMemo(
     () => (
       <SegmentedControl
         size="xs"
-        aria-label="Below the map"
+        aria-label={t`Below the map`}
         data={[
-          { value: "table", label: "Road users" },
-          { value: "time", label: "Time" },
+          { value: "table", label: t`Road users` },
+          { value: "time", label: t`Time` },
         ]}
         value={dock}
         onChange={(next) => {
@@ -87,7 +90,7 @@ export function Stage({
           picker={picker}
           scene={scene}
           handle={now.handle}
-          label={`Map ${document.map.name}`}
+          label={t`Map ${document.map.name}`}
           aim={handler.aim}
           onPick={view.shown ? view.pick : handler.pick}
           onPoint={(at) => {
@@ -101,7 +104,7 @@ export function Stage({
             return taken !== null;
           }}
           onDrop={(at) => {
-            if (at && carried?.needsRoute && now.unreachable) now.say(NO_ROUTE);
+            if (at && carried?.needsRoute && now.unreachable) now.say(NO_ROUTE());
             else if (at) carried?.drop(at);
             setCarried(null);
             setHover(null);
@@ -111,8 +114,10 @@ export function Stage({
           {slow ? (
             <div className="map-hint" role="status">
               <span className="waiting">
-                <Loader size={16} aria-hidden="true" />
-                Applying the change …
+                <Trans>
+                  <Loader size={16} aria-hidden="true" />
+                  Applying the change …
+                </Trans>
               </span>
             </div>
           ) : (

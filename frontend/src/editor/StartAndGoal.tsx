@@ -1,5 +1,7 @@
 import { ActionIcon, Button, Group, Select, Text, Tooltip } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import type { Actor, Flow } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { IconTrash } from "../ui/icons";
@@ -34,9 +36,9 @@ export function StartAndGoal({
   const start = graph.place(one.spawn);
   const moves: [string, () => Place | null][] = start
     ? [
-        ["Further back", () => starts.along(start, -1)],
-        ["Further on", () => starts.along(start, 1)],
-        ["Another lane", () => starts.otherLane(start)],
+        [t`Further back`, () => starts.along(start, -1)],
+        [t`Further on`, () => starts.along(start, 1)],
+        [t`Another lane`, () => starts.otherLane(start)],
       ]
     : [];
   const ids = (goals ?? []).map((goal) => goal.id);
@@ -45,12 +47,12 @@ export function StartAndGoal({
     <>
       <div>
         <Text size="sm" fw={500}>
-          Start
+          <Trans>Start</Trans>
         </Text>
         <Tooltip label={one.spawn} position="top-start">
           <Text size="sm">{placeWord(graph, one.spawn)}</Text>
         </Tooltip>
-        <Group gap={6} mt={4} role="group" aria-label="Move the start">
+        <Group gap={6} mt={4} role="group" aria-label={t`Move the start`}>
           {moves.map(([word, find]) => (
             <Button
               key={word}
@@ -69,32 +71,32 @@ export function StartAndGoal({
       {!isFlow(one) && <Passed via={one.via} graph={graph} onVia={onVia} onPickVia={onPickVia} />}
       {goals?.length === 0 && !one.goal ? (
         <Text size="sm" c="red">
-          No goal can be reached from here. Move the start or extend the region.
+          <Trans>No goal can be reached from here. Move the start or extend the region.</Trans>
         </Text>
       ) : (
         <Group gap={6} align="flex-end">
           <Select
             style={{ flex: "1 1 170px" }}
-            label="Goal"
+            label={t`Goal`}
             searchable
             disabled={goals === null}
             allowDeselect={false}
             value={one.goal ?? ""}
             data={[
-              { value: "", label: `Random${goals ? ` (one of ${goals.length})` : ""}` },
+              { value: "", label: goals ? t`Random (one of ${goals.length})` : t`Random` },
               ...all.map((id) => ({ value: id, label: placeWord(graph, id) })),
             ]}
-            nothingFoundMessage="No such goal"
+            nothingFoundMessage={t`No such goal`}
             onChange={(goal) => {
               if ((goal || null) !== one.goal) onGoal(goal || null);
             }}
           />
           <Button variant="default" px="sm" disabled={!goals?.length} onClick={onPickGoal}>
-            Choose on the map
+            <Trans>Choose on the map</Trans>
           </Button>
           {one.goal && (
             <Button variant="default" px="sm" onClick={() => onGoal(null)}>
-              Random goal
+              <Trans>Random goal</Trans>
             </Button>
           )}
         </Group>
@@ -116,13 +118,13 @@ function Passed({
   onPickVia: () => void;
 }) {
   return (
-    <div role="group" aria-label="Waypoints">
+    <div role="group" aria-label={t`Waypoints`}>
       <Group gap={6} justify="space-between">
         <Text size="sm" fw={500}>
-          Waypoints{via.length === 0 && ": none"}
+          {via.length === 0 ? t`Waypoints: none` : t`Waypoints`}
         </Text>
         <Button size="compact-xs" variant="default" onClick={onPickVia}>
-          Add a waypoint
+          <Trans>Add a waypoint</Trans>
         </Button>
       </Group>
       {via.map((id, index) => (
@@ -137,7 +139,7 @@ function Passed({
             size="sm"
             variant="subtle"
             color="red"
-            aria-label={`Remove waypoint ${index + 1}, ${placeWord(graph, id)}`}
+            aria-label={t`Remove waypoint ${index + 1}, ${placeWord(graph, id)}`}
             onClick={() => onVia(via.filter((_, other) => other !== index))}
           >
             <IconTrash size={14} />

@@ -1,9 +1,11 @@
 import { ActionIcon, Button, Group, Text, TextInput } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { inSentence } from "../ui/words";
 import type { Graph } from "../map/graph";
 import { IconTrash } from "../ui/icons";
-import { count } from "../ui/words";
 import { PartCard } from "./DemandParts";
 import { type PlacePick, useTaking } from "./pick";
 import { placeWord } from "./placeWords";
@@ -37,26 +39,32 @@ export function StationCard({
   const [refused, setRefused] = useState<string | null>(null);
   const rename = (text: string): void => {
     const name = text.trim();
-    const problem = name !== id && taken.includes(name) ? `${name} is taken` : null;
-    setRefused(name === "" ? "A station needs a name" : problem);
+    const problem = name !== id && taken.includes(name) ? t`${name} is taken` : null;
+    setRefused(name === "" ? t`A station needs a name` : problem);
     if (name === "" || problem || name === id) return;
     pick.stop();
     onChange({ ...station, id: name });
     onOpen(name);
   };
-  const note = lines.map(({ word, nodes }) => `${word.toLowerCase()} ${count(nodes.length, "lane")}`);
+  const note = lines.map(
+    ({ word, nodes }) => `${inSentence(word)} ${plural(nodes.length, { one: "# lane", other: "# lanes" })}`,
+  );
   return (
     <PartCard
       name={id}
-      what={STATION[kind]}
-      note={kind === "detectors" ? count(lines[0]?.nodes.length ?? 0, "lane") : note.join(", ")}
+      what={STATION()[kind]}
+      note={
+        kind === "detectors"
+          ? plural(lines[0]?.nodes.length ?? 0, { one: "# lane", other: "# lanes" })
+          : note.join(", ")
+      }
       onRemove={onRemove}
     >
       <OpenAndShow part={id} open={open} onShow={onShow} onOpen={() => onOpen(open ? null : id)} />
       {open && (
         <>
           <TextInput
-            label="Name"
+            label={t`Name`}
             key={id}
             defaultValue={id}
             maxLength={64}
@@ -104,7 +112,7 @@ function LineLanes({
   };
   const active = useTaking(pick, key, ({ name }) => toggle(name));
   return (
-    <section aria-label={`${word} of ${of}`}>
+    <section aria-label={t`${word} of ${of}`}>
       <Text size="sm" fw={500}>
         {word}
       </Text>
@@ -117,7 +125,7 @@ function LineLanes({
             variant="subtle"
             color="gray"
             disabled={nodes.length === 1}
-            aria-label={`Take ${node} out of ${word.toLowerCase()} of ${of}`}
+            aria-label={t`Take ${node} out of ${inSentence(word)} of ${of}`}
             onClick={() => toggle(node)}
           >
             <IconTrash />
@@ -130,9 +138,9 @@ function LineLanes({
         aria-pressed={active}
         onClick={() => (active ? pick.stop() : pick.start(key, "node"))}
       >
-        {active ? "Stop choosing" : `${word}: choose lanes on the map`}
+        {active ? t`Stop choosing` : t`${word}: choose lanes on the map`}
       </Button>
-      <NodeByName label={`${word}: or type a node`} onAdd={toggle} />
+      <NodeByName label={t`${word}: or type a node`} onAdd={toggle} />
     </section>
   );
 }
@@ -157,8 +165,8 @@ export function NodeByName({ label, onAdd }: { label: string; onAdd: (node: stri
           if (event.key === "Enter") add();
         }}
       />
-      <Button variant="default" disabled={!typed.trim()} aria-label={`Add ${label}`} onClick={add}>
-        Add
+      <Button variant="default" disabled={!typed.trim()} aria-label={t`Add ${label}`} onClick={add}>
+        <Trans>Add</Trans>
       </Button>
     </Group>
   );

@@ -1,5 +1,6 @@
 import { Switch } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
 import type { Edit, FieldsOf } from "../api/types";
 import type { Graph } from "../map/graph";
 import { Committed } from "./Committed";
@@ -37,22 +38,22 @@ export function StopCard({
   return (
     <PartCard
       name={id}
-      what={stop.name ? `Stop ${stop.name}` : "Stop"}
-      note={stop.bay ? `${where}, in a bay` : where}
+      what={stop.name ? t`Stop ${stop.name}` : t`Stop`}
+      note={stop.bay ? t`${where}, in a bay` : where}
       onRemove={() => onRemove(id)}
     >
       <OpenAndShow part={id} open={open} onShow={onShow} onOpen={() => onOpen(open ? null : key)} />
       {open && (
         <>
           <CommittedText
-            label="Name for people"
+            label={t`Name for people`}
             value={stop.name}
             maxLength={200}
             onCommit={(name) => change({ name })}
           />
           <Committed
-            label="Length"
-            suffix=" m"
+            label={t`Length`}
+            suffix={" m"}
             min={5}
             max={200}
             digits={1}
@@ -62,12 +63,12 @@ export function StopCard({
             }}
           />
           <Switch
-            label="In a bay beside the lane"
+            label={t`In a bay beside the lane`}
             checked={stop.bay}
             onChange={(event) => change({ bay: event.currentTarget.checked })}
           />
           <PickButton pick={pick} pickKey={key} by="node" onTake={({ name }) => change({ node: name })}>
-            Move it on the map
+            {t`Move it on the map`}
           </PickButton>
         </>
       )}

@@ -1,6 +1,9 @@
 import { Button, Group, Select, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { localized } from "../language/localized";
 import type { Edit } from "../api/types";
 import { isKey } from "../lists";
 import type { Graph } from "../map/graph";
@@ -20,7 +23,7 @@ import {
   type StudyFields,
 } from "./study";
 
-const NEW = "new station";
+const NEW = localized(() => t`new station`);
 const OWN = "own";
 /** Seconds of the intervals that are usual. */
 const USUAL = ["300", "900", "3600"];
@@ -55,7 +58,9 @@ export function StudyStep({
     );
   return (
     <>
-      <Text size="sm">What of a run is analysed, and where vehicles are counted and timed besides.</Text>
+      <Text size="sm">
+        <Trans>What of a run is analysed, and where vehicles are counted and timed besides.</Trans>
+      </Text>
       <Times study={study} onChange={change} />
       {stations.map((one) => (
         <StationCard
@@ -66,10 +71,10 @@ export function StudyStep({
           open={open === one.id}
           pick={pick}
           onOpen={setOpen}
-          onChange={(next) => put(one.id, one.kind, next, `Change ${one.id}`)}
+          onChange={(next) => put(one.id, one.kind, next, t`Change ${one.id}`)}
           onRemove={() => {
             pick.stop();
-            put(one.id, one.kind, null, `Remove ${one.id}`);
+            put(one.id, one.kind, null, t`Remove ${one.id}`);
           }}
           onShow={() => onShow(one.lines.flatMap(({ nodes }) => nodes))}
         />
@@ -78,7 +83,7 @@ export function StudyStep({
         study={study}
         pick={pick}
         onAdd={(one) => {
-          change(stationFields(one.kind, [...stations, one]), `Add ${one.id}`);
+          change(stationFields(one.kind, [...stations, one]), t`Add ${one.id}`);
           pick.stop();
           setOpen(one.id);
         }}
@@ -93,10 +98,10 @@ function Times({ study, onChange }: { study: Study; onChange: (fields: StudyFiel
   const known = interval === null ? "" : String(interval);
   const own = asked || (interval !== null && !USUAL.includes(known));
   return (
-    <section className="fold" aria-label="What is analysed">
+    <section className="fold" aria-label={t`What is analysed`}>
       <Committed
-        label="Warm-up that figures leave out"
-        suffix=" min"
+        label={t`Warm-up that figures leave out`}
+        suffix={" min"}
         min={0}
         max={1e5}
         digits={2}
@@ -104,13 +109,13 @@ function Times({ study, onChange }: { study: Study; onChange: (fields: StudyFiel
         onCommit={(minutes) => onChange({ warm_up: Math.round((minutes ?? 0) * 60) })}
       />
       <Select
-        label="Analysis interval"
+        label={t`Analysis interval`}
         data={[
-          { value: "", label: "Chosen by the length of the run" },
+          { value: "", label: t`Chosen by the length of the run` },
           { value: "300", label: "5 min" },
           { value: "900", label: "15 min" },
           { value: "3600", label: "60 min" },
-          { value: OWN, label: "Another" },
+          { value: OWN, label: t`Another` },
         ]}
         value={own ? OWN : known}
         allowDeselect={false}
@@ -122,8 +127,8 @@ function Times({ study, onChange }: { study: Study; onChange: (fields: StudyFiel
       />
       {own && (
         <Committed
-          label="Length of an interval"
-          suffix=" min"
+          label={t`Length of an interval`}
+          suffix={" min"}
           min={1 / 60}
           max={1440}
           digits={2}
@@ -150,6 +155,7 @@ function NewStation({
   const [kind, setKind] = useState<StationKind>("detectors");
   const [chosen, setChosen] = useState<readonly string[]>([]);
   const words = lineWords(kind);
+  const first = words[0] ?? "";
   const word = words[chosen.length] ?? "";
   const stop = (): void => {
     pick.stop();
@@ -170,31 +176,31 @@ function NewStation({
       ),
     );
   };
-  const active = useTaking(pick, NEW, ({ name }) => add(name));
+  const active = useTaking(pick, NEW(), ({ name }) => add(name));
   return (
-    <section className="fold" aria-label="New station">
+    <section className="fold" aria-label={t`New station`}>
       <Select
-        label="Kind of station"
-        data={Object.entries(STATION).map(([value, label]) => ({ value, label }))}
+        label={t`Kind of station`}
+        data={Object.entries(STATION()).map(([value, label]) => ({ value, label }))}
         value={kind}
         allowDeselect={false}
         onChange={(next) => {
-          if (!isKey(STATION, next)) return;
+          if (!isKey(STATION(), next)) return;
           stop();
           setKind(next);
         }}
       />
       {words.length > 1 && (
         <Text size="sm" role="status">
-          {chosen[0] === undefined ? `First its ${words[0]}.` : `${words[0]}: ${chosen[0]}. Now its ${word}.`}
+          {chosen[0] === undefined ? t`First its ${first}.` : t`${first}: ${chosen[0]}. Now its ${word}.`}
         </Text>
       )}
       <Group gap={6}>
-        <Button aria-pressed={active} onClick={() => (active ? stop() : pick.start(NEW, "node"))}>
-          {active ? "Stop choosing" : "Choose it on the map"}
+        <Button aria-pressed={active} onClick={() => (active ? stop() : pick.start(NEW(), "node"))}>
+          {active ? t`Stop choosing` : t`Choose it on the map`}
         </Button>
       </Group>
-      <NodeByName label="or type the node" onAdd={add} />
+      <NodeByName label={t`or type the node`} onAdd={add} />
     </section>
   );
 }

@@ -1,6 +1,9 @@
 import { Alert, Anchor, Button, FileButton, Group, List, Select, Text, TextInput } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useEffect, useRef, useState } from "react";
 
+import { localized } from "../language/localized";
 import { ApiError } from "../api/client";
 import { type Demand, demand, type TableKind } from "../api/demand";
 import { isKey } from "../lists";
@@ -10,33 +13,29 @@ import { exampleTable } from "./demand";
 import type { EditorStore } from "./store";
 import { sentence } from "../ui/words";
 
-const KINDS: Record<TableKind, { label: string; stem: string | null; text: string }> = {
+const KINDS = localized((): Record<TableKind, { label: string; stem: string | null; text: string }> => ({
   od: {
-    label: "Trips between zones",
+    label: t`Trips between zones`,
     stem: "trips",
-    text: "How many trips go from one segment or zone to another. Columns “begin” and “end” may say when.",
+    text: t`How many trips go from one segment or zone to another. Columns “begin” and “end” may say when.`,
   },
   inputs: {
-    label: "Vehicle inputs",
+    label: t`Vehicle inputs`,
     stem: "input",
-    text:
-      "How many vehicles drive into the region on a segment in each slice of time; " +
-      "a column “direction” where both directions lead in.",
+    text: t`How many vehicles drive into the region on a segment in each slice of time; a column “direction” where both directions lead in.`,
   },
   counts: {
-    label: "Counts",
+    label: t`Counts`,
     stem: "counts",
-    text:
-      "How many vehicles passed a count station, to be reproduced by traffic. " +
-      "A count station is a segment, or consecutive segments: r1>j2>r3.",
+    text: t`How many vehicles passed a count station, to be reproduced by traffic. A count station is a segment, or consecutive segments: r1>j2>r3.`,
   },
   profile: {
-    label: "A day profile",
+    label: t`A day profile`,
     stem: "my-day",
-    text: "The share of the traffic in each equal slice of a day, from midnight.",
+    text: t`The share of the traffic in each equal slice of a day, from midnight.`,
   },
-  zones: { label: "Zones", stem: null, text: "Names for groups of segments, for use in tables of trips." },
-};
+  zones: { label: t`Zones`, stem: null, text: t`Names for groups of segments, for use in tables of trips.` },
+}));
 
 interface Refusal {
   file: string;
@@ -64,12 +63,12 @@ export function TableForm({
   useEffect(() => {
     if (refusal) alert.current?.scrollIntoView({ block: "nearest" });
   }, [refusal]);
-  const chosen = KINDS[kind];
+  const chosen = KINDS()[kind];
   const example = exampleTable(kind, known, roads);
   const choose = (next: string | null): void => {
-    if (!isKey(KINDS, next)) return;
+    if (!isKey(KINDS(), next)) return;
     setKind(next);
-    setPart(KINDS[next].stem ?? "");
+    setPart(KINDS()[next].stem ?? "");
     setRefusal(null);
   };
   const send = (file: File | null): void => {
@@ -79,7 +78,7 @@ export function TableForm({
     setRefusal(null);
     take((version) => demand.table(name, version, kind, file, chosen.stem && part.trim()))
       .then(
-        () => tell(`${file.name} is imported.`),
+        () => tell(t`${file.name} is imported.`),
         (error: unknown) => setRefusal({ file: file.name, problems: problemsOf(error) }),
       )
       .finally(() => setBusy(false));
@@ -87,8 +86,8 @@ export function TableForm({
   return (
     <div className="fold">
       <Select
-        label="Contents of the table"
-        data={Object.entries(KINDS).map(([value, { label }]) => ({ value, label }))}
+        label={t`Contents of the table`}
+        data={Object.entries(KINDS()).map(([value, { label }]) => ({ value, label }))}
         value={kind}
         allowDeselect={false}
         onChange={choose}
@@ -96,9 +95,9 @@ export function TableForm({
       <Text size="sm">{chosen.text}</Text>
       <div>
         <Text size="xs" c="dimmed">
-          For example, as text with commas, semicolons or tabs:
+          <Trans>For example, as text with commas, semicolons or tabs:</Trans>
         </Text>
-        <pre className="example" tabIndex={0} aria-label="An example">
+        <pre className="example" tabIndex={0} aria-label={t`An example`}>
           {example}
         </pre>
         <Anchor
@@ -107,18 +106,18 @@ export function TableForm({
           href={`data:text/csv;charset=utf-8,${encodeURIComponent(example)}`}
           download={`${chosen.stem ?? "zones"}.csv`}
         >
-          Download this example
+          <Trans>Download this example</Trans>
         </Anchor>
       </div>
       {kind !== "profile" && (
         <Text size="xs" c="dimmed">
-          Point at a road or junction on the map to see its id for tables.
+          <Trans>Point at a road or junction on the map to see its id for tables.</Trans>
         </Text>
       )}
       {chosen.stem && (
         <TextInput
-          label="Name"
-          description="replaces what has this name already"
+          label={t`Name`}
+          description={t`replaces what has this name already`}
           inputWrapperOrder={["label", "input", "description"]}
           value={part}
           onChange={(event) => setPart(event.currentTarget.value)}
@@ -128,7 +127,7 @@ export function TableForm({
         <Alert
           ref={alert}
           color="red"
-          title={`${refusal.file} was not imported`}
+          title={t`${refusal.file} was not imported`}
           style={{ overflowWrap: "anywhere" }}
         >
           {refusal.problems.length === 1 ? (
@@ -146,7 +145,7 @@ export function TableForm({
         <FileButton accept=".csv,.tsv,.txt,text/csv" resetRef={reset} onChange={send}>
           {(props) => (
             <Button variant="light" loading={busy} disabled={chosen.stem !== null && !part.trim()} {...props}>
-              Choose a table
+              <Trans>Choose a table</Trans>
             </Button>
           )}
         </FileButton>

@@ -1,24 +1,27 @@
 import { Button, CloseButton, Group, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useEffect, useRef, useState } from "react";
 
+import { localized } from "../language/localized";
 import { nth } from "../lists";
 import type { Step } from "./scene";
 
 const KEY = "odscen.tour";
-const STEPS: readonly [title: string, text: string][] = [
+const STEPS = localized((): readonly [title: string, text: string][] => [
   [
-    "1. Choose where",
-    "Click a road or junction: it is the first segment of your region. Light-blue segments can be added.",
+    t`1. Choose where`,
+    t`Click a road or junction: it is the first segment of your region. Light-blue segments can be added.`,
   ],
   [
-    "2. Choose who",
-    "Open “Road users”, choose a kind and click on a blue point for vehicles, a yellow one for pedestrians.",
+    t`2. Choose who`,
+    t`Open “Road users”, choose a kind and click on a blue point for vehicles, a yellow one for pedestrians.`,
   ],
   [
-    "3. Run it",
-    "Open “Run” and press Run to watch the traffic. Every change is saved automatically and can be undone.",
+    t`3. Run it`,
+    t`Open “Run” and press Run to watch the traffic. Every change is saved automatically and can be undone.`,
   ],
-];
+]);
 
 /** Whether this is the first visit; without storage no visit is. */
 export function firstVisit(): boolean {
@@ -51,13 +54,13 @@ export function Tour({ step, onClose }: { step: Step; onClose: () => void }) {
     before.current = step;
     setAt((old) => CARD[step] ?? old);
   }, [step]);
-  const [title, text] = nth(STEPS, at);
-  const last = at === STEPS.length - 1;
+  const [title, text] = nth(STEPS(), at);
+  const last = at === STEPS().length - 1;
   return (
     <div
       className="tour"
       role="dialog"
-      aria-label="Short tour"
+      aria-label={t`Short tour`}
       onKeyDown={(event) => {
         if (event.key === "Escape") {
           onClose();
@@ -67,23 +70,25 @@ export function Tour({ step, onClose }: { step: Step; onClose: () => void }) {
     >
       <Group justify="space-between" wrap="nowrap">
         <Text fw={700}>{title}</Text>
-        <CloseButton aria-label="Close the tour" onClick={onClose} />
+        <CloseButton aria-label={t`Close the tour`} onClick={onClose} />
       </Group>
       <Text size="sm" aria-live="polite">
         {text}
       </Text>
       <Group justify="space-between" mt="sm">
         <Text size="xs" c="dimmed">
-          {at + 1} of {STEPS.length}
+          <Trans>
+            {at + 1} of {STEPS().length}
+          </Trans>
         </Text>
         <Group gap={6}>
           {at > 0 && (
             <Button size="compact-sm" variant="default" onClick={() => setAt(at - 1)}>
-              Back
+              <Trans>Back</Trans>
             </Button>
           )}
           <Button size="compact-sm" onClick={() => (last ? onClose() : setAt(at + 1))}>
-            {last ? "Done" : "Next"}
+            {last ? t`Done` : t`Next`}
           </Button>
         </Group>
       </Group>

@@ -1,10 +1,13 @@
 import { Button, Stack, Text, TextInput } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { parsedDayTime, dayTime } from "../language/units";
 import type { Edit, ScenarioDocument } from "../api/types";
 import { BackgroundForm } from "./BackgroundForm";
 import { InputForm, NewInput } from "./InputForm";
-import { bringsTraffic, freeName, secondsOfDay, timeOfDay } from "./demand";
+import { bringsTraffic, freeName } from "./demand";
 import { CountsList, MatrixForm, ProfileList, ZoneList } from "./DemandParts";
 import type { Profiles } from "./DayProfiles";
 import { ParkingForm } from "./ParkingForm";
@@ -37,7 +40,7 @@ export function TrafficStep({
   const [wrongClock, setWrongClock] = useState(false);
   const remove = (part: string): void => onEdit({ kind: "remove_demand", part });
   const setClock = (text: string): void => {
-    const clock = text.trim() ? secondsOfDay(text.trim()) : 0;
+    const clock = text.trim() ? parsedDayTime(text) : 0;
     setWrongClock(clock === null);
     if (clock !== null && Math.floor(clock / 60) !== Math.floor(demand.clock / 60))
       onEdit({ kind: "set_clock", clock });
@@ -46,11 +49,11 @@ export function TrafficStep({
   return (
     <>
       <TextInput
-        label="Time of day at the start"
-        placeholder="Not set: times count from the start"
-        error={wrongClock && "Hours and minutes, such as 07:30 or 17:15"}
+        label={t`Time of day at the start`}
+        placeholder={t`Not set: times count from the start`}
+        error={wrongClock && t`Hours and minutes, such as ${dayTime(27_000)} or ${dayTime(62_100)}`}
         key={demand.clock}
-        defaultValue={demand.clock ? timeOfDay(demand.clock) : ""}
+        defaultValue={demand.clock ? dayTime(demand.clock) : ""}
         onBlur={(event) => setClock(event.currentTarget.value)}
         onKeyDown={(event) => {
           if (event.key === "Enter") setClock(event.currentTarget.value);
@@ -103,10 +106,10 @@ export function TrafficStep({
             onEdit({ kind: "set_background", background: freeName(demand, "background"), per_km: 5 })
           }
         >
-          Add background traffic
+          <Trans>Add background traffic</Trans>
         </Button>
         <Button variant="default" aria-expanded={adding === "input"} onClick={() => toggle("input")}>
-          Add vehicles from outside
+          <Trans>Add vehicles from outside</Trans>
         </Button>
         {adding === "input" && (
           <NewInput
@@ -120,17 +123,17 @@ export function TrafficStep({
           />
         )}
         <Button variant="default" aria-expanded={adding === "day"} onClick={() => toggle("day")}>
-          Whole day on the whole map
+          <Trans>Whole day on the whole map</Trans>
         </Button>
         {adding === "day" && <WholeDay store={store} onDone={() => setAdding(null)} />}
         <Button variant="default" aria-expanded={adding === "table"} onClick={() => toggle("table")}>
-          Import a table
+          <Trans>Import a table</Trans>
         </Button>
         {adding === "table" && <TableForm store={store} demand={demand} roads={roads} />}
       </Stack>
       <ProfileList profiles={profiles} own={demand.profiles.map(({ id }) => id)} onRemove={remove} />
       <Text size="xs" c="dimmed">
-        Road users that were placed by hand keep their start and departure.
+        <Trans>Road users that were placed by hand keep their start and departure.</Trans>
       </Text>
     </>
   );

@@ -1,6 +1,9 @@
 import { Button, MultiSelect, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { localized } from "../language/localized";
 import type { Edit, ScenarioDocument } from "../api/types";
 import type { Graph } from "../map/graph";
 import { LineCard } from "./LineForm";
@@ -8,8 +11,8 @@ import { type PlacePick, useTaking } from "./pick";
 import { StopCard } from "./StopForm";
 import { freePartId, type Stop, stopWord } from "./transit";
 
-const NEW_STOP = "new stop";
-const NEW_LINE = "new line";
+const NEW_STOP = localized(() => t`new stop`);
+const NEW_LINE = localized(() => t`new line`);
 /** Seconds between the trips of a new line. */
 const HEADWAY = 600;
 
@@ -39,7 +42,9 @@ export function TransitStep({
   const shared = { pick, onOpen: setOpen, onEdit, onRemove: remove };
   return (
     <>
-      <Text size="sm">Lines whose vehicles stop at stops: by a timetable, or every so many minutes.</Text>
+      <Text size="sm">
+        <Trans>Lines whose vehicles stop at stops: by a timetable, or every so many minutes.</Trans>
+      </Text>
       {lines.map((line) => (
         <LineCard
           key={`line ${line.id}`}
@@ -83,17 +88,17 @@ function NewStop({
   pick: PlacePick;
   onEdit: (edit: Edit, label?: string) => void;
 }) {
-  const active = useTaking(pick, NEW_STOP, ({ name }) => {
+  const active = useTaking(pick, NEW_STOP(), ({ name }) => {
     const stop = freePartId(transit, "stop");
-    onEdit({ kind: "set_stop", stop, node: name }, `Add ${stop}`);
+    onEdit({ kind: "set_stop", stop, node: name }, t`Add ${stop}`);
   });
   return (
     <Button
       variant="default"
       aria-pressed={active}
-      onClick={() => (active ? pick.stop() : pick.start(NEW_STOP, "node"))}
+      onClick={() => (active ? pick.stop() : pick.start(NEW_STOP(), "node"))}
     >
-      {active ? "Stop adding stops" : "Add stops on the map"}
+      {active ? t`Stop adding stops` : t`Add stops on the map`}
     </Button>
   );
 }
@@ -112,10 +117,10 @@ function NewLine({
 }) {
   const [adding, setAdding] = useState(false);
   const [served, setServed] = useState<string[]>([]);
-  const active = useTaking(pick, NEW_LINE, ({ name }) => {
+  const active = useTaking(pick, NEW_LINE(), ({ name }) => {
     const line = freePartId(transit, "line");
     const stops = served.map((stop) => ({ stop }));
-    onEdit({ kind: "set_line", line, start: name, stops, headway: HEADWAY }, `Add ${line}`);
+    onEdit({ kind: "set_line", line, start: name, stops, headway: HEADWAY }, t`Add ${line}`);
     pick.stop();
     setServed([]);
     setAdding(false);
@@ -124,13 +129,13 @@ function NewLine({
   if (!adding)
     return (
       <Button variant="default" aria-expanded={false} onClick={() => setAdding(true)}>
-        Add a line
+        <Trans>Add a line</Trans>
       </Button>
     );
   return (
-    <section className="fold" aria-label="New line">
+    <section className="fold" aria-label={t`New line`}>
       <MultiSelect
-        label="Its stops, in their order"
+        label={t`Its stops, in their order`}
         data={transit.stops.map((stop) => ({ value: stop.id, label: stopWord(stop) }))}
         value={served}
         onChange={setServed}
@@ -139,9 +144,9 @@ function NewLine({
       <Button
         disabled={served.length === 0}
         aria-pressed={active}
-        onClick={() => (active ? pick.stop() : pick.start(NEW_LINE, "node"))}
+        onClick={() => (active ? pick.stop() : pick.start(NEW_LINE(), "node"))}
       >
-        {active ? "Stop choosing" : "Choose on the map where it begins"}
+        {active ? t`Stop choosing` : t`Choose on the map where it begins`}
       </Button>
       <Button
         variant="subtle"
@@ -151,7 +156,7 @@ function NewLine({
           setAdding(false);
         }}
       >
-        Cancel
+        <Trans>Cancel</Trans>
       </Button>
     </section>
   );

@@ -1,7 +1,8 @@
+import { plural, t } from "@lingui/core/macro";
+
 import type { Filler } from "../api/generators";
 import type { Actor, Category, Edit, Flow, ScenarioState } from "../api/types";
 import type { Graph, Place } from "../map/graph";
-import { count } from "../ui/words";
 import { extension } from "./regions";
 import { isFlow, type Moves, type Starts } from "./placing";
 
@@ -55,7 +56,10 @@ export function changesOf({
     const left = moved.length - moves.length;
     if (left > 0)
       say(
-        `${count(left, "road user")} found no free point there and ${left === 1 ? "was" : "were"} left out.`,
+        plural(left, {
+          one: "# road user found no free point there and was left out.",
+          other: "# road users found no free point there and were left out.",
+        }),
       );
     return moves;
   };
@@ -75,7 +79,7 @@ export function changesOf({
       const moves = shifted(copied, to);
       if (moves.length === 0) return;
       const copies = Object.fromEntries(moves.map(([id, spawn]) => [spawn, id]));
-      change({ kind: "copy_actors", copies }, labelOf("Copy", copied, moves.length));
+      change({ kind: "copy_actors", copies }, labelOf(t`Copy`, copied, moves.length));
     },
     move: (ids, to) => {
       const moved = among(ids);
@@ -86,14 +90,14 @@ export function changesOf({
         const spawn = spawns.get(one.id);
         return spawn ? [startOf(one, spawn)] : [];
       });
-      change(edits, labelOf("Move", moved, moves.length));
+      change(edits, labelOf(t`Move`, moved, moves.length));
     },
     remove: (ids) => {
       const gone = among(ids);
       const actors = gone.filter((one) => !isFlow(one)).map((one) => one.id);
       const edits: Edit[] = gone.filter(isFlow).map((one) => ({ kind: "remove_flow", flow: one.id }));
       if (actors.length > 0) edits.unshift({ kind: "remove_actors", actors });
-      if (edits.length > 0) change(edits, labelOf("Remove", gone, gone.length));
+      if (edits.length > 0) change(edits, labelOf(t`Remove`, gone, gone.length));
     },
     setStart: (one, spawn) => change(startOf(one, spawn)),
     setGoal: (one, goal) =>
@@ -105,21 +109,29 @@ export function changesOf({
       if (segments.length === 0) {
         say(
           left > 0
-            ? "These segments do not hang together with the region. Add those between first."
-            : "There is nothing to add here: no segment lies in it, or all are in the region.",
+            ? t`These segments do not hang together with the region. Add those between first.`
+            : t`There is nothing to add here: no segment lies in it, or all are in the region.`,
         );
         return;
       }
-      change({ kind: "extend_roi", segments }, `Add ${count(segments.length, "segment")}`);
+      change(
+        { kind: "extend_roi", segments },
+        t`Add ${plural(segments.length, { one: "# segment", other: "# segments" })}`,
+      );
       if (left > 0)
         say(
-          `${count(left, "segment")} did not hang together with the rest and ${left === 1 ? "was" : "were"} left out.`,
+          plural(left, {
+            one: "# segment did not hang together with the rest and was left out.",
+            other: "# segments did not hang together with the rest and were left out.",
+          }),
         );
     },
     fill: async (share, seed, filler) => {
       const done = await edit({ kind: "fill_roi", share, seed, ...filler });
       if (done)
-        say(`${count(done.document.actors.length, "road user")} placed. Undo restores the previous ones.`);
+        say(
+          t`${plural(done.document.actors.length, { one: "# road user", other: "# road users" })} placed. Undo restores the previous ones.`,
+        );
       return done !== null;
     },
   };
@@ -130,4 +142,4 @@ const startOf = (one: Actor | Flow, spawn: string): Edit =>
 
 /** What undo says of it: one by its name, several by their number. */
 const labelOf = (verb: string, ones: readonly (Actor | Flow)[], number: number): string =>
-  ones.length === 1 ? `${verb} ${ones[0]?.id}` : `${verb} ${number} road users`;
+  ones.length === 1 ? `${verb} ${ones[0]?.id}` : t`${verb} ${number} road users`;

@@ -1,20 +1,23 @@
+import { plural, t } from "@lingui/core/macro";
+
+import { localized } from "../language/localized";
 import type { ActorMeasureInfo, FigureInfo } from "../api/figures";
 import { sentence } from "../ui/words";
 
 /** Operators of criteria, in the words of the reports. */
-export const OPERATORS: [op: string, words: string][] = [
-  [">=", "at least"],
-  ["<=", "at most"],
+export const OPERATORS = localized((): [op: string, words: string][] => [
+  [">=", t`at least`],
+  ["<=", t`at most`],
   ["==", "exactly"],
-  [">", "more than"],
-  ["<", "less than"],
-];
+  [">", t`more than`],
+  ["<", t`less than`],
+]);
 /** What is asked of a road user most, as the reports say it. */
-const PLAIN: Record<string, string> = {
-  "arrived == 1": "reaches its goal",
-  "arrived >= 1": "reaches its goal",
-  "collided == 0": "does not collide",
-};
+const PLAIN = localized((): Record<string, string> => ({
+  "arrived == 1": t`reaches its goal`,
+  "arrived >= 1": t`reaches its goal`,
+  "collided == 0": t`does not collide`,
+}));
 /** Means every ego where no road user has this id. */
 export const EGO = "ego";
 /** The subject of criteria about all road users. */
@@ -59,10 +62,10 @@ export function criterionWords(
   const known = parts.actor === WHOLE_RUN ? measures.run : measures.actors;
   const measure = known.find(({ name }) => name === parts.name);
   if (!measure) return text;
-  const plain = PLAIN[`${parts.name} ${parts.op} ${parts.bound}`];
+  const plain = PLAIN()[`${parts.name} ${parts.op} ${parts.bound}`];
   if (parts.actor !== WHOLE_RUN && plain) return `${parts.actor} ${plain}`;
-  const about = parts.actor === WHOLE_RUN ? measure.label : `${measure.label} of ${parts.actor}`;
-  const op = OPERATORS.find(([sign]) => sign === parts.op)?.[1] ?? parts.op;
+  const about = parts.actor === WHOLE_RUN ? measure.label : t`${measure.label} of ${parts.actor}`;
+  const op = OPERATORS().find(([sign]) => sign === parts.op)?.[1] ?? parts.op;
   const unit = parts.unit || measure.unit;
   return `${sentence(about)}: ${op} ${parts.bound}${unit ? ` ${unit}` : ""}`;
 }
@@ -70,7 +73,5 @@ export function criterionWords(
 /** What the head of the step says. */
 export const criteriaNote = (criteria: readonly string[]): string =>
   criteria.length === 0
-    ? "When has a run passed?"
-    : criteria.length === 1
-      ? "1 criterion"
-      : `${criteria.length} criteria`;
+    ? t`When has a run passed?`
+    : plural(criteria.length, { one: "# criterion", other: "# criteria" });

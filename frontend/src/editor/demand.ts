@@ -1,47 +1,54 @@
+import { plural, t } from "@lingui/core/macro";
+
+import { dayTime } from "../language/units";
+import { localized } from "../language/localized";
 import type { Background, Demand, Matrix, Mix, TableKind } from "../api/demand";
 import { CATEGORIES } from "../api/types";
-import { CATEGORY_WORD, count } from "../ui/words";
+import { CATEGORY_WORD } from "../ui/words";
 
 /** Ways to give the amount of background traffic, with what to begin with. */
-export const AMOUNTS = [
-  {
-    key: "fill",
-    word: "Percent of the maximum density",
-    unit: "Density",
-    suffix: " %",
-    scale: 100,
-    min: 0.1,
-    max: 100,
-    digits: 1,
-    begin: 0.1,
-  },
-  {
-    key: "per_km",
-    word: "Vehicles per kilometre of lane",
-    unit: "Vehicles per kilometre",
-    suffix: "",
-    scale: 1,
-    min: 0.1,
-    max: 200,
-    digits: 1,
-    begin: 5,
-  },
-  {
-    key: "trips",
-    word: "Number of trips",
-    unit: "Trips",
-    suffix: "",
-    scale: 1,
-    min: 1,
-    max: 1e7,
-    digits: 0,
-    begin: 500,
-  },
-] as const;
-export type Amount = (typeof AMOUNTS)[number];
+export const AMOUNTS = localized(
+  () =>
+    [
+      {
+        key: "fill",
+        word: t`Percent of the maximum density`,
+        unit: t`Density`,
+        suffix: " %",
+        scale: 100,
+        min: 0.1,
+        max: 100,
+        digits: 1,
+        begin: 0.1,
+      },
+      {
+        key: "per_km",
+        word: t`Vehicles per kilometre of lane`,
+        unit: t`Vehicles per kilometre`,
+        suffix: "",
+        scale: 1,
+        min: 0.1,
+        max: 200,
+        digits: 1,
+        begin: 5,
+      },
+      {
+        key: "trips",
+        word: t`Number of trips`,
+        unit: t`Trips`,
+        suffix: "",
+        scale: 1,
+        min: 1,
+        max: 1e7,
+        digits: 0,
+        begin: 500,
+      },
+    ] as const,
+);
+export type Amount = ReturnType<typeof AMOUNTS>[number];
 
 export const amountOf = (one: Background): Amount =>
-  AMOUNTS.find(({ key }) => one[key] !== null) ?? AMOUNTS[0];
+  AMOUNTS().find(({ key }) => one[key] !== null) ?? AMOUNTS()[0];
 
 /** Whether the demand of a scenario has trips to make. */
 export const bringsTraffic = ({ inputs, matrices, counts, background }: Demand): boolean =>
@@ -53,14 +60,14 @@ export const tripsOf = (matrix: Matrix): number =>
 /** What a scenario's traffic is, in a line. */
 export function trafficNote(demand: Demand): string {
   const { inputs, matrices, counts, background } = demand;
-  if (!bringsTraffic(demand)) return "Who else is on the road?";
+  if (!bringsTraffic(demand)) return t`Who else is on the road?`;
   const trips = Math.round(matrices.reduce((sum, one) => sum + tripsOf(one), 0));
   const counted = counts.reduce((sum, one) => sum + one.rows.length, 0);
   return [
-    ...(inputs.length ? [count(inputs.length, "vehicle input")] : []),
-    ...(matrices.length ? [count(trips, "trip")] : []),
-    ...(counts.length ? [count(counted, "count")] : []),
-    ...(background.length ? ["background traffic"] : []),
+    ...(inputs.length ? [plural(inputs.length, { one: "# vehicle input", other: "# vehicle inputs" })] : []),
+    ...(matrices.length ? [plural(trips, { one: "# trip", other: "# trips" })] : []),
+    ...(counts.length ? [plural(counted, { one: "# count", other: "# counts" })] : []),
+    ...(background.length ? [t`background traffic`] : []),
   ].join(", ");
 }
 
@@ -69,7 +76,7 @@ export function mixWords(mix: Mix): string {
   const total = Object.values(mix).reduce((sum, share) => sum + share, 0);
   return CATEGORIES.filter((one) => mix[one])
     .sort((a, b) => (mix[b] ?? 0) - (mix[a] ?? 0))
-    .map((one) => `${CATEGORY_WORD[one]} ${Math.round((100 * (mix[one] ?? 0)) / total)} %`)
+    .map((one) => `${CATEGORY_WORD()[one]} ${Math.round((100 * (mix[one] ?? 0)) / total)} %`)
     .join(", ");
 }
 
@@ -101,9 +108,9 @@ export function secondsOfDay(text: string): number | null {
 
 /** When traffic is highest and lowest. */
 export function peakWords(shares: readonly number[]): string {
-  const at = (n: number): string => timeOfDay((n * 86_400) / shares.length);
+  const at = (n: number): string => dayTime((n * 86_400) / shares.length);
   const [most, fewest] = [shares.indexOf(Math.max(...shares)), shares.indexOf(Math.min(...shares))];
-  return `most trips from ${at(most)}, fewest from ${at(fewest)}`;
+  return t`most trips from ${at(most)}, fewest from ${at(fewest)}`;
 }
 
 /** What a table looks like, with roads of the scenario's own; it can be read in as it is. */

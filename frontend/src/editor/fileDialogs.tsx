@@ -1,11 +1,12 @@
 import { Alert, Button, Group, Loader, Modal, Stack, Text, TextInput } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type FormEvent, useState } from "react";
 
 import { api } from "../api/client";
 import { go } from "../ui/address";
 import { reasonOf } from "../ui/reason";
 import { useLoaded } from "../ui/useLoaded";
-import { count } from "../ui/words";
 
 /** Asks for a name; a name that the server refuses can be changed and tried again. */
 export function NameDialog({
@@ -46,7 +47,7 @@ export function NameDialog({
         />
         <Group justify="flex-end" mt="md">
           <Button variant="default" onClick={onClose}>
-            Cancel
+            <Trans>Cancel</Trans>
           </Button>
           <Button type="submit" loading={busy} disabled={!name.trim()}>
             {action}
@@ -62,11 +63,13 @@ export function OpenDialog({ current, onClose }: { current: string; onClose: () 
   const { value, error } = useLoaded(api.scenarios);
   const others = value?.filter((one) => one.name !== current && !one.error);
   return (
-    <Modal opened onClose={onClose} title="Open another scenario" centered>
+    <Modal opened onClose={onClose} title={t`Open another scenario`} centered>
       {error && <Alert color="red">{error}</Alert>}
-      {!others && !error && <Loader aria-label="Loading the scenarios" />}
+      {!others && !error && <Loader aria-label={t`Loading the scenarios`} />}
       {others?.length === 0 && (
-        <Text size="sm">There is no other one yet. “Save as” makes a copy of this one.</Text>
+        <Text size="sm">
+          <Trans>There is no other one yet. “Save as” makes a copy of this one.</Trans>
+        </Text>
       )}
       <Stack gap={6}>
         {others?.map((one) => (
@@ -77,7 +80,7 @@ export function OpenDialog({ current, onClose }: { current: string; onClose: () 
             onClick={() => go({ view: "editor", scenario: one.name })}
             rightSection={
               <Text size="xs" c="dimmed">
-                {one.map}, {count(one.actors, "road user")}
+                {one.map}, {plural(one.actors, { one: "# road user", other: "# road users" })}
               </Text>
             }
           >

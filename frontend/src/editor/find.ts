@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import type { Actor, Flow } from "../api/types";
 import type { Graph } from "../map/graph";
 import { CATEGORY_WORD, flowWord } from "../ui/words";
@@ -33,9 +35,9 @@ export function findAll(graph: Graph, ones: readonly (Actor | Flow)[], search: s
   };
   for (const one of ones) look({ is: "one", id: one.id, kind: kindOf(one) });
   for (const { id, kind } of graph.columns.segments)
-    look({ is: "segment", id, kind: kind === "junction" ? "Junction" : "Road" });
+    look({ is: "segment", id, kind: kind === "junction" ? t`Junction` : t`Road` });
   return ranks.flat().slice(0, MOST);
 }
 
 const kindOf = (one: Actor | Flow): string =>
-  isFlow(one) ? flowWord("pedestrian" in one.mix) : CATEGORY_WORD[one.category];
+  isFlow(one) ? flowWord("pedestrian" in one.mix) : CATEGORY_WORD()[one.category];

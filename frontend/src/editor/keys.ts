@@ -1,4 +1,7 @@
+import { t } from "@lingui/core/macro";
 import { useEffect, useRef } from "react";
+
+import { localized } from "../language/localized";
 
 export interface KeyActions {
   undo: () => void;
@@ -76,30 +79,30 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
   return plain[key] ?? null;
 }
 
-export const SHORTCUTS: readonly (readonly [keys: string, what: string])[] = [
-  ["Ctrl+Z / Ctrl+Y", "Undo / redo"],
-  ["Ctrl+K", "Find a road, a junction or a road user"],
-  ["1 – 7", "Place a car, van, truck, bus, motorcycle, bicycle, pedestrian"],
-  ["8 / 9", "Place a vehicle flow / pedestrian flow"],
-  ["Ctrl+C", "Copy what is selected: then choose where"],
-  ["Ctrl+V", "Place what was copied once more"],
-  ["M", "Move what is selected: then choose where"],
-  [", / .", "Move the start of what is selected back or on along its lane"],
-  ["L", "Move the start of what is selected to another lane"],
-  ["G", "Choose the goal of what is selected on the map"],
-  ["W", "Add a waypoint to the route of what is selected"],
-  ["Drag", "Move road users, the flag of a goal, or the route through another place"],
-  ["Ctrl+A", "Select all"],
-  ["Shift + click", "Select several"],
-  ["Shift + drag", "Select all in a rectangle"],
-  ["Ctrl + drag", "Select all inside a line that is drawn"],
-  ["Delete", "Remove what is selected"],
-  ["Escape", "Stop placing, clear the selection"],
-  ["Arrow keys", "On the map: move it (with Shift: a little)"],
-  ["+ / −", "On the map: zoom"],
-  ["0", "On the map: show everything"],
-  ["Enter", "On the map: choose what is in the middle"],
-  ["↑ / ↓", "In the table: the row before or after"],
-  ["← / →", "In the time bar: move a block by 1 s (with Shift 10 s, with Alt 0.1 s)"],
-  ["?", "This help"],
-];
+export const SHORTCUTS = localized((): readonly (readonly [keys: string, what: string])[] => [
+  [t`Ctrl+Z / Ctrl+Y`, t`Undo / redo`],
+  [t`Ctrl+K`, t`Find a road, a junction or a road user`],
+  ["1 – 7", t`Place a car, van, truck, bus, motorcycle, bicycle, pedestrian`],
+  ["8 / 9", t`Place a vehicle flow / pedestrian flow`],
+  [t`Ctrl+C`, t`Copy what is selected: then choose where`],
+  [t`Ctrl+V`, t`Place what was copied once more`],
+  ["M", t`Move what is selected: then choose where`],
+  [", / .", t`Move the start of what is selected back or on along its lane`],
+  ["L", t`Move the start of what is selected to another lane`],
+  ["G", t`Choose the goal of what is selected on the map`],
+  ["W", t`Add a waypoint to the route of what is selected`],
+  [t`Drag`, t`Move road users, the flag of a goal, or the route through another place`],
+  [t`Ctrl+A`, t`Select all`],
+  [t`Shift + click`, t`Select several`],
+  [t`Shift + drag`, t`Select all in a rectangle`],
+  [t`Ctrl + drag`, t`Select all inside a line that is drawn`],
+  [t`Delete`, t`Remove what is selected`],
+  ["Escape", t`Stop placing, clear the selection`],
+  [t`Arrow keys`, t`On the map: move it (with Shift: a little)`],
+  ["+ / −", t`On the map: zoom`],
+  ["0", t`On the map: show everything`],
+  ["Enter", t`On the map: choose what is in the middle`],
+  ["↑ / ↓", t`In the table: the row before or after`],
+  ["← / →", t`In the time bar: move a block by 1 s (with Shift 10 s, with Alt 0.1 s)`],
+  ["?", t`This help`],
+]);

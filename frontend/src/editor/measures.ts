@@ -1,17 +1,21 @@
+import { plural, t } from "@lingui/core/macro";
+
+import { lengthText, speedText } from "../language/units";
+import { localized } from "../language/localized";
 import type { ScenarioDocument } from "../api/types";
-import { clock, count, kmh } from "../ui/words";
+import { clock } from "../ui/words";
 import type { PickBy, Picked } from "./pick";
 
 export type Measure = ScenarioDocument["measures"][number];
 
-export const KIND: Record<Measure["kind"], string> = {
-  closure: "Closure",
-  roadworks: "Roadworks",
-  incident: "Incident",
-  speed_limit: "Speed limit",
-  permission: "Permission",
-  signal_outage: "Signal out of order",
-};
+export const KIND = localized((): Record<Measure["kind"], string> => ({
+  closure: t`Closure`,
+  roadworks: t`Roadworks`,
+  incident: t`Incident`,
+  speed_limit: t`Speed limit`,
+  permission: t`Permission`,
+  signal_outage: t`Signal out of order`,
+}));
 
 /** Segments, lanes and turns that a measure names. */
 export function placesOf(measure: Measure): readonly string[] {
@@ -33,34 +37,34 @@ function detail(measure: Measure): string {
     case "closure":
       return where;
     case "incident":
-      return `lane ${measure.lane} at s ${measure.s} m`;
+      return t`lane ${measure.lane} at s ${lengthText(measure.s)}`;
     case "speed_limit":
-      return `${kmh(measure.speed)}: ${where}`;
+      return `${speedText(measure.speed)}: ${where}`;
     case "permission":
       return measure.allowed.length > 0
-        ? `only ${measure.allowed.join(", ")}: ${where}`
-        : `no ${measure.banned.join(", ")}: ${where}`;
+        ? t`only ${measure.allowed.join(", ")}: ${where}`
+        : t`no ${measure.banned.join(", ")}: ${where}`;
     case "signal_outage":
-      return `junction ${measure.junction}, ${measure.shows}`;
+      return t`junction ${measure.junction}, ${measure.shows}`;
     case "roadworks":
       return [
         measure.places.join(", "),
-        ...(measure.speed === null ? [] : [kmh(measure.speed)]),
-        ...(measure.width === null ? [] : [`lanes ${measure.width} m wide`]),
-        ...(measure.closed_lanes.length > 0 ? [`closed lanes ${measure.closed_lanes.join(", ")}`] : []),
+        ...(measure.speed === null ? [] : [speedText(measure.speed)]),
+        ...(measure.width === null ? [] : [t`lanes ${lengthText(measure.width, 2)} wide`]),
+        ...(measure.closed_lanes.length > 0 ? [t`closed lanes ${measure.closed_lanes.join(", ")}`] : []),
       ].join(", ");
   }
 }
 
 /** Of the step, in a line. */
 export const measureNote = (measures: readonly Measure[]): string =>
-  measures.length === 0 ? "None" : count(measures.length, "measure");
+  measures.length === 0 ? t`None` : plural(measures.length, { one: "# measure", other: "# measures" });
 
 /** A measure in words: what it is, where, and when. */
 export const inWords = (measure: Measure): { title: string; detail: string; when: string } => ({
-  title: `${KIND[measure.kind]} ${measure.id}`,
+  title: `${KIND()[measure.kind]} ${measure.id}`,
   detail: detail(measure),
-  when: `${clock(measure.begin)} to ${measure.end === null ? "the end" : clock(measure.end)}`,
+  when: t`${clock(measure.begin)} to ${measure.end === null ? t`the end` : clock(measure.end)}`,
 });
 
 /** How places of a kind of measure can be picked, the usual one first. */

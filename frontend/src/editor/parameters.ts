@@ -1,5 +1,6 @@
+import { plural, t } from "@lingui/core/macro";
+
 import type { ScenarioDocument } from "../api/types";
-import { count } from "../ui/words";
 
 export type Parameter = ScenarioDocument["parameters"][string];
 
@@ -59,10 +60,10 @@ export function placeLabel(place: string): string {
   const [root = "", first = "", ...rest] = place.split("/").map(unescaped);
   const words = (keys: readonly string[]): string =>
     keys.map((key) => (/^\d+$/.test(key) ? String(Number(key) + 1) : key.replaceAll("_", " "))).join(" ");
-  if (root === "simulation") return `Run: ${words([first, ...rest])}`;
-  if (root === "parameters") return `Parameter ${first}`;
+  if (root === "simulation") return t`Run: ${words([first, ...rest])}`;
+  if (root === "parameters") return t`Parameter ${first}`;
   if (rest.length === 0) return `${words([root])}: ${words([first])}`;
-  return root === "rules" ? `Rule ${first}: ${words(rest)}` : `${first}: ${words(rest)}`;
+  return root === "rules" ? t`Rule ${first}: ${words(rest)}` : `${first}: ${words(rest)}`;
 }
 
 /** Numbers that are computed from a parameter. */
@@ -110,5 +111,7 @@ export const shortNumber = (value: number): string => String(Number(value.toPrec
 
 export const parameterNote = (parameters: Readonly<Record<string, Parameter>>): string => {
   const names = Object.keys(parameters);
-  return names.length === 0 ? "Numbers to turn, and sweeps" : count(names.length, "parameter");
+  return names.length === 0
+    ? t`Numbers to turn, and sweeps`
+    : plural(names.length, { one: "# parameter", other: "# parameters" });
 };

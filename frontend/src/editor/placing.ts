@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import type { Actor, Flow, ScenarioDocument } from "../api/types";
 import { nth } from "../lists";
 import type { Graph, Place } from "../map/graph";
@@ -68,15 +70,15 @@ export class Starts {
     const options = { vehicles: !walk, walks: walk };
     const allowed = (i: number, onFoot: boolean): boolean => this.graph.usable(i, onFoot);
     if (this.picker.place(x, y, wide, { ...options, inside: this.inside, allowed }))
-      return `Every point here is occupied. Start the ${who} a little further away.`;
+      return t`Every point here is occupied. Start the ${who} a little further away.`;
     if (this.picker.place(x, y, wide, { ...options, inside: this.inside }))
-      return `No ${who} may start here: the grey points cannot be used.`;
+      return t`No ${who} may start here: the grey points cannot be used.`;
     if (this.picker.place(x, y, wide, options))
-      return `That is outside the region. Start the ${who} inside it, or extend the region.`;
+      return t`That is outside the region. Start the ${who} inside it, or extend the region.`;
     const where = walk
-      ? "Pedestrians start on the yellow points beside the road."
-      : "Vehicles start on the blue points of the lanes.";
-    return `No ${who} may start here. ${where}`;
+      ? t`Pedestrians start on the yellow points beside the road.`
+      : t`Vehicles start on the blue points of the lanes.`;
+    return t`No ${who} may start here. ${where}`;
   }
 
   /** The first free start, in the order of the map; far enough from others. */

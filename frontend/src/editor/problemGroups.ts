@@ -1,3 +1,7 @@
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../language/localized";
 import type { Problem } from "../api/types";
 import type { Graph } from "../map/graph";
 import { placeWord } from "./placeWords";
@@ -29,25 +33,25 @@ export function grouped(problems: readonly Problem[], graph: Graph): ProblemGrou
 function titleOf(problems: readonly Problem[], graph: Graph): string {
   const [first] = problems;
   if (!first) return "";
-  const number = problems.length.toLocaleString("en");
-  const title = TITLE[first.code];
-  return title ? `${number} times: ${title}` : `${number} of a kind, the first: ${inWords(first, graph)}`;
+  const number = problems.length.toLocaleString(i18n.locale);
+  const title = TITLE()[first.code];
+  return title ? t`${number} times: ${title}` : t`${number} of a kind, the first: ${inWords(first, graph)}`;
 }
 
 /** Kinds of problems that many road users can have at once; of others the first is quoted. */
-const TITLE: Record<string, string> = {
-  bodies_overlap: "two road users overlap where they start",
-  node_taken: "two road users start at the same point",
-  spawn_outside_roi: "a start lies outside the region",
-  goal_outside_roi: "a goal lies outside the region",
-  goal_unreachable: "a goal cannot be reached inside the region",
-  goal_not_candidate: "a goal is not where a path through the region ends",
-  no_goal: "no path leads on from a start",
-  tight_curve: "a long vehicle starts in a tight curve",
-  body_over_border: "a vehicle reaches over the border of its lane",
-  off_lane: "a road user is outside its lane",
-  speed_implausible: "a desired speed is implausible",
-};
+const TITLE = localized((): Record<string, string> => ({
+  bodies_overlap: t`two road users overlap where they start`,
+  node_taken: t`two road users start at the same point`,
+  spawn_outside_roi: t`a start lies outside the region`,
+  goal_outside_roi: t`a goal lies outside the region`,
+  goal_unreachable: t`a goal cannot be reached inside the region`,
+  goal_not_candidate: t`a goal is not where a path through the region ends`,
+  no_goal: t`no path leads on from a start`,
+  tight_curve: t`a long vehicle starts in a tight curve`,
+  body_over_border: t`a vehicle reaches over the border of its lane`,
+  off_lane: t`a road user is outside its lane`,
+  speed_implausible: t`a desired speed is implausible`,
+}));
 
 /** The message with its nodes as places: `Road 4, right lane 1, 12 m` in place of an id. */
 export const inWords = ({ message, nodes }: Problem, graph: Graph): string =>

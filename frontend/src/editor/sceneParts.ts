@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { inSentence } from "../ui/words";
 import type { Bounds, ScenarioDocument } from "../api/types";
 import { nth } from "../lists";
 import type { Graph } from "../map/graph";
@@ -84,7 +87,7 @@ export function stationPins(graph: Graph, study: Study): ScenePin[] {
     lines.flatMap(({ nodes, word }) =>
       nodes.flatMap((node): ScenePin[] => {
         const place = graph.place(node);
-        const text = kind === "detectors" ? id : `${id}: ${word.toLowerCase()}`;
+        const text = kind === "detectors" ? id : `${id}: ${inSentence(word)}`;
         return place ? [{ x: place.x, y: place.y, sign: SIGN[kind], text }] : [];
       }),
     ),
@@ -102,8 +105,8 @@ export function transitPins(graph: Graph, { stops, lines }: ScenarioDocument["tr
   return [
     ...stops.flatMap(({ id, name, node }) => pin(node, "H", name || id)),
     ...lines.flatMap(({ id, start, goal }) => [
-      ...pin(start, "▸", `Line ${id}`),
-      ...pin(goal, "■", `Line ${id} ends`),
+      ...pin(start, "▸", t`Line ${id}`),
+      ...pin(goal, "■", t`Line ${id} ends`),
     ]),
   ];
 }

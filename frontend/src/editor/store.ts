@@ -1,3 +1,4 @@
+import { t } from "@lingui/core/macro";
 import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
@@ -191,9 +192,9 @@ export function createEditorStore(name: string): EditorStore {
         set({ saving: unsent.length > 0 ? "failed" : "saved" });
         if (!(error instanceof ApiError) || error.status !== 409) throw error;
         await get().load();
-        throw new Error("The scenario was changed in another tab. You now see its newest state; try again.");
+        throw new Error(t`The scenario was changed in another tab. You now see its newest state; try again.`);
       });
-      if (!found) throw new Error("The scenario is not loaded yet.");
+      if (!found) throw new Error(t`The scenario is not loaded yet.`);
       return found;
     };
     /** What is said stays as long as something waits to be made again. */
@@ -217,18 +218,18 @@ export function createEditorStore(name: string): EditorStore {
           set({
             saving: "failed",
             refusal: {
-              title: "The scenario cannot be read",
+              title: t`The scenario cannot be read`,
               message: reasonOf(failure),
               again: later(again),
             },
           });
           return;
         }
-        const title = "Changed in another tab";
+        const title = t`Changed in another tab`;
         set({
           refusal: {
             title,
-            message: "You now see the newest state without your last change, which you can apply again.",
+            message: t`You now see the newest state without your last change, which you can apply again.`,
             again: later(again),
           },
         });
@@ -240,14 +241,14 @@ export function createEditorStore(name: string): EditorStore {
       // One that can never be made does not push out those that wait.
       if (unsent.length > 0 && !failed) {
         set({ saving: "failed" });
-        return tell(`That is not possible: ${message}`);
+        return tell(t`That is not possible: ${message}`);
       }
       const title =
         unsent.length > 1
-          ? `Your last ${unsent.length} changes are not saved`
+          ? t`Your last ${unsent.length} changes are not saved`
           : failed
-            ? "Your last change is not saved"
-            : "That is not possible";
+            ? t`Your last change is not saved`
+            : t`That is not possible`;
       set({ saving: failed ? "failed" : "saved", refusal: { title, message, again: all } });
     };
     return {

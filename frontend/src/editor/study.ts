@@ -1,15 +1,18 @@
+import { plural, t } from "@lingui/core/macro";
+
+import { localized } from "../language/localized";
 import type { FieldsOf, ScenarioDocument } from "../api/types";
-import { count, hoursMinutes } from "../ui/words";
+import { hoursMinutes } from "../ui/words";
 
 export type Study = ScenarioDocument["study"];
 export type StudyFields = FieldsOf<"set_study", never>;
 export type StationKind = "detectors" | "sections" | "cordons";
 
-export const STATION: Record<StationKind, string> = {
-  detectors: "Detector",
-  sections: "Travel-time section",
-  cordons: "Cordon",
-};
+export const STATION = localized((): Record<StationKind, string> => ({
+  detectors: t`Detector`,
+  sections: t`Travel-time section`,
+  cordons: t`Cordon`,
+}));
 
 /** A line across the road: nodes of the lane graph, one for each lane. */
 export interface StationLine {
@@ -25,19 +28,19 @@ export interface Station {
 }
 
 /** The lines that each kind has, in the order in which they are chosen. */
-const LINES: Record<StationKind, readonly (readonly [field: string, word: string])[]> = {
-  detectors: [["nodes", "Lanes"]],
+const LINES = localized((): Record<StationKind, readonly (readonly [field: string, word: string])[]> => ({
+  detectors: [["nodes", t`Lanes`]],
   sections: [
-    ["begin", "Begin"],
+    ["begin", t`Begin`],
     ["end", "End"],
   ],
   cordons: [
-    ["entries", "Entries"],
-    ["exits", "Exits"],
+    ["entries", t`Entries`],
+    ["exits", t`Exits`],
   ],
-};
+}));
 
-export const lineWords = (kind: StationKind): readonly string[] => LINES[kind].map(([, word]) => word);
+export const lineWords = (kind: StationKind): readonly string[] => LINES()[kind].map(([, word]) => word);
 
 /** All stations, detectors first. */
 export const stationsOf = ({ detectors, sections, cordons }: Study): Station[] => [
@@ -49,7 +52,7 @@ export const stationsOf = ({ detectors, sections, cordons }: Study): Station[] =
 export const station = (kind: StationKind, id: string, nodes: readonly (readonly string[])[]): Station => ({
   kind,
   id,
-  lines: LINES[kind].map(([field, word], n) => ({ field, word, nodes: nodes[n] ?? [] })),
+  lines: LINES()[kind].map(([field, word], n) => ({ field, word, nodes: nodes[n] ?? [] })),
 });
 
 /** The fields of the study with these stations of one kind. */
@@ -84,17 +87,17 @@ export function freeStation(study: Study, kind: StationKind): string {
   for (let n = 1; ; n++) if (!taken.has(`${stem}-${n}`)) return `${stem}-${n}`;
 }
 
-export const WHOLE_RUN = "The whole run";
+export const WHOLE_RUN = localized(() => t`The whole run`);
 
 export function studyNote(study: Study): string {
   const stations = stationsOf(study).length;
   const words = [
-    ...(study.warm_up > 0 ? [`warm-up ${secondsWord(study.warm_up)}`] : []),
-    ...(study.interval === null ? [] : [`every ${secondsWord(study.interval)}`]),
-    ...(stations > 0 ? [count(stations, "station")] : []),
+    ...(study.warm_up > 0 ? [t`warm-up ${secondsWord(study.warm_up)}`] : []),
+    ...(study.interval === null ? [] : [t`every ${secondsWord(study.interval)}`]),
+    ...(stations > 0 ? [plural(stations, { one: "# station", other: "# stations" })] : []),
   ];
-  return words.length > 0 ? words.join(", ") : WHOLE_RUN;
+  return words.length > 0 ? words.join(", ") : WHOLE_RUN();
 }
 
 const secondsWord = (seconds: number): string =>
-  seconds % 60 === 0 ? hoursMinutes(seconds) : `${seconds} s`;
+  seconds % 60 === 0 ? hoursMinutes(seconds) : t`${seconds} s`;

@@ -1,5 +1,7 @@
+import { plural, t } from "@lingui/core/macro";
+
 import type { EditOf, ScenarioDocument } from "../api/types";
-import { count, hoursMinutes } from "../ui/words";
+import { hoursMinutes } from "../ui/words";
 
 type Transit = ScenarioDocument["transit"];
 export type Stop = Transit["stops"][number];
@@ -17,13 +19,16 @@ export function freePartId({ stops, lines }: Transit, stem: string): string {
 /** How often a line runs. */
 export const timetableWord = ({ headway, departures }: Line): string =>
   headway === null
-    ? count(departures.length, "departure")
-    : `every ${headway % 60 === 0 ? hoursMinutes(headway) : `${headway} s`}`;
+    ? plural(departures.length, { one: "# departure", other: "# departures" })
+    : t`every ${headway % 60 === 0 ? hoursMinutes(headway) : t`${headway} s`}`;
 
 export const transitNote = ({ stops, lines }: Transit): string =>
   stops.length + lines.length === 0
-    ? "None"
-    : [count(lines.length, "line"), count(stops.length, "stop")].join(", ");
+    ? t`None`
+    : [
+        plural(lines.length, { one: "# line", other: "# lines" }),
+        plural(stops.length, { one: "# stop", other: "# stops" }),
+      ].join(", ");
 
 type SetLine = EditOf<"set_line">;
 type Dwell = NonNullable<SetLine["dwell"]>;

@@ -1,3 +1,4 @@
+import { t } from "@lingui/core/macro";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { Assets, MapDetails, Problem, ScenarioDocument, ScenarioState } from "../api/types";
@@ -76,7 +77,7 @@ export function useEditing(
 ): EditorNow {
   const { graph, picker } = loaded;
   const { scenario, checked, selection, name, edit, select } = store();
-  if (!scenario) throw new Error("the editor is only shown with a scenario");
+  if (!scenario) throw new Error(t`the editor is only shown with a scenario`);
   const { document, problems } = scenario;
   const [step, setStep] = useState<Step>(() => keptStep() ?? firstStep(document));
   // A link selects who was selected when it was copied.

@@ -1,3 +1,7 @@
+import { i18n } from "@lingui/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
 import "./exchange.css";
 
 import { Alert, Button, Group, Loader, Modal, Select, Text, Title } from "@mantine/core";
@@ -7,7 +11,7 @@ import { ApiError } from "../api/client";
 import { exchange, type ExportNote, type ExportNotes } from "../api/exchange";
 import { IconDown } from "../ui/icons";
 import { useLoaded } from "../ui/useLoaded";
-import { count, sentence } from "../ui/words";
+import { sentence } from "../ui/words";
 import { type Format, FORMATS, VERSIONS } from "./formats";
 
 /** Notes that are shown at once. */
@@ -25,14 +29,14 @@ export function ExportDialog({
 }) {
   const [version, setVersion] = useState<string | null>(format === "openscenario" ? "1.2" : null);
   return (
-    <Modal opened onClose={onClose} size="lg" title={`Export to ${FORMATS[format].title}`}>
+    <Modal opened onClose={onClose} size="lg" title={t`Export to ${FORMATS()[format].title}`}>
       <Text size="sm" mb="sm">
-        {FORMATS[format].words}
+        {FORMATS()[format].words}
       </Text>
       {version !== null && (
         <Select
-          label="Version"
-          data={VERSIONS}
+          label={t`Version`}
+          data={VERSIONS()}
           value={version}
           allowDeselect={false}
           onChange={(chosen) => setVersion(chosen ?? version)}
@@ -58,7 +62,7 @@ function Body({ name, format, version }: { name: string; format: Format; version
   const { value, error } = useLoaded(load);
   if (error !== null)
     return (
-      <Alert color="red" title="It cannot be exported as it is">
+      <Alert color="red" title={t`It cannot be exported as it is`}>
         <Text size="sm">{error}</Text>
         <ul style={{ margin: "6px 0 0", paddingLeft: 20 }}>
           {problems.map((one) => (
@@ -67,13 +71,13 @@ function Body({ name, format, version }: { name: string; format: Format; version
         </ul>
       </Alert>
     );
-  if (!value) return <Loader aria-label="Preparing the export" />;
+  if (!value) return <Loader aria-label={t`Preparing the export`} />;
   return (
     <>
       <Notes notes={value} format={format} />
       <Group justify="space-between" mt="md" wrap="nowrap">
         <Text size="sm" c="dimmed" style={{ overflowWrap: "anywhere" }}>
-          {count(value.files.length, "file")}: {value.files.join(", ")}
+          {plural(value.files.length, { one: "# file", other: "# files" })}: {value.files.join(", ")}
         </Text>
         <Button
           component="a"
@@ -82,7 +86,7 @@ function Body({ name, format, version }: { name: string; format: Format; version
           leftSection={<IconDown size={15} />}
           style={{ flexShrink: 0 }}
         >
-          Download (ZIP)
+          <Trans>Download (ZIP)</Trans>
         </Button>
       </Group>
     </>
@@ -98,13 +102,17 @@ function Notes({
 }) {
   if (format !== "openscenario") return null;
   if (approximated.length + leftOut.length === 0)
-    return <Text size="sm">All of the scenario can be said in OpenSCENARIO.</Text>;
+    return (
+      <Text size="sm">
+        <Trans>All of the scenario can be said in OpenSCENARIO.</Trans>
+      </Text>
+    );
   return (
     <>
-      <List title="Cannot be said, and is left out" notes={leftOut} />
-      <List title="Can only be said approximately" notes={approximated} />
+      <List title={t`Cannot be said, and is left out`} notes={leftOut} />
+      <List title={t`Can only be said approximately`} notes={approximated} />
       <Text size="xs" c="dimmed">
-        The same list is in the download.
+        <Trans>The same list is in the download.</Trans>
       </Text>
     </>
   );
@@ -117,7 +125,7 @@ function List({ title, notes }: { title: string; notes: readonly ExportNote[] })
   return (
     <section aria-label={title}>
       <Title order={3} size="h6" mt="sm">
-        {title}: {notes.length.toLocaleString("en")}
+        {title}: {notes.length.toLocaleString(i18n.locale)}
       </Title>
       <ul className="import-reasons" style={{ maxHeight: 260, overflow: "auto" }} tabIndex={0}>
         {[...reasons].slice(0, SHOWN).map(([reason, places]) => (
@@ -125,7 +133,7 @@ function List({ title, notes }: { title: string; notes: readonly ExportNote[] })
             <Text size="sm">{sentence(reason)}</Text>
             <Text size="xs" c="dimmed">
               {places.slice(0, 12).join(", ")}
-              {places.length > 12 && ` and ${places.length - 12} more`}
+              {places.length > 12 && t` and ${places.length - 12} more`}
             </Text>
           </li>
         ))}

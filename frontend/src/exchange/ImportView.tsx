@@ -1,8 +1,12 @@
+import { plural, t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
+
 import "./exchange.css";
 
 import { Alert, Anchor, Button, Group, Loader, Text, Title } from "@mantine/core";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
+import { lengthText } from "../language/units";
 import { api } from "../api/client";
 import { exchange, type ImportReport, type ImportRow } from "../api/exchange";
 import type { Assets, ScenarioState } from "../api/types";
@@ -14,7 +18,6 @@ import { EMPTY_SCENE, type Scene } from "../map/scene";
 import { go } from "../ui/address";
 import { useLearnedTitle } from "../ui/titles";
 import { useLoaded } from "../ui/useLoaded";
-import { count } from "../ui/words";
 import { around, pinsOf, spotOf } from "./report";
 import { ReportPanel } from "./ReportPanel";
 
@@ -33,13 +36,15 @@ export function ImportView({ scenario: name }: { scenario: string }) {
   if (error)
     return (
       <div className="catalogue">
-        <Alert color="red" title="The report of the import cannot be shown">
+        <Alert color="red" title={t`The report of the import cannot be shown`}>
           {error}
         </Alert>
         <Group mt="md">
-          <Button onClick={() => go({ view: "editor", scenario: name })}>Open in the editor</Button>
+          <Button onClick={() => go({ view: "editor", scenario: name })}>
+            <Trans>Open in the editor</Trans>
+          </Button>
           <Button variant="default" onClick={() => go({ view: "catalogue" })}>
-            Back to the maps
+            <Trans>Back to the maps</Trans>
           </Button>
         </Group>
       </div>
@@ -47,7 +52,7 @@ export function ImportView({ scenario: name }: { scenario: string }) {
   if (!value)
     return (
       <div className="empty">
-        <Loader aria-label="Loading the report" />
+        <Loader aria-label={t`Loading the report`} />
       </div>
     );
   return <Shown name={name} whole={value} />;
@@ -87,32 +92,42 @@ function Shown({ name, whole }: { name: string; whole: Whole }) {
   const wrong = problems.filter(({ severity }) => severity === "error").length;
   return (
     <div className="import">
-      <section className="import-side" aria-label="Report of the import">
+      <section className="import-side" aria-label={t`Report of the import`}>
         <Title order={1} size="h4" style={{ overflowWrap: "anywhere" }}>
-          {report.file} was imported
+          <Trans>{report.file} was imported</Trans>
         </Title>
         <Text size="sm" c="dimmed" mb="sm">
-          {count(document.actors.length, "road user")} and {count(document.rules.length, "rule")} on the map{" "}
-          {report.map}
-          {report.added && ", which was added to your maps"}.
+          <Trans>
+            <Plural value={document.actors.length} one="# road user" other="# road users" /> and{" "}
+            <Plural value={document.rules.length} one="# rule" other="# rules" /> on the map {report.map}
+            {report.added ? t`, which was added to your maps` : ""}.
+          </Trans>
         </Text>
         <Group mb="md">
-          <Button onClick={() => go({ view: "editor", scenario: name })}>Open in the editor</Button>
+          <Button onClick={() => go({ view: "editor", scenario: name })}>
+            <Trans>Open in the editor</Trans>
+          </Button>
           <Button variant="default" onClick={() => go({ view: "catalogue" })}>
-            Back to the maps
+            <Trans>Back to the maps</Trans>
           </Button>
         </Group>
         {wrong > 0 && (
-          <Alert color="orange" mb="md" title={`${count(wrong, "problem")} left to solve before it runs`}>
-            The editor lists them under “Problems”.
+          <Alert
+            color="orange"
+            mb="md"
+            title={t`${plural(wrong, { one: "# problem", other: "# problems" })} left to solve before it runs`}
+          >
+            <Trans>The editor lists them under “Problems”.</Trans>
           </Alert>
         )}
         {report.sweep && (
-          <Alert color="blue" mb="md" title="The file varies parameters">
-            <Anchor href={exchange.planUrl(name)} download size="sm">
-              Download the plan of the sweep
-            </Anchor>{" "}
-            for <code>odscen sweep --plan</code>.
+          <Alert color="blue" mb="md" title={t`The file varies parameters`}>
+            <Trans>
+              <Anchor href={exchange.planUrl(name)} download size="sm">
+                Download the plan of the sweep
+              </Anchor>{" "}
+              for <code>odscen sweep --plan</code>.
+            </Trans>
           </Alert>
         )}
         <ReportPanel
@@ -132,11 +147,13 @@ function Shown({ name, whole }: { name: string; whole: Whole }) {
           picker={loaded.picker}
           scene={scene}
           handle={handle}
-          label={`Map ${report.map}`}
+          label={t`Map ${report.map}`}
         >
           {spot && (
             <div className="map-hint" role="status">
-              x = {spot.x.toFixed(1)} m, y = {spot.y.toFixed(1)} m
+              <Trans>
+                x = {lengthText(spot.x, 1)}, y = {lengthText(spot.y, 1)}
+              </Trans>
             </div>
           )}
         </MapCanvas>

@@ -1,5 +1,7 @@
 import { Alert, Button, FileButton, Group, Loader, Text } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import type { Import } from "./useImport";
 
 export const XOSC_FILES = ".xosc,.xodr";
@@ -13,12 +15,12 @@ export function ImportWork({ work: { state, begin, cancel, close } }: { work: Im
   const names = state.files.map(({ name }) => name).join(", ");
   if (state.refusal === null)
     return (
-      <Alert key="going" ref={intoSight} color="blue" my="md" role="status" title={`Importing ${names}`}>
+      <Alert key="going" ref={intoSight} color="blue" my="md" role="status" title={t`Importing ${names}`}>
         <Group gap="sm">
           <Loader size={16} aria-hidden="true" />
           <Text size="sm">{state.step} …</Text>
           <Button size="compact-sm" variant="default" disabled={state.job === null} onClick={cancel}>
-            Cancel
+            <Trans>Cancel</Trans>
           </Button>
         </Group>
       </Alert>
@@ -29,9 +31,9 @@ export function ImportWork({ work: { state, begin, cancel, close } }: { work: Im
       ref={intoSight}
       color="red"
       my="md"
-      title={`${names} could not be imported`}
+      title={t`${names} could not be imported`}
       withCloseButton
-      closeButtonLabel="Close this message"
+      closeButtonLabel={t`Close this message`}
       onClose={close}
       style={{ overflowWrap: "anywhere" }}
     >
@@ -41,7 +43,7 @@ export function ImportWork({ work: { state, begin, cancel, close } }: { work: Im
       <FileButton multiple accept={XOSC_FILES} onChange={(more) => begin(together(state.files, more))}>
         {(props) => (
           <Button size="compact-sm" variant="default" {...props}>
-            Add its map or catalogs and try again
+            <Trans>Add its map or catalogs and try again</Trans>
           </Button>
         )}
       </FileButton>

@@ -1,8 +1,10 @@
+import { i18n } from "@lingui/core";
 import { Text, Title } from "@mantine/core";
 
+import { plural, t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import type { ImportReport, ImportRow } from "../api/exchange";
 import { IconTarget } from "../ui/icons";
-import { count } from "../ui/words";
 import {
   type Element,
   grouped,
@@ -32,22 +34,28 @@ export function ReportPanel({ report, ...chosen }: { report: ImportReport } & Ch
     <>
       <Text>
         {report.refused.length === 0
-          ? "Everything that acts was imported."
-          : `${count(report.refused.length, "element")} could not be imported.`}{" "}
-        Of {count(all, "element")} in the file, {share} % were imported unchanged.
+          ? t`Everything that acts was imported.`
+          : plural(report.refused.length, {
+              one: "# element could not be imported.",
+              other: "# elements could not be imported.",
+            })}{" "}
+        <Trans>
+          Of <Plural value={all} one="# element" other="# elements" /> in the file, {share} % were imported
+          unchanged.
+        </Trans>
       </Text>
       <dl className="import-counts">
         {VERDICTS.map((verdict) => (
           <div key={verdict} data-verdict={verdict}>
-            <dt>{TITLES[verdict]}</dt>
-            <dd>{report[verdict].length.toLocaleString("en")}</dd>
+            <dt>{TITLES()[verdict]}</dt>
+            <dd>{report[verdict].length.toLocaleString(i18n.locale)}</dd>
           </div>
         ))}
       </dl>
       {VERDICTS.filter((verdict) => report[verdict].length > 0).map((verdict) => (
-        <section key={verdict} aria-label={TITLES[verdict]}>
+        <section key={verdict} aria-label={TITLES()[verdict]}>
           <Title order={2} size="h5" mt="lg">
-            {TITLES[verdict]}
+            {TITLES()[verdict]}
           </Title>
           {verdict === "taken" ? (
             <Taken rows={report.taken} />
@@ -68,7 +76,7 @@ function List({
   return (
     <>
       <Text size="sm" c="dimmed" mb={6}>
-        {MEANING[verdict]}
+        {MEANING()[verdict]}
       </Text>
       <ul className="import-reasons">
         {grouped(rows).map((reason) => (
@@ -90,7 +98,13 @@ function Elements({ reason: { elements }, ...rest }: { reason: Reason; file: str
           <Where element={element} {...rest} />
         </li>
       ))}
-      {elements.length > NAMED && <li>and {count(elements.length - NAMED, "more", "more")}</li>}
+      {elements.length > NAMED && (
+        <li>
+          <Trans>
+            and <Plural value={elements.length - NAMED} one="# more" other="# more" />
+          </Trans>
+        </li>
+      )}
     </ul>
   );
 }
@@ -102,11 +116,18 @@ function Where({
   chosen,
   onPlace,
 }: { element: Element; file: string } & Chosen) {
-  const line = row.file === file ? `line ${row.line}` : `line ${row.line} of ${row.file}`;
+  const line = row.file === file ? t`line ${row.line}` : t`line ${row.line} of ${row.file}`;
   const words = (
     <>
       {word}, {line}
-      {inside > 0 && <span className="import-inside"> with {count(inside, "part")}</span>}
+      {inside > 0 && (
+        <span className="import-inside">
+          {" "}
+          <Trans>
+            with <Plural value={inside} one="# part" other="# parts" />
+          </Trans>
+        </span>
+      )}
     </>
   );
   if (!spotOf(row)) return <span title={row.xpath}>{words}</span>;
@@ -115,7 +136,7 @@ function Where({
       type="button"
       className="import-place"
       title={row.xpath}
-      aria-label={`${word}, ${line}: show on the map`}
+      aria-label={t`${word}, ${line}: show on the map`}
       aria-pressed={chosen === row}
       onClick={() => onPlace(row)}
     >
@@ -128,11 +149,15 @@ function Where({
 function Taken({ rows }: { rows: readonly ImportRow[] }) {
   return (
     <details>
-      <summary className="import-summary">{count(rows.length, "element")}, by kind</summary>
+      <summary className="import-summary">
+        <Trans>
+          <Plural value={rows.length} one="# element" other="# elements" />, by kind
+        </Trans>
+      </summary>
       <ul className="import-elements">
         {kinds(rows).map(([word, number]) => (
           <li key={word}>
-            {word}: {number.toLocaleString("en")}
+            {word}: {number.toLocaleString(i18n.locale)}
           </li>
         ))}
       </ul>

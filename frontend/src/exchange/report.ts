@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../language/localized";
 import type { ImportReport, ImportRow } from "../api/exchange";
 import type { Bounds } from "../api/types";
 import type { ScenePin } from "../map/scene";
@@ -7,19 +10,19 @@ import { sentence } from "../ui/words";
 export const VERDICTS = ["refused", "approximated", "ignored", "taken"] as const;
 export type Verdict = (typeof VERDICTS)[number];
 
-export const TITLES: Record<Verdict, string> = {
-  refused: "Left out, though it would act",
-  approximated: "Imported approximately",
-  ignored: "Without a counterpart here",
-  taken: "Imported unchanged",
-};
+export const TITLES = localized((): Record<Verdict, string> => ({
+  refused: t`Left out, though it would act`,
+  approximated: t`Imported approximately`,
+  ignored: t`Without a counterpart here`,
+  taken: t`Imported unchanged`,
+}));
 
-export const MEANING: Record<Verdict, string> = {
-  refused: "The rest of the scenario is there; these parts do nothing.",
-  approximated: "These act, but not exactly as the file says.",
-  ignored: "odscen has no part for these. The scenario plays without them.",
-  taken: "Nothing to do.",
-};
+export const MEANING = localized((): Record<Verdict, string> => ({
+  refused: t`The rest of the scenario is there; these parts do nothing.`,
+  approximated: t`These act, but not exactly as the file says.`,
+  ignored: t`odscen has no part for these. The scenario plays without them.`,
+  taken: t`Nothing to do.`,
+}));
 
 export const SIGNS: Record<Verdict, string> = { refused: "!", approximated: "≈", ignored: "–", taken: "✓" };
 
@@ -43,17 +46,17 @@ export function elementWord(xpath: string): string {
   return sentence(words);
 }
 
-const PLAIN: [RegExp, string][] = [
-  [/^odscen has no part for it$/, "There is nothing like this in a scenario of odscen"],
-  [/^its value is put in where it is named$/, "Its value was put in where the file names it"],
-];
+const PLAIN = localized((): [RegExp, string][] => [
+  [/^odscen has no part for it$/, t`There is nothing like this in a scenario of odscen`],
+  [/^its value is put in where it is named$/, t`Its value was put in where the file names it`],
+]);
 
 /** A path through the file with its line, of which people need the last element only. */
 const PATH = /\/OpenSCENARIO\S*\/(\w+)(?:\[\d+\])? \(line (\d+)\)/g;
 
 export function plainReason(reason: string): string {
   if (!reason) return "";
-  for (const [pattern, text] of PLAIN) if (pattern.test(reason)) return text;
+  for (const [pattern, text] of PLAIN()) if (pattern.test(reason)) return text;
   const words = reason.replace(/^left out: /, "").replace(PATH, "$1 in line $2");
   return sentence(words);
 }
@@ -104,7 +107,7 @@ export function pinsOf(report: ImportReport, chosen: Spot | null): ScenePin[] {
       const key = `${spot.x} ${spot.y}`;
       const pin = pins.get(key) ?? { ...spot, sign: SIGNS[verdict], text: "", count: 0 };
       pin.count += 1;
-      pin.text = pin.count === 1 ? `line ${row.line}` : `${pin.count} elements`;
+      pin.text = pin.count === 1 ? `line ${row.line}` : t`${pin.count} elements`;
       pins.set(key, pin);
     }
   }

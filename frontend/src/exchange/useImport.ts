@@ -1,3 +1,4 @@
+import { t } from "@lingui/core/macro";
 import { useRef, useState } from "react";
 
 import { api } from "../api/client";
@@ -30,7 +31,7 @@ export function useImport(): Import {
   const begin = (files: readonly File[]): void => {
     if (busy.current || files.length === 0) return;
     busy.current = true;
-    setState({ files, step: "Sending the files", job: null, refusal: null });
+    setState({ files, step: t`Sending the files`, job: null, refusal: null });
     exchange
       .bring(files, ({ id, step }) => setState({ files, step: sentence(step), job: id, refusal: null }))
       .then(

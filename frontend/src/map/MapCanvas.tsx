@@ -1,4 +1,5 @@
 import { ActionIcon, Tooltip, useComputedColorScheme } from "@mantine/core";
+import { t } from "@lingui/core/macro";
 import {
   type KeyboardEvent,
   memo,
@@ -12,7 +13,9 @@ import {
   useState,
 } from "react";
 
+import { localized } from "../language/localized";
 import type { Bounds } from "../api/types";
+import { roundLength } from "../language/units";
 import type { Head } from "../signals/heads";
 import { type Area, inBounds, inRing } from "./areas";
 import type { PackedDrawing } from "./drawing";
@@ -21,7 +24,7 @@ import { Minimap } from "./Minimap";
 import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
 import type { Mark, Moving, Scene } from "./scene";
-import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, visible, zoomAt } from "./view";
+import { clampTo, fit, panBy, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { legendRows } from "./writtenLegend";
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 import { keep, parseKept } from "../ui/kept";
@@ -83,7 +86,9 @@ interface Drag {
   line: readonly Pixels[];
 }
 
-const KEYS = "Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.";
+const KEYS = localized(
+  () => t`Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`,
+);
 const CLICK_SLACK = 4;
 const TOUCH = 14;
 
@@ -258,7 +263,7 @@ export function MapCanvas({
     event.preventDefault();
   };
 
-  const bar = scaleBar(shown.scale, 110);
+  const bar = roundLength(110 / shown.scale);
   return (
     <div
       ref={host}
@@ -267,7 +272,7 @@ export function MapCanvas({
       data-view={`${shown.x} ${shown.y} ${shown.scale}`}
       role="application"
       tabIndex={0}
-      aria-label={`${label}. ${KEYS}`}
+      aria-label={`${label}. ${KEYS()}`}
       onKeyDown={onKeyDown}
       onBlur={() => setCrosshair(false)}
       onPointerDown={(event) => {
@@ -343,8 +348,8 @@ export function MapCanvas({
         )}
         <MapButtons onZoom={zoom} onAll={showAll} />
       </div>
-      <div className="map-scale" aria-hidden="true" style={{ width: bar * shown.scale }}>
-        {bar >= 1000 ? `${bar / 1000} km` : `${bar} m`}
+      <div className="map-scale" aria-hidden="true" style={{ width: bar.metres * shown.scale }}>
+        {bar.text}
       </div>
       {children}
     </div>
@@ -376,13 +381,13 @@ const MapButtons = memo(function MapButtons({
 }) {
   return (
     <div className="map-buttons">
-      <MapButton label="Zoom in" onClick={() => onZoom(1.5)}>
+      <MapButton label={t`Zoom in`} onClick={() => onZoom(1.5)}>
         <IconPlus />
       </MapButton>
-      <MapButton label="Zoom out" onClick={() => onZoom(1 / 1.5)}>
+      <MapButton label={t`Zoom out`} onClick={() => onZoom(1 / 1.5)}>
         <IconMinus />
       </MapButton>
-      <MapButton label="Show the whole map" onClick={onAll}>
+      <MapButton label={t`Show the whole map`} onClick={onAll}>
         <IconFit />
       </MapButton>
     </div>

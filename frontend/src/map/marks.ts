@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import { nth } from "../lists";
 import {
   FLOW,
@@ -171,7 +173,7 @@ export function drawFlow(
   }
   context.restore();
   if (flow.selected) brackets(context, [x, y], 20, palette.ink);
-  tag(context, `${Math.round(flow.perHour)} per hour`, x, y - 22);
+  tag(context, t`${Math.round(flow.perHour)} per hour`, x, y - 22);
 }
 
 /** Corners around what is selected, so that not only its colour says so. */

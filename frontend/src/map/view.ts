@@ -79,13 +79,6 @@ export function visible(view: View, size: Size): Bounds {
 export const overlaps = (a: Bounds, b: Bounds): boolean =>
   a[0] <= b[2] && a[2] >= b[0] && a[1] <= b[3] && a[3] >= b[1];
 
-/** A round length whose bar is at most `most` pixels, for the scale bar. */
-export function scaleBar(scale: number, most: number): number {
-  const metres = most / scale;
-  const power = 10 ** Math.floor(Math.log10(metres));
-  const step = [5, 2, 1].find((one) => one * power <= metres) ?? 1;
-  return step * power;
-}
 
 /** Makes a canvas draw in metres. */
 export function worldTransform(

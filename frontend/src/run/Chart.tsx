@@ -1,3 +1,6 @@
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useId } from "react";
 
 import { nth } from "../lists";
@@ -48,13 +51,13 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
           <g key={v}>
             <line className="chart-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
             <text x={BOX.left - 6} y={py(v) + 4} textAnchor="end">
-              {v.toLocaleString("en")}
+              {v.toLocaleString(i18n.locale)}
             </text>
           </g>
         ))}
         {xTicks.map((v) => (
           <text key={v} x={px(v)} y={BOX.bottom + 15} textAnchor="middle">
-            {v.toLocaleString("en")}
+            {v.toLocaleString(i18n.locale)}
           </text>
         ))}
         <text x={(BOX.left + BOX.right) / 2} y={H - 3} textAnchor="middle">
@@ -106,7 +109,9 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
       )}
       <p>{children}</p>
       <details>
-        <summary>{title} in numbers</summary>
+        <summary>
+          <Trans>{title} in numbers</Trans>
+        </summary>
         <Numbers title={title} xLabel={xLabel} yLabel={yLabel} x={x} series={series} bars={bars} />
       </details>
     </figure>
@@ -130,7 +135,7 @@ function Numbers({
 }) {
   const rows = x.slice(0, series[0]?.values.length).map((_, k) => k);
   return (
-    <table aria-label={`${title} in numbers`} style={{ width: "100%", fontSize: 12.5, textAlign: "right" }}>
+    <table aria-label={t`${title} in numbers`} style={{ width: "100%", fontSize: 12.5, textAlign: "right" }}>
       <thead>
         <tr>
           <th scope="col">{xLabel}</th>
@@ -145,7 +150,7 @@ function Numbers({
         {(bars ? rows : thinned(rows, ROWS)).map((k) => (
           <tr key={k}>
             <th scope="row" style={{ fontWeight: 400 }}>
-              {bars ? `${round(nth(x, k))} to ${round(nth(x, k + 1))}` : round(nth(x, k))}
+              {bars ? t`${round(nth(x, k))} to ${round(nth(x, k + 1))}` : round(nth(x, k))}
             </th>
             {series.map((one) => (
               <td key={one.name}>{said(one.values[k])}</td>
@@ -157,7 +162,7 @@ function Numbers({
   );
 }
 
-const round = (v: number): string => v.toLocaleString("en", { maximumFractionDigits: 1 });
+const round = (v: number): string => v.toLocaleString(i18n.locale, { maximumFractionDigits: 1 });
 const said = (v: number | null | undefined): string => (v == null ? "–" : round(v));
 
 /** Lines through what is known; a gap where nothing is. */

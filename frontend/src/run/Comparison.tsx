@@ -1,4 +1,6 @@
 import { Alert, Anchor, Loader, Table, Text, Title, VisuallyHidden } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useCallback } from "react";
 
 import { allFigures } from "../api/figures";
@@ -21,39 +23,49 @@ export function Comparison({ info, scenario }: { info: RunInfo; scenario: string
   const known = useLoaded(allFigures);
   if (error ?? known.error)
     return (
-      <Alert color="gray" title="Earlier runs cannot be compared">
+      <Alert color="gray" title={t`Earlier runs cannot be compared`}>
         {error ?? known.error}
       </Alert>
     );
-  if (!value || !known.value) return <Loader aria-label="Looking for the last run" />;
+  if (!value || !known.value) return <Loader aria-label={t`Looking for the last run`} />;
   const [last] = value;
   if (!summary || !last) {
     return (
       <Text size="sm" c="dimmed">
-        This is the first run of this scenario. After the next one, both are shown beside each other here.
+        <Trans>
+          This is the first run of this scenario. After the next one, both are shown beside each other here.
+        </Trans>
       </Text>
     );
   }
   return (
     <>
       <Title order={3} size="h5">
-        Compared with the last run
+        <Trans>Compared with the last run</Trans>
       </Title>
       <Text size="sm" mt={4}>
         <Anchor underline="always" href={hashOf({ view: "run", scenario, run: last.info.run })}>
           {last.info.finished ? when(last.info.finished) : last.info.run}
         </Anchor>
-        . {last.changed ? "The scenario was changed in between." : "The scenario is the same."}
+        . {last.changed ? t`The scenario was changed in between.` : t`The scenario is the same.`}
       </Text>
-      <Table mt="xs" verticalSpacing={4} fz={13} aria-label="Compared with the last run">
+      <Table mt="xs" verticalSpacing={4} fz={13} aria-label={t`Compared with the last run`}>
         <Table.Thead>
           <Table.Tr>
             <Table.Th>
-              <VisuallyHidden>Figure</VisuallyHidden>
+              <VisuallyHidden>
+                <Trans>Figure</Trans>
+              </VisuallyHidden>
             </Table.Th>
-            <Table.Th>This run</Table.Th>
-            <Table.Th>Last run</Table.Th>
-            <Table.Th>Difference</Table.Th>
+            <Table.Th>
+              <Trans>This run</Trans>
+            </Table.Th>
+            <Table.Th>
+              <Trans>Last run</Trans>
+            </Table.Th>
+            <Table.Th>
+              <Trans>Difference</Trans>
+            </Table.Th>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
@@ -66,7 +78,7 @@ export function Comparison({ info, scenario }: { info: RunInfo; scenario: string
               <Table.Td>{one.before}</Table.Td>
               <Table.Td fw={one.difference === "same" ? 400 : 700}>
                 {one.difference}
-                {one.better === null ? "" : one.better ? ", better" : ", worse"}
+                {one.better === null ? "" : one.better ? t`, better` : t`, worse`}
               </Table.Td>
             </Table.Tr>
           ))}

@@ -1,9 +1,13 @@
+import { i18n } from "@lingui/core";
 import { Alert, Button, List, Loader, Table, Text, Title } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import { useCallback, useEffect, useState } from "react";
 
+import { fixed } from "../language/numbers";
 import { type FitRow, runs } from "../api/runs";
 import { useLoaded } from "../ui/useLoaded";
-import { count, span } from "../ui/words";
+import { span } from "../ui/words";
 import { worstFirst } from "./fit";
 import { Scatter } from "./Scatter";
 
@@ -29,32 +33,32 @@ export function CountsFit({
   }, [value, onFit]);
   if (error)
     return (
-      <Alert color="gray" title="The counts cannot be compared">
+      <Alert color="gray" title={t`The counts cannot be compared`}>
         {error}
       </Alert>
     );
-  if (!value) return <Loader aria-label="Counting" />;
+  if (!value) return <Loader aria-label={t`Counting`} />;
   const { rows, met, hours, hours_met, rmse, contradictions } = value;
   const shown = worstFirst(all ? rows : rows.filter((row) => !row.met));
   return (
     <>
       <Title order={3} size="h5">
-        {met.toLocaleString("en")} of {count(rows.length, "count")} met (
-        {Math.round((100 * met) / rows.length)} %)
+        <Trans>
+          {met.toLocaleString(i18n.locale)} of <Plural value={rows.length} one="# count" other="# counts" />{" "}
+          met ({Math.round((100 * met) / rows.length)} %)
+        </Trans>
       </Title>
       <Text size="sm" mt={4} mb="sm">
-        A count is met if its GEH, the usual measure of how far two numbers of vehicles are apart, is 5 or
-        less.{" "}
-        {hours > 0 && (
-          <>
-            Of the whole hours that the counts make up, {hours_met} of {hours} are met.{" "}
-          </>
-        )}
-        {rmse !== null && <>The mean error is {rmse.toFixed(1)} vehicles (root mean square).</>}
+        <Trans>
+          A count is met if its GEH, the usual measure of how far two numbers of vehicles are apart, is 5 or
+          less.
+        </Trans>
+        {hours > 0 && ` ${t`Of the whole hours that the counts make up, ${hours_met} of ${hours} are met.`}`}
+        {rmse !== null && ` ${t`The mean error is ${fixed(rmse, 1)} vehicles (root mean square).`}`}
       </Text>
       <Scatter rows={rows} />
       {contradictions.length > 0 && (
-        <Alert color="gray" title="Counts that contradict each other" mb="md">
+        <Alert color="gray" title={t`Counts that contradict each other`} mb="md">
           <List size="sm">
             {contradictions.slice(0, 20).map((text) => (
               <List.Item key={text}>{text}</List.Item>
@@ -63,27 +67,37 @@ export function CountsFit({
         </Alert>
       )}
       <Title order={3} size="h5">
-        {all ? "All counts" : "Not met"}
+        {all ? t`All counts` : t`Not met`}
       </Title>
       {rows.length > met && (
         <Text size="xs" c="dimmed">
-          Choose one to see its count station.
+          <Trans>Choose one to see its count station.</Trans>
         </Text>
       )}
-      {shown.length === 0 && <Text size="sm">Every count is met.</Text>}
+      {shown.length === 0 && (
+        <Text size="sm">
+          <Trans>Every count is met.</Trans>
+        </Text>
+      )}
       {shown.length > 0 && (
         <Table
           mt="xs"
           verticalSpacing={4}
           horizontalSpacing={5}
           fz={13}
-          aria-label={all ? "All counts" : "Counts that are not met"}
+          aria-label={all ? t`All counts` : t`Counts that are not met`}
         >
           <Table.Thead>
             <Table.Tr>
-              <Table.Th>Count station and time</Table.Th>
-              <Table.Th ta="right">Counted</Table.Th>
-              <Table.Th ta="right">Simulated</Table.Th>
+              <Table.Th>
+                <Trans>Count station and time</Trans>
+              </Table.Th>
+              <Table.Th ta="right">
+                <Trans>Counted</Trans>
+              </Table.Th>
+              <Table.Th ta="right">
+                <Trans>Simulated</Trans>
+              </Table.Th>
               <Table.Th ta="right">GEH</Table.Th>
             </Table.Tr>
           </Table.Thead>
@@ -94,11 +108,11 @@ export function CountsFit({
       )}
       {shown.length > LISTED && (
         <Text size="sm" c="dimmed" mt="xs">
-          and {(shown.length - LISTED).toLocaleString("en")} more
+          <Trans>and {(shown.length - LISTED).toLocaleString(i18n.locale)} more</Trans>
         </Text>
       )}
       <Button mt="sm" variant="default" size="compact-sm" onClick={() => setAll(!all)}>
-        {all ? "Only those that are not met" : "Show all counts"}
+        {all ? t`Only those that are not met` : t`Show all counts`}
       </Button>
     </>
   );
@@ -119,9 +133,9 @@ function Row({ row, onShow }: { row: FitRow; onShow: (x: number, y: number) => v
           )}
           <div className="fit-time">{span(begin, end)}</div>
         </Table.Th>
-        <Table.Td ta="right">{counted.toLocaleString("en")}</Table.Td>
-        <Table.Td ta="right">{modelled.toLocaleString("en")}</Table.Td>
-        <Table.Td ta="right">{geh.toFixed(1)}</Table.Td>
+        <Table.Td ta="right">{counted.toLocaleString(i18n.locale)}</Table.Td>
+        <Table.Td ta="right">{modelled.toLocaleString(i18n.locale)}</Table.Td>
+        <Table.Td ta="right">{fixed(geh, 1)}</Table.Td>
       </Table.Tr>
       {why && (
         <Table.Tr>

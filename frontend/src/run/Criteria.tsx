@@ -1,5 +1,7 @@
 import { Button, Text, Title } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { short } from "../language/numbers";
 import type { CriterionInfo } from "../api/runs";
 import { clock } from "../ui/words";
 
@@ -15,24 +17,24 @@ export function Criteria({
   if (criteria.length === 0) return null;
   const missed = criteria.filter(({ passed }) => !passed).length;
   return (
-    <section aria-label="Criteria" style={{ marginTop: 14 }}>
+    <section aria-label={t`Criteria`} style={{ marginTop: 14 }}>
       <Title order={3} size="h5">
-        {missed === 0 ? "All criteria are met" : `${missed} of ${criteria.length} criteria not met`}
+        {missed === 0 ? t`All criteria are met` : t`${missed} of ${criteria.length} criteria not met`}
       </Title>
       <ul className="criteria">
         {criteria.map(({ criterion, words, passed, value, unit, time }) => (
           <li key={criterion}>
-            <strong data-met={passed}>{passed ? "Met" : "Not met"}:</strong> {words}
+            <strong data-met={passed}>{passed ? t`Met` : t`Not met`}:</strong> {words}
             <Text size="sm" c="dimmed" component="span">
-              {value === null ? " (not measured)" : `, is ${rounded(value)}${unit ? ` ${unit}` : ""}`}
-              {time !== null && !onShow && ` at ${clock(time)}`}
+              {value === null ? t` (not measured)` : t`, is ${rounded(value)}${unit ? ` ${unit}` : ""}`}
+              {time !== null && !onShow && t` at ${clock(time)}`}
             </Text>
             {time !== null && onShow && (
               <Button
                 size="compact-xs"
                 variant="default"
                 ml={6}
-                aria-label={`Show ${words} at ${clock(time)}`}
+                aria-label={t`Show ${words} at ${clock(time)}`}
                 onClick={() => onShow(time)}
               >
                 {clock(time)}
@@ -45,4 +47,4 @@ export function Criteria({
   );
 }
 
-const rounded = (value: number): string => String(Number(value.toFixed(2)));
+const rounded = (value: number): string => short(value, 2);

@@ -1,4 +1,6 @@
 import { ActionIcon, Alert, Anchor, Group, Loader, Table, Text, VisuallyHidden } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useCallback, useEffect, useState } from "react";
 
 import { type RunInfo, runs } from "../api/runs";
@@ -31,37 +33,45 @@ export function EarlierRuns({
   const [removing, setRemoving] = useState<ToRemove | null>(null);
   if (error)
     return (
-      <Alert color="red" title="The runs cannot be shown">
+      <Alert color="red" title={t`The runs cannot be shown`}>
         {error}
       </Alert>
     );
-  if (!value) return <Loader aria-label="Loading the runs" />;
+  if (!value) return <Loader aria-label={t`Loading the runs`} />;
   if (value.length === 0)
     return (
-      <Text c="dimmed">This scenario has not been run yet. Start a run in the editor, in its last step.</Text>
+      <Text c="dimmed">
+        <Trans>This scenario has not been run yet. Start a run in the editor, in its last step.</Trans>
+      </Text>
     );
   return (
     <>
-      <Table verticalSpacing={6} fz={14} aria-label="Runs of this scenario">
+      <Table verticalSpacing={6} fz={14} aria-label={t`Runs of this scenario`}>
         <Table.Thead>
           <Table.Tr>
-            <Table.Th>Ended</Table.Th>
-            <Table.Th>Outcome</Table.Th>
             <Table.Th>
-              <VisuallyHidden>Actions</VisuallyHidden>
+              <Trans>Ended</Trans>
+            </Table.Th>
+            <Table.Th>
+              <Trans>Outcome</Trans>
+            </Table.Th>
+            <Table.Th>
+              <VisuallyHidden>
+                <Trans>Actions</Trans>
+              </VisuallyHidden>
             </Table.Th>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
           {[...value].reverse().map((one) => (
             <Table.Tr key={one.run} title={one.run}>
-              <Table.Td>{one.finished ? when(one.finished) : "now"}</Table.Td>
+              <Table.Td>{one.finished ? when(one.finished) : t`now`}</Table.Td>
               <Table.Td>{outcome(one)}</Table.Td>
               <Table.Td>
                 <Group gap={10} justify="flex-end" wrap="nowrap">
                   {one.run === current ? (
                     <Text size="sm" fw={600}>
-                      shown
+                      <Trans>shown</Trans>
                     </Text>
                   ) : (
                     <Anchor
@@ -69,7 +79,7 @@ export function EarlierRuns({
                       href={hashOf({ view: "run", scenario, run: one.run })}
                       aria-label={`${watchWord(one)} ${one.run}`}
                     >
-                      {one.state === "interrupted" ? "Resume" : "Watch"}
+                      {one.state === "interrupted" ? t`Resume` : t`Watch`}
                     </Anchor>
                   )}
                   {hasReport(one) && (
@@ -78,16 +88,16 @@ export function EarlierRuns({
                       href={runs.reportUrl(one.run)}
                       target="_blank"
                       rel="noreferrer"
-                      aria-label={`Report of ${one.run}`}
+                      aria-label={t`Report of ${one.run}`}
                     >
-                      Report
+                      <Trans>Report</Trans>
                     </Anchor>
                   )}
                   {hasEnded(one.state) && (
                     <ActionIcon
                       variant="subtle"
                       color="gray"
-                      aria-label={`Remove ${one.run}`}
+                      aria-label={t`Remove ${one.run}`}
                       onClick={() => setRemoving({ kind: "run", name: one.run })}
                     >
                       <IconTrash />
@@ -113,7 +123,7 @@ export function EarlierRuns({
 
 const outcome = ({ state, summary }: RunInfo): string =>
   (state === "completed" || state === "stopped") && summary?.usable
-    ? `${STATE_WORD[state]}, ${summary.usable.level}`
-    : STATE_WORD[state];
-const watchWord = ({ state }: RunInfo): string => (state === "interrupted" ? "Resume" : "Watch");
+    ? `${STATE_WORD()[state]}, ${summary.usable.level}`
+    : STATE_WORD()[state];
+const watchWord = ({ state }: RunInfo): string => (state === "interrupted" ? t`Resume` : t`Watch`);
 const hasReport = ({ state }: RunInfo): boolean => state === "completed" || state === "stopped";

@@ -1,4 +1,6 @@
 import { Alert, Anchor, Button, Group, Loader, Select, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useCallback, useState } from "react";
 
 import { exchange } from "../api/exchange";
@@ -17,7 +19,9 @@ export function Files({ run }: { run: string }) {
       style={{ marginTop: 18 }}
       onToggle={(event) => setOpen(event.currentTarget.open)}
     >
-      <summary>Download the results</summary>
+      <summary>
+        <Trans>Download the results</Trans>
+      </summary>
       {open && <Listed run={run} />}
     </details>
   );
@@ -27,11 +31,11 @@ function Listed({ run }: { run: string }) {
   const { value, error } = useLoaded(useCallback(() => runs.files(run), [run]));
   if (error)
     return (
-      <Alert color="gray" title="There are no files of this run">
+      <Alert color="gray" title={t`There are no files of this run`}>
         {error}
       </Alert>
     );
-  if (!value) return <Loader aria-label="Loading the list of files" />;
+  if (!value) return <Loader aria-label={t`Loading the list of files`} />;
   const recorded = value.some(({ name }) => name === "trajectories.parquet");
   return (
     <>
@@ -47,16 +51,18 @@ function AsRun({ run }: { run: string }) {
   return (
     <div>
       <Text fw={600} size="sm" mt="sm">
-        OpenSCENARIO, as it happened
+        <Trans>OpenSCENARIO, as it happened</Trans>
       </Text>
       <Text size="xs" c="dimmed" mb={6}>
-        Each road user follows the trajectory that it had, and signals change as they did; nothing reacts.
+        <Trans>
+          Each road user follows the trajectory that it had, and signals change as they did; nothing reacts.
+        </Trans>
       </Text>
       <Group gap="sm" align="end">
         <Select
           size="xs"
-          label="Version"
-          data={VERSIONS}
+          label={t`Version`}
+          data={VERSIONS()}
           value={version}
           allowDeselect={false}
           onChange={(chosen) => setVersion(chosen ?? version)}
@@ -68,7 +74,7 @@ function AsRun({ run }: { run: string }) {
           href={exchange.runUrl(run, "openscenario", version)}
           download
         >
-          Download (ZIP)
+          <Trans>Download (ZIP)</Trans>
         </Button>
       </Group>
     </div>

@@ -1,5 +1,8 @@
+import { i18n } from "@lingui/core";
 import { Text } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import { MARK_COLOR } from "../map/colors";
@@ -24,9 +27,8 @@ export function IncidentLog({
     return (
       <Text size="sm" c="dimmed">
         {over
-          ? "There were no incidents."
-          : "No incidents so far. Collisions, emergency braking and teleported vehicles " +
-            "(removed after waiting too long) appear here."}
+          ? t`There were no incidents.`
+          : t`No incidents so far. Collisions, emergency braking and teleported vehicles (removed after waiting too long) appear here.`}
       </Text>
     );
   }
@@ -34,9 +36,9 @@ export function IncidentLog({
   return (
     <>
       <Text size="sm" c="dimmed">
-        Choose one to see where it happened.
+        <Trans>Choose one to see where it happened.</Trans>
       </Text>
-      <ul className="rows" aria-label="Incidents">
+      <ul className="rows" aria-label={t`Incidents`}>
         {listed.map((one, n) => (
           <li key={incidents.length - n}>
             <button type="button" onClick={() => onShow(one)}>
@@ -49,7 +51,9 @@ export function IncidentLog({
       </ul>
       {incidents.length > LISTED && (
         <Text size="sm" c="dimmed" mt="xs">
-          {(incidents.length - LISTED).toLocaleString("en")} earlier ones are in the report.
+          <Trans>
+            {(incidents.length - LISTED).toLocaleString(i18n.locale)} earlier ones are in the report.
+          </Trans>
         </Text>
       )}
     </>

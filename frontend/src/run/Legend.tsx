@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
 import { CATEGORIES, type Category } from "../api/types";
 import { CATEGORY_COLOR, EGO, MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
 import type { MarkKind } from "../map/scene";
@@ -27,12 +30,12 @@ export function Legend({
 }) {
   if (categories.size === 0) return null;
   return (
-    <ul className="map-legend" aria-label="What is shown" style={{ listStyle: "none", margin: 0 }}>
+    <ul className="map-legend" aria-label={t`What is shown`} style={{ listStyle: "none", margin: 0 }}>
       {by !== "kind" &&
-        SCALES[by].legend.map((words, n) => (
+        SCALES()[by].legend.map((words, n) => (
           <li key={words}>
             <span>
-              <i style={{ background: SCALES[by].colors[n] }} />
+              <i style={{ background: SCALES()[by].colors[n] }} />
               {words}
             </span>
           </li>
@@ -42,39 +45,47 @@ export function Legend({
           <span>
             <i style={{ background: CATEGORY_COLOR[kind] }} />
             <CategoryGlyph category={kind} size={16} />
-            {CATEGORY_WORD[kind]}
+            {CATEGORY_WORD()[kind]}
           </span>
         </li>
       ))}
       {ego && (
         <li>
           <span>
-            <i style={{ border: `2px solid ${EGO}`, borderRadius: "50%", boxSizing: "border-box" }} />
-            Your vehicle
+            <Trans>
+              <i style={{ border: `2px solid ${EGO}`, borderRadius: "50%", boxSizing: "border-box" }} />
+              Your vehicle
+            </Trans>
           </span>
         </li>
       )}
       {lights && (
         <li>
           <span>
-            <SignalShapes />
-            Traffic light: go, give way, yellow, red
+            <Trans>
+              <SignalShapes />
+              Traffic light: go, give way, yellow, red
+            </Trans>
           </span>
         </li>
       )}
       {lamps && (
         <li>
           <span>
-            <i style={{ background: "#ff2a1f" }} />
-            Brakes
+            <Trans>
+              <i style={{ background: "#ff2a1f" }} />
+              Brakes
+            </Trans>
           </span>
         </li>
       )}
       {lamps && (
         <li>
           <span>
-            <i style={{ background: "#ffab00" }} />
-            Indicator
+            <Trans>
+              <i style={{ background: "#ffab00" }} />
+              Indicator
+            </Trans>
           </span>
         </li>
       )}
@@ -82,7 +93,7 @@ export function Legend({
         <li key={kind}>
           <span>
             <i className="mark" style={{ background: MARK_COLOR[kind] }} />
-            {MARK_WORD[kind]}
+            {MARK_WORD()[kind]}
           </span>
         </li>
       ))}

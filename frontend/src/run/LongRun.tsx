@@ -1,6 +1,10 @@
+import { i18n } from "@lingui/core";
 import { Alert, Button, Group, Progress, Table, Text, Title } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { fixed } from "../language/numbers";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
 import { hoursMinutes, span } from "../ui/words";
@@ -28,32 +32,34 @@ export function Interrupted({
     });
   };
   return (
-    <section aria-label="Result of the run">
+    <section aria-label={t`Result of the run`}>
       <Title order={2} size="h3">
-        The run was interrupted
+        <Trans>The run was interrupted</Trans>
       </Title>
       <Text size="sm" mt="sm">
         {saved > 0 ? (
-          <>
+          <Trans>
             {hoursMinutes(saved)} of {hoursMinutes(until)} are completed and saved. The run resumes from
             there, with the same results as without the interruption.
-          </>
+          </Trans>
         ) : (
-          "It did not complete its first hour and starts again from the beginning."
+          t`It did not complete its first hour and starts again from the beginning.`
         )}
       </Text>
-      <Progress mt="sm" value={until ? (100 * saved) / until : 0} aria-label="Progress of the run" />
+      <Progress mt="sm" value={until ? (100 * saved) / until : 0} aria-label={t`Progress of the run`} />
       <Group mt="md" mb="lg" gap="xs">
         <Button loading={busy} onClick={resume}>
-          Resume
+          <Trans>Resume</Trans>
         </Button>
         <Button variant="default" onClick={onBack}>
-          Back to the editor
+          <Trans>Back to the editor</Trans>
         </Button>
       </Group>
       {words && (
         <details className="words">
-          <summary>Why it was interrupted</summary>
+          <summary>
+            <Trans>Why it was interrupted</Trans>
+          </summary>
           <pre tabIndex={0}>{words}</pre>
         </details>
       )}
@@ -73,12 +79,13 @@ export function SafeSlices({ info }: { info: RunInfo }) {
       mb="md"
       role="status"
       title={
-        slices.done === 0 ? "Nothing is saved yet" : `${slices.done} of ${total} parts completed and saved`
+        slices.done === 0 ? t`Nothing is saved yet` : t`${slices.done} of ${total} parts completed and saved`
       }
     >
       <Text size="sm">
-        A part is {hoursMinutes(slices.length)}. If the run is interrupted, it can be resumed from{" "}
-        {slices.done === 0 ? "its beginning" : hoursMinutes(slices.time)}.
+        {slices.done === 0
+          ? t`A part is ${hoursMinutes(slices.length)}. If the run is interrupted, it can be resumed from its beginning.`
+          : t`A part is ${hoursMinutes(slices.length)}. If the run is interrupted, it can be resumed from ${hoursMinutes(slices.time)}.`}
       </Text>
     </Alert>
   );
@@ -90,17 +97,27 @@ export function SliceTable({ summary }: { summary: Summary }) {
   if (done.length === 0) return null;
   return (
     <details className="words" style={{ marginTop: 18 }}>
-      <summary>The {done.length} parts of the run</summary>
+      <summary>
+        <Trans>The {done.length} parts of the run</Trans>
+      </summary>
       <Text size="xs" c="dimmed">
-        Road users on the road at the end of each part, and what it cost to compute.
+        <Trans>Road users on the road at the end of each part, and what it cost to compute.</Trans>
       </Text>
-      <Table mt="xs" verticalSpacing={3} fz={13} aria-label="Parts of the run">
+      <Table mt="xs" verticalSpacing={3} fz={13} aria-label={t`Parts of the run`}>
         <Table.Thead>
           <Table.Tr>
-            <Table.Th>Part</Table.Th>
-            <Table.Th ta="right">On the road</Table.Th>
-            <Table.Th ta="right">Computed in</Table.Th>
-            <Table.Th ta="right">Memory</Table.Th>
+            <Table.Th>
+              <Trans>Part</Trans>
+            </Table.Th>
+            <Table.Th ta="right">
+              <Trans>On the road</Trans>
+            </Table.Th>
+            <Table.Th ta="right">
+              <Trans>Computed in</Trans>
+            </Table.Th>
+            <Table.Th ta="right">
+              <Trans>Memory</Trans>
+            </Table.Th>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
@@ -109,11 +126,13 @@ export function SliceTable({ summary }: { summary: Summary }) {
               <Table.Th scope="row" fw={400} style={{ whiteSpace: "nowrap" }}>
                 {span(done[n - 1]?.time ?? 0, one.time)}
               </Table.Th>
-              <Table.Td ta="right">{one.running.toLocaleString("en")}</Table.Td>
+              <Table.Td ta="right">{one.running.toLocaleString(i18n.locale)}</Table.Td>
               <Table.Td ta="right" style={{ whiteSpace: "nowrap" }}>
-                {(one.wall_seconds - (done[n - 1]?.wall_seconds ?? 0)).toFixed(1)} s
+                <Trans>{fixed(one.wall_seconds - (done[n - 1]?.wall_seconds ?? 0), 1)} s</Trans>
               </Table.Td>
-              <Table.Td ta="right">{Math.round(one.memory_mb).toLocaleString("en")} MB</Table.Td>
+              <Table.Td ta="right">
+                <Trans>{Math.round(one.memory_mb).toLocaleString(i18n.locale)} MB</Trans>
+              </Table.Td>
             </Table.Tr>
           ))}
         </Table.Tbody>

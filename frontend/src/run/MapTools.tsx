@@ -1,4 +1,6 @@
 import { Select } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import type { ReactNode } from "react";
 
 import { type ColourBy, coloursFor } from "./tint";
@@ -29,8 +31,12 @@ export function MapTools({
         <Select
           size="xs"
           w={176}
-          aria-label="Colour by"
-          leftSection={<span aria-hidden="true">Colour</span>}
+          aria-label={t`Colour by`}
+          leftSection={
+            <span aria-hidden="true">
+              <Trans>Colour</Trans>
+            </span>
+          }
           leftSectionWidth={54}
           allowDeselect={false}
           data={coloursFor(live)}

@@ -1,6 +1,9 @@
 import { Alert, Button, Group, Text, Title } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { localized } from "../language/localized";
 import { carla } from "../api/carla";
 import { allFigures } from "../api/figures";
 import { type RunInfo, runs, type Summary, type Verdict } from "../api/runs";
@@ -16,7 +19,10 @@ import { Interrupted, SliceTable } from "./LongRun";
 
 /** Longer runs are not watched in real time. */
 const LONG = 3600;
-const TITLE: Record<string, string> = { failed: "The run failed", stopped: "The run was stopped" };
+const TITLE = localized((): Record<string, string> => ({
+  failed: t`The run failed`,
+  stopped: t`The run was stopped`,
+}));
 
 /** The result of a run, in figures. */
 export function Result({
@@ -49,9 +55,9 @@ export function Result({
   const failed = info.state === "failed";
   const verdict = failed ? null : (info.summary?.usable ?? null);
   return (
-    <section aria-label="Result of the run">
+    <section aria-label={t`Result of the run`}>
       <Title order={2} size="h3">
-        {TITLE[info.state] ?? "The run is finished"}
+        {TITLE()[info.state] ?? t`The run is finished`}
         {verdict && `: ${verdict.level}`}
       </Title>
       {verdict && <Reservations verdict={verdict} />}
@@ -69,7 +75,9 @@ export function Result({
         </dl>
       )}
       <Group mt="md" mb="lg" gap="xs">
-        <Button onClick={onBack}>Back to the editor</Button>
+        <Button onClick={onBack}>
+          <Trans>Back to the editor</Trans>
+        </Button>
         {info.summary && !failed && (
           <Button
             variant="default"
@@ -78,7 +86,7 @@ export function Result({
             target="_blank"
             rel="noreferrer"
           >
-            Full report
+            <Trans>Full report</Trans>
           </Button>
         )}
         {compared(info.summary) && (
@@ -89,11 +97,11 @@ export function Result({
             target="_blank"
             rel="noreferrer"
           >
-            Compared with CARLA
+            <Trans>Compared with CARLA</Trans>
           </Button>
         )}
         <Button variant="default" loading={busy} onClick={again}>
-          Run again
+          <Trans>Run again</Trans>
         </Button>
       </Group>
       {info.summary && !failed && <SliceTable summary={info.summary} />}
@@ -111,7 +119,7 @@ function Reservations({ verdict }: { verdict: Verdict }) {
     <Alert
       color={bad ? "red" : "yellow"}
       mt="sm"
-      title={bad ? "The figures of this run cannot be used" : "Use these figures with care"}
+      title={bad ? t`The figures of this run cannot be used` : t`Use these figures with care`}
     >
       <ul className="verdict-reasons">
         {verdict.reasons.map(({ kind, words }) => (
@@ -128,15 +136,25 @@ function Failure({ info }: { info: RunInfo }) {
   const words = info.error;
   return (
     <>
-      <Alert color="red" mt="sm" title="The simulation could not continue">
-        Your scenario is unchanged, and other runs continue.{" "}
-        {info.carla
-          ? "See below what is wrong with CARLA, or run without it."
-          : "Try to run it again; if it fails at the same time, remove the road users that were inserted last."}
+      <Alert color="red" mt="sm" title={t`The simulation could not continue`}>
+        <Trans>
+          Your scenario is unchanged, and other runs continue.{" "}
+          {info.carla
+            ? t`See below what is wrong with CARLA, or run without it.`
+            : t`Try to run it again; if it fails at the same time, remove the road users that were inserted last.`}
+        </Trans>
       </Alert>
       <details className="words" style={{ marginTop: 12 }}>
-        <summary>Messages of the simulator</summary>
-        {words ? <pre tabIndex={0}>{words}</pre> : <Text size="sm">There are none.</Text>}
+        <summary>
+          <Trans>Messages of the simulator</Trans>
+        </summary>
+        {words ? (
+          <pre tabIndex={0}>{words}</pre>
+        ) : (
+          <Text size="sm">
+            <Trans>There are none.</Trans>
+          </Text>
+        )}
       </details>
     </>
   );

@@ -1,10 +1,13 @@
 import { Button, Group, Text, TextInput } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useState } from "react";
 
+import { speedText } from "../language/units";
 import type { Category } from "../api/types";
 import { nth } from "../lists";
 import { CategoryGlyph, IconSearch } from "../ui/icons";
-import { CATEGORY_WORD, count, kmh } from "../ui/words";
+import { CATEGORY_WORD } from "../ui/words";
 import type { Picture } from "./usePicture";
 
 const PAUSE = 1000;
@@ -33,7 +36,7 @@ export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boole
   }, [latest, wanted]);
   const word = search.trim().toLowerCase();
   const found = rows.filter(
-    ({ id, category }) => !word || `${id} ${CATEGORY_WORD[category]}`.toLowerCase().includes(word),
+    ({ id, category }) => !word || `${id} ${CATEGORY_WORD()[category]}`.toLowerCase().includes(word),
   );
   const ego = rows.find((row) => row.ego);
   return (
@@ -46,31 +49,31 @@ export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boole
             if (ego) follow(ego.id);
           }}
         >
-          Follow my vehicle
+          <Trans>Follow my vehicle</Trans>
         </Button>
         <Button size="xs" variant="default" disabled={followed === null} onClick={() => follow(null)}>
-          Stop following
+          <Trans>Stop following</Trans>
         </Button>
       </Group>
       <TextInput
         mt="sm"
-        label="Find a road user"
-        placeholder="Part of the name, or a kind"
+        label={t`Find a road user`}
+        placeholder={t`Part of the name, or a kind`}
         leftSection={<IconSearch />}
         value={search}
         onChange={(event) => setSearch(event.currentTarget.value)}
       />
       {rows.length === 0 && (
         <Text size="sm" c="dimmed" mt="sm">
-          No road user is on the road now.
+          <Trans>No road user is on the road now.</Trans>
         </Text>
       )}
       {rows.length > 0 && found.length === 0 && (
         <Text size="sm" mt="sm">
-          No road user on the road matches “{search}”.
+          <Trans>No road user on the road matches “{search}”.</Trans>
         </Text>
       )}
-      <ul className="rows" aria-label="Follow a road user">
+      <ul className="rows" aria-label={t`Follow a road user`}>
         {found.slice(0, LISTED).map((row) => (
           <li key={row.id}>
             <button
@@ -80,15 +83,18 @@ export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boole
             >
               <CategoryGlyph category={row.category} size={20} />
               {row.id}
-              {row.ego && " (yours)"}
-              <span className="far">{kmh(row.speed)}</span>
+              {row.ego && t` (yours)`}
+              <span className="far">{speedText(row.speed)}</span>
             </button>
           </li>
         ))}
       </ul>
       {found.length > LISTED && (
         <Text size="sm" c="dimmed" mt="xs">
-          {count(found.length - LISTED, "more road user")}: type a part of the name.
+          <Trans>
+            <Plural value={found.length - LISTED} one="# more road user" other="# more road users" />: type a
+            part of the name.
+          </Trans>
         </Text>
       )}
     </>

@@ -1,5 +1,7 @@
 import { Alert, Button, Group, Title } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useStarter } from "../editor/asked";
 import { go } from "../ui/address";
 
@@ -18,18 +20,18 @@ export function RunGone({
   return (
     <div className="catalogue">
       <Title order={1} size="h3" mb="sm">
-        {watched ? "This run is gone" : "This run cannot be shown"}
+        {watched ? t`This run is gone` : t`This run cannot be shown`}
       </Title>
       <Alert color="red">
         {watched
-          ? "It was removed, or the server was ended by force while it went on and nothing of it is kept. The scenario is as it was; run again, it gives the same results."
+          ? t`It was removed, or the server was ended by force while it went on and nothing of it is kept. The scenario is as it was; run again, it gives the same results.`
           : reason}
       </Alert>
       <Group mt="md" gap="xs">
-        <Button onClick={() => go({ view: "editor", scenario })}>Back to the editor</Button>
+        <Button onClick={() => go({ view: "editor", scenario })}><Trans>Back to the editor</Trans></Button>
         {watched && (
           <Button variant="default" loading={busy} onClick={() => start({ scenario, speed: 1 })}>
-            Run again
+            <Trans>Run again</Trans>
           </Button>
         )}
       </Group>

@@ -1,5 +1,6 @@
 import { Loader } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
 import type { RunInfo } from "../api/runs";
 
 /** What is said on the map of a run: how its preparation goes, or who is followed. */
@@ -24,7 +25,7 @@ export function RunHint({
       <div className="map-hint" role="status">
         <span className="waiting">
           <Loader size={16} aria-hidden="true" />
-          The server does not answer. What is shown goes on as soon as it is back …
+          {t`The server does not answer. What is shown goes on as soon as it is back …`}
         </span>
       </div>
     );
@@ -34,8 +35,8 @@ export function RunHint({
         <span className="waiting">
           <Loader size={16} aria-hidden="true" />
           {planned
-            ? "Preparing, step 2 of 2: starting the simulation …"
-            : `Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
+            ? t`Preparing, step 2 of 2: starting the simulation …`
+            : t`Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
         </span>
       </div>
     );
@@ -43,8 +44,8 @@ export function RunHint({
   return (
     <div className="map-hint" role="status">
       {there
-        ? `Following ${followed}. Click on the empty map to stop.`
-        : `${followed} is not on the road now.`}
+        ? t`Following ${followed}. Click on the empty map to stop.`
+        : t`${followed} is not on the road now.`}
     </div>
   );
 }

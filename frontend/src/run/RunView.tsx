@@ -1,3 +1,7 @@
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
 import "./run.css";
 
 import { Loader, Tabs } from "@mantine/core";
@@ -172,7 +176,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   if (!info)
     return (
       <div className="empty">
-        <Loader aria-label="Loading the run" />
+        <Loader aria-label={t`Loading the run`} />
       </div>
     );
   return (
@@ -186,7 +190,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               picker={loaded?.picker ?? null}
               scene={scene}
               handle={handle}
-              label={mode === "replay" ? "Recording of the run" : "Live view of the run"}
+              label={mode === "replay" ? t`Recording of the run` : t`Live view of the run`}
               onPick={pick}
             >
               <RunHint
@@ -229,23 +233,45 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
             </MapCanvas>
           ) : (
             <div className="empty">
-              <Loader aria-label="Loading the map" />
+              <Loader aria-label={t`Loading the map`} />
             </div>
           )}
         </div>
-        <aside className="run-side" aria-label="About the run">
+        <aside className="run-side" aria-label={t`About the run`}>
           {info.carla && mode === "live" && <CameraPanel run={run} over={ended} />}
           <Tabs className="run-tabs" value={shownTab} onChange={setTab} keepMounted={false}>
             <Tabs.List>
-              {ended && <Tabs.Tab value="result">Result</Tabs.Tab>}
-              {replayable && <Tabs.Tab value="charts">Charts</Tabs.Tab>}
-              {counts > 0 && <Tabs.Tab value="counts">Counts</Tabs.Tab>}
-              <Tabs.Tab value="users">Road users</Tabs.Tab>
-              <Tabs.Tab value="incidents">
-                Incidents{incidents.length > 0 && ` (${incidents.length.toLocaleString("en")})`}
+              {ended && (
+                <Tabs.Tab value="result">
+                  <Trans>Result</Trans>
+                </Tabs.Tab>
+              )}
+              {replayable && (
+                <Tabs.Tab value="charts">
+                  <Trans>Charts</Trans>
+                </Tabs.Tab>
+              )}
+              {counts > 0 && (
+                <Tabs.Tab value="counts">
+                  <Trans>Counts</Trans>
+                </Tabs.Tab>
+              )}
+              <Tabs.Tab value="users">
+                <Trans>Road users</Trans>
               </Tabs.Tab>
-              {shownJunction && <Tabs.Tab value="lights">Lights</Tabs.Tab>}
-              <Tabs.Tab value="runs">Runs</Tabs.Tab>
+              <Tabs.Tab value="incidents">
+                <Trans>
+                  Incidents{incidents.length > 0 && ` (${incidents.length.toLocaleString(i18n.locale)})`}
+                </Trans>
+              </Tabs.Tab>
+              {shownJunction && (
+                <Tabs.Tab value="lights">
+                  <Trans>Lights</Trans>
+                </Tabs.Tab>
+              )}
+              <Tabs.Tab value="runs">
+                <Trans>Runs</Trans>
+              </Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="result" className="run-panel">
               <Result

@@ -1,4 +1,5 @@
 import { Anchor, Title } from "@mantine/core";
+import { Trans } from "@lingui/react/macro";
 import { useCallback } from "react";
 
 import { api } from "../api/client";
@@ -15,11 +16,11 @@ export function RunsView({ scenario }: { scenario: string }) {
   return (
     <div className="runs-view">
       <Title order={1} size="h2" mb="md">
-        Runs of {title}
+        <Trans>Runs of {title}</Trans>
       </Title>
       <EarlierRuns scenario={scenario} />
       <Anchor display="inline-block" mt="lg" href={hashOf({ view: "editor", scenario })}>
-        Back to the editor
+        <Trans>Back to the editor</Trans>
       </Anchor>
     </div>
   );

@@ -1,3 +1,5 @@
+import { i18n } from "@lingui/core";
+import { Trans } from "@lingui/react/macro";
 import { useId } from "react";
 
 import type { FitRow } from "../api/runs";
@@ -18,16 +20,18 @@ export function Scatter({ rows }: { rows: readonly FitRow[] }) {
   const unmet = rows.filter((row) => !row.met);
   return (
     <figure className="chart" aria-labelledby={id}>
-      <figcaption id={id}>Counted and simulated vehicles</figcaption>
+      <figcaption id={id}>
+        <Trans>Counted and simulated vehicles</Trans>
+      </figcaption>
       <svg viewBox={`0 0 ${W} ${H}`} aria-hidden="true">
         {marks.map((v) => (
           <g key={v}>
             <line className="chart-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
             <text x={BOX.left - 6} y={py(v) + 4} textAnchor="end">
-              {v.toLocaleString("en")}
+              {v.toLocaleString(i18n.locale)}
             </text>
             <text x={px(v)} y={BOX.bottom + 15} textAnchor="middle">
-              {v.toLocaleString("en")}
+              {v.toLocaleString(i18n.locale)}
             </text>
           </g>
         ))}
@@ -59,30 +63,38 @@ export function Scatter({ rows }: { rows: readonly FitRow[] }) {
             ),
         )}
         <text x={(BOX.left + BOX.right) / 2} y={H - 4} textAnchor="middle">
-          Counted
+          <Trans>Counted</Trans>
         </text>
         <text x={2} y={12}>
-          Simulated
+          <Trans>Simulated</Trans>
         </text>
       </svg>
       <div className="chart-key" aria-hidden="true">
         <span>
-          <i style={{ background: MARK_COLOR.met, borderRadius: "50%", width: 9, height: 9 }} />
-          met ({(rows.length - unmet.length).toLocaleString("en")})
+          <Trans>
+            <i style={{ background: MARK_COLOR.met, borderRadius: "50%", width: 9, height: 9 }} />
+            met ({(rows.length - unmet.length).toLocaleString(i18n.locale)})
+          </Trans>
         </span>
         <span>
-          <i
-            style={{
-              background: MARK_COLOR.unmet,
-              clipPath: "polygon(50% 0, 100% 100%, 0 100%)",
-              width: 11,
-              height: 10,
-            }}
-          />
-          not met ({unmet.length.toLocaleString("en")})
+          <Trans>
+            <i
+              style={{
+                background: MARK_COLOR.unmet,
+                clipPath: "polygon(50% 0, 100% 100%, 0 100%)",
+                width: 11,
+                height: 10,
+              }}
+            />
+            not met ({unmet.length.toLocaleString(i18n.locale)})
+          </Trans>
         </span>
       </div>
-      <p>On the line, as many vehicles were simulated as counted; below it too few, above it too many.</p>
+      <p>
+        <Trans>
+          On the line, as many vehicles were simulated as counted; below it too few, above it too many.
+        </Trans>
+      </p>
     </figure>
   );
 }

@@ -1,4 +1,6 @@
 import { Button, Menu } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { type RefObject, useEffect, useRef, useState } from "react";
 
 import type { MapHandle } from "../map/MapCanvas";
@@ -24,7 +26,7 @@ export function ShareMenu({
   const moved = useRef(false);
   const begin = (): void => {
     const made = record((canvas) => handle.current?.picture(canvas));
-    if (!made) return tell("This browser cannot record videos.");
+    if (!made) return tell(t`This browser cannot record videos.`);
     moved.current = false;
     setRecording(made);
     if (playing === false) onPlay();
@@ -48,25 +50,33 @@ export function ShareMenu({
           recording.stop().then((blob) => saveFile(blob, `${run}.webm`), tellError);
         }}
       >
-        Stop and save the video
+        <Trans>Stop and save the video</Trans>
       </Button>
     );
   return (
     <Menu position="bottom-end" withinPortal={false} withInitialFocusPlaceholder={false}>
       <Menu.Target>
         <Button size="xs" variant="default" leftSection={<IconDown size={13} />}>
-          Share
+          <Trans context="button">Share</Trans>
         </Button>
       </Menu.Target>
       <Menu.Dropdown>
-        <Menu.Item onClick={copyLink}>Copy the link to this view</Menu.Item>
+        <Menu.Item onClick={copyLink}>
+          <Trans>Copy the link to this view</Trans>
+        </Menu.Item>
         <Menu.Item
           onClick={() => {
             const canvas = handle.current?.picture();
             if (canvas) savePicture(canvas, run);
           }}
         >
-          Picture of the map (PNG)
+          <Trans>Picture of the map (PNG)</Trans>
+        </Menu.Item>
+        <Menu.Item onClick={begin}>
+          <Trans>Video of the map (WebM)</Trans>
+        </Menu.Item>
+        <Menu.Item onClick={() => print()}>
+          <Trans>Print</Trans>
         </Menu.Item>
         <Menu.Item
           onClick={() => {
@@ -74,10 +84,8 @@ export function ShareMenu({
             if (svg) saveVector(svg, run);
           }}
         >
-          Drawing of the map (SVG)
+          <Trans>Drawing of the map (SVG)</Trans>
         </Menu.Item>
-        <Menu.Item onClick={begin}>Video of the map (WebM)</Menu.Item>
-        <Menu.Item onClick={() => print()}>Print</Menu.Item>
       </Menu.Dropdown>
     </Menu>
   );

@@ -1,5 +1,9 @@
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
+import { speedText } from "../language/units";
 import { nth } from "../lists";
-import { clock, kmh } from "../ui/words";
+import { clock } from "../ui/words";
 
 const [WIDTH, HEIGHT] = [260, 74];
 /** Room for the words of the axes, pixels. */
@@ -47,25 +51,27 @@ export function SpeedChart({
   const toY = (speed: number): number => TOP + (1 - speed / most) * (HEIGHT - TOP - BOTTOM);
   const now = points.findLast((one) => one.time <= time + 1e-6);
   const there = now !== undefined && time - now.time <= gap;
-  const words = there ? kmh(now.speed) : "not on the road";
+  const words = there ? speedText(now.speed) : t`not on the road`;
   return (
     <figure className="speed-chart">
       <figcaption>
-        Speed of {name}: <b>{words}</b>
+        <Trans>
+          Speed of {name}: <b>{words}</b>
+        </Trans>
       </figcaption>
       <svg
         viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
         width={WIDTH}
         height={HEIGHT}
         role="img"
-        aria-label={`Speed of ${name} from ${clock(begin)} to ${clock(end)}, at most ${kmh(most)}`}
+        aria-label={t`Speed of ${name} from ${clock(begin)} to ${clock(end)}, at most ${speedText(most)}`}
       >
         <line className="speed-axis" x1={LEFT} x2={WIDTH - LEFT} y1={toY(0)} y2={toY(0)} />
         <line className="speed-axis" x1={LEFT} x2={WIDTH - LEFT} y1={TOP} y2={TOP} />
         <path d={speedPath(points, toX, toY, gap)} />
         {there && <circle cx={toX(time)} cy={toY(now.speed)} r={3.5} />}
         <text x={LEFT + 1} y={TOP + 10}>
-          {kmh(most)}
+          {speedText(most)}
         </text>
         <text x={LEFT} y={HEIGHT - 2}>
           {clock(begin)}

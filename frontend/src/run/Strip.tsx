@@ -1,5 +1,8 @@
 import { Button, Group, Progress, Select, Text } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+import { fixed } from "../language/numbers";
 import { type Action, type Incident, type RunInfo, runs, type RunState } from "../api/runs";
 import { MARK_COLOR } from "../map/colors";
 import { IconBack, IconPause, IconPlay, IconStep, IconStop } from "../ui/icons";
@@ -35,16 +38,16 @@ export function LiveStrip({
   // Only where it matters; at a chosen speed it takes as long as one has chosen.
   const left = until > LONG && info.speed == null ? info.progress?.time_left : null;
   return (
-    <div className="strip" role="region" aria-label="The run">
+    <div className="strip" role="region" aria-label={t`The run`}>
       <Back onBack={onBack} />
-      <Group gap={6} role="group" aria-label="Control the run">
+      <Group gap={6} role="group" aria-label={t`Control the run`}>
         {state === "paused" ? (
           <Button leftSection={<IconPlay />} onClick={() => control("resume")}>
-            Resume
+            <Trans>Resume</Trans>
           </Button>
         ) : (
           <Button leftSection={<IconPause />} disabled={state !== "running"} onClick={() => control("pause")}>
-            Pause
+            <Trans>Pause</Trans>
           </Button>
         )}
         {!info.slices && (
@@ -54,7 +57,7 @@ export function LiveStrip({
             disabled={state !== "paused"}
             onClick={() => control("step")}
           >
-            One step
+            <Trans>One step</Trans>
           </Button>
         )}
         <Button
@@ -63,15 +66,15 @@ export function LiveStrip({
           disabled={!going && state !== "preparing"}
           onClick={() => control("stop")}
         >
-          Stop
+          <Trans>Stop</Trans>
         </Button>
         {info.slices && (
           <Button variant="default" disabled={!going} onClick={() => control("interrupt")}>
-            Resume later
+            <Trans>Resume later</Trans>
           </Button>
         )}
         <SpeedChoice
-          speeds={SPEEDS}
+          speeds={SPEEDS()}
           speed={info.speed ?? null}
           onChange={(speed) => control("speed", speed)}
         />
@@ -79,17 +82,17 @@ export function LiveStrip({
       <div className="time-line">
         <Progress
           value={until ? Math.min(100, (100 * now.time) / until) : 0}
-          aria-label="Progress of the run"
+          aria-label={t`Progress of the run`}
         />
         <Text size="sm" mt={4}>
-          {STATE_WORD[state]}
-          {left != null && state === "running" && `, about ${hoursMinutes(left + 30)} left`}
+          {STATE_WORD()[state]}
+          {left != null && state === "running" && t`, about ${hoursMinutes(left + 30)} left`}
         </Text>
       </div>
-      <Shown label="Time" value={longClock(now.time, until)} />
-      <Shown label="Real-time factor" value={now.pace.toFixed(1)} />
-      <Shown label="On the road" value={String(now.running)} />
-      <Shown label="Arrived" value={String(now.arrived)} />
+      <Shown label={t`Time`} value={longClock(now.time, until)} />
+      <Shown label={t`Real-time factor`} value={fixed(now.pace, 1)} />
+      <Shown label={t`On the road`} value={String(now.running)} />
+      <Shown label={t`Arrived`} value={String(now.arrived)} />
     </div>
   );
 }
@@ -115,12 +118,12 @@ export function ReplayStrip({
   const { replay, time, playing } = player;
   const [begin, end] = replay ? [replay.begin, replay.end] : [0, 0];
   return (
-    <div className="strip" role="region" aria-label="The recording">
+    <div className="strip" role="region" aria-label={t`The recording`}>
       <Back onBack={onBack} />
-      <Group gap={6} role="group" aria-label="Control the recording">
+      <Group gap={6} role="group" aria-label={t`Control the recording`}>
         {playing && replay ? (
           <Button leftSection={<IconPause />} onClick={player.pause}>
-            Pause
+            <Trans>Pause</Trans>
           </Button>
         ) : (
           <Button
@@ -129,11 +132,11 @@ export function ReplayStrip({
             loading={player.loading}
             disabled={!recorded || player.error !== null}
           >
-            {replay ? "Play" : "Watch again"}
+            {replay ? t`Play` : t`Watch again`}
           </Button>
         )}
         <SpeedChoice
-          speeds={REPLAY_SPEEDS}
+          speeds={REPLAY_SPEEDS()}
           speed={player.speed}
           onChange={(speed) => player.setSpeed(speed ?? 1)}
         />
@@ -154,12 +157,12 @@ export function ReplayStrip({
           </div>
           <input
             type="range"
-            aria-label="Moment of the run"
+            aria-label={t`Moment of the run`}
             min={begin}
             max={end}
             step={Math.min(STEP, (end - begin) / 2 || STEP)}
             value={time}
-            aria-valuetext={`${longClock(time, end)} of ${longClock(end, end)}`}
+            aria-valuetext={t`${longClock(time, end)} of ${longClock(end, end)}`}
             onChange={(event) => {
               player.pause();
               player.seek(Number(event.currentTarget.value));
@@ -169,14 +172,14 @@ export function ReplayStrip({
       ) : (
         <Text size="sm" className="time-line" c="dimmed">
           {!recorded || player.error
-            ? "There is no recording of this run."
+            ? t`There is no recording of this run.`
             : player.loading
-              ? "Fetching the recording …"
-              : "The run is over."}
+              ? t`Fetching the recording …`
+              : t`The run is over.`}
         </Text>
       )}
-      {replay && <Shown label={`of ${longClock(end, end)}`} value={longClock(time, end)} />}
-      {replay && <Shown label="On the road" value={String(running)} />}
+      {replay && <Shown label={t`of ${longClock(end, end)}`} value={longClock(time, end)} />}
+      {replay && <Shown label={t`On the road`} value={String(running)} />}
     </div>
   );
 }
@@ -184,7 +187,7 @@ export function ReplayStrip({
 function Back({ onBack }: { onBack: () => void }) {
   return (
     <Button variant="default" leftSection={<IconBack />} onClick={onBack}>
-      Back to the editor
+      <Trans>Back to the editor</Trans>
     </Button>
   );
 }
@@ -201,7 +204,7 @@ function SpeedChoice({
   const known = speeds.find((one) => one.speed === speed);
   return (
     <Select
-      aria-label="Speed"
+      aria-label={t`Speed`}
       w={150}
       data={speeds.map(({ value, label }) => ({ value, label }))}
       allowDeselect={false}

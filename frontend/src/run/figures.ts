@@ -1,3 +1,8 @@
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
+
+import { preferences } from "../language/preferences";
+import { localized } from "../language/localized";
 import { longClock, sentence } from "../ui/words";
 import type { FigureInfo } from "../api/figures";
 import type { RunState, Summary } from "../api/runs";
@@ -25,7 +30,7 @@ function get(summary: Summary, { name, part }: FigureInfo): number | null {
 }
 
 function plain(n: number, { unit, factor, digits }: FigureInfo["display"]): string {
-  const text = (n * factor).toLocaleString("en", {
+  const text = (n * factor).toLocaleString(i18n.locale, {
     minimumFractionDigits: digits,
     maximumFractionDigits: digits,
   });
@@ -82,16 +87,16 @@ function signed(difference: number, { display }: FigureInfo): string {
 const ENDED: readonly RunState[] = ["completed", "stopped", "failed", "interrupted"];
 export const hasEnded = (state: RunState): boolean => ENDED.includes(state);
 
-export const STATE_WORD: Record<RunState, string> = {
-  preparing: "Preparing",
-  running: "Running",
-  paused: "Paused",
-  finishing: "Writing the results",
-  completed: "Finished",
-  stopped: "Stopped",
-  failed: "Failed",
-  interrupted: "Interrupted",
-};
+export const STATE_WORD = localized((): Record<RunState, string> => ({
+  preparing: t`Preparing`,
+  running: t`Running`,
+  paused: t`Paused`,
+  finishing: t`Writing the results`,
+  completed: t`Finished`,
+  stopped: t`Stopped`,
+  failed: t`Failed`,
+  interrupted: t`Interrupted`,
+}));
 
 export interface Speed {
   value: string;
@@ -100,18 +105,22 @@ export interface Speed {
 }
 
 /** Speeds to choose from; null is as fast as the machine can. */
-export const SPEEDS: Speed[] = [
+export const SPEEDS = localized((): Speed[] => [
   { value: "0.1", label: "0.1 ×", speed: 0.1 },
   { value: "0.25", label: "0.25 ×", speed: 0.25 },
   { value: "0.5", label: "0.5 ×", speed: 0.5 },
-  { value: "1", label: "Real time", speed: 1 },
+  { value: "1", label: t`Real time`, speed: 1 },
   { value: "2", label: "2 ×", speed: 2 },
   { value: "5", label: "5 ×", speed: 5 },
   { value: "10", label: "10 ×", speed: 10 },
-  { value: "max", label: "As fast as possible", speed: null },
-];
+  { value: "max", label: t`As fast as possible`, speed: null },
+]);
 /** A recording has no limit but the eye. */
-export const REPLAY_SPEEDS: Speed[] = SPEEDS.filter(({ speed }) => speed !== null);
+export const REPLAY_SPEEDS = localized((): Speed[] => SPEEDS().filter(({ speed }) => speed !== null));
 
 export const when = (seconds1970: number): string =>
-  new Date(seconds1970 * 1000).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" });
+  new Date(seconds1970 * 1000).toLocaleString(
+    // English dates begin with the day, as the day is what one looks for.
+    i18n.locale === "en" ? "en-GB" : i18n.locale,
+    { dateStyle: "medium", timeStyle: "short", hour12: preferences().hours === 12 },
+  );

@@ -1,21 +1,24 @@
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../language/localized";
 import type { RunFile } from "../api/runs";
 
-const WORD: Record<string, string> = {
-  "report.html": "Full report",
-  "parity.html": "Comparison with CARLA",
-  "summary.json": "Key figures",
-  "figures.json": "Figures by road and junction",
-  "actors.json": "Outcome of each road user",
-  "events.json": "Incidents",
-  "plan.json": "Planned trips",
-  "scenario.json": "The scenario as it was run",
-  "sumo.log": "Messages of the simulator",
-  "trajectories.parquet": "Trajectories",
-  "figures/network.csv": "The whole road network over time",
-  "figures/segments.csv": "Each road over time",
-  "figures/junctions.csv": "Each junction over time",
-  "figures/movements.csv": "Each turning movement over time",
-};
+const WORD = localized((): Record<string, string> => ({
+  "report.html": t`Full report`,
+  "parity.html": t`Comparison with CARLA`,
+  "summary.json": t`Key figures`,
+  "figures.json": t`Figures by road and junction`,
+  "actors.json": t`Outcome of each road user`,
+  "events.json": t`Incidents`,
+  "plan.json": t`Planned trips`,
+  "scenario.json": t`The scenario as it was run`,
+  "sumo.log": t`Messages of the simulator`,
+  "trajectories.parquet": t`Trajectories`,
+  "figures/network.csv": t`The whole road network over time`,
+  "figures/segments.csv": t`Each road over time`,
+  "figures/junctions.csv": t`Each junction over time`,
+  "figures/movements.csv": t`Each turning movement over time`,
+}));
 
 interface Group {
   title: string;
@@ -23,34 +26,34 @@ interface Group {
   files: (RunFile & { word: string })[];
 }
 
-const GROUPS: readonly { title: string; text: string; holds: (name: string) => boolean }[] = [
+const GROUPS = localized((): readonly { title: string; text: string; holds: (name: string) => boolean }[] => [
   {
-    title: "To read",
-    text: "Open in any browser; they need nothing else.",
+    title: t`To read`,
+    text: t`Open in any browser; they need nothing else.`,
     holds: (name) => name.endsWith(".html"),
   },
-  { title: "Tables", text: "Open in a spreadsheet.", holds: (name) => name.endsWith(".csv") },
+  { title: t`Tables`, text: t`Open in a spreadsheet.`, holds: (name) => name.endsWith(".csv") },
   {
-    title: "Figures and lists",
-    text: "As data, for programs (JSON).",
+    title: t`Figures and lists`,
+    text: t`As data, for programs (JSON).`,
     holds: (name) => name.endsWith(".json"),
   },
   {
-    title: "Recordings",
-    text: "Large tables, for programs (Parquet).",
+    title: t`Recordings`,
+    text: t`Large tables, for programs (Parquet).`,
     holds: (name) => name.endsWith(".parquet"),
   },
-  { title: "The rest", text: "If something went wrong.", holds: () => true },
-];
+  { title: t`The rest`, text: t`If something went wrong.`, holds: () => true },
+]);
 
 /** Files by what one does with them, in plain words where they are known. */
 export function fileGroups(files: readonly RunFile[]): Group[] {
   let left = [...files];
-  return GROUPS.flatMap(({ title, text, holds }) => {
+  return GROUPS().flatMap(({ title, text, holds }) => {
     const mine = left.filter(({ name }) => holds(name));
     left = left.filter((file) => !mine.includes(file));
     return mine.length > 0
-      ? [{ title, text, files: mine.map((file) => ({ ...file, word: WORD[file.name] ?? file.name })) }]
+      ? [{ title, text, files: mine.map((file) => ({ ...file, word: WORD()[file.name] ?? file.name })) }]
       : [];
   });
 }

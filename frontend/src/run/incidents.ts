@@ -1,7 +1,11 @@
+import { plural, t } from "@lingui/core/macro";
+
+import { fixed } from "../language/numbers";
+import { localized } from "../language/localized";
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import type { Mark, MarkKind } from "../map/scene";
-import { CATEGORY_WORD, count, hoursMinutes } from "../ui/words";
+import { CATEGORY_WORD, hoursMinutes } from "../ui/words";
 
 /** Simulated seconds for which something counts as having just happened. */
 const FRESH = 4;
@@ -24,74 +28,77 @@ const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
   rule_overridden: "rule",
 };
 
-export const MARK_WORD: Record<MarkKind, string> = {
-  collision: "Collision",
-  braking: "Emergency braking",
-  teleported: "Teleported",
-  jam: "Jam",
-  measure: "Measure",
-  rule: "Rule",
-  met: "Count met",
-  unmet: "Count not met",
-};
+export const MARK_WORD = localized((): Record<MarkKind, string> => ({
+  collision: t`Collision`,
+  braking: t`Emergency braking`,
+  teleported: t`Teleported`,
+  jam: t`Jam`,
+  measure: t`Measure`,
+  rule: t`Rule`,
+  met: t`Count met`,
+  unmet: t`Count not met`,
+}));
 
 export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ?? "teleported";
 
 /** An incident in a sentence, with whom. */
 export function sentence(incident: Incident, categories: ReadonlyMap<string, Category>): string {
   const who = named(incident.actor, categories);
+  const rule = incident.rule ?? "";
+  const detail = incident.detail ?? "";
   switch (incident.kind) {
     case "collision":
       return incident.partner
-        ? `${who} collided with ${named(incident.partner, categories)}`
-        : `${who} collided`;
+        ? t`${who} collided with ${named(incident.partner, categories)}`
+        : t`${who} collided`;
     case "emergency_stop":
-      return `${who} braked in an emergency`;
+      return t`${who} braked in an emergency`;
     case "teleport_start":
-      return `${who} was gridlocked and teleported`;
+      return t`${who} was gridlocked and teleported`;
     case "teleport_end":
-      return `${who} was put back on the road after its teleport`;
+      return t`${who} was put back on the road after its teleport`;
     case "jam_begin":
-      return `A jam${queued(incident)} began at ${who}`;
+      return t`A jam${queued(incident)} began at ${who}`;
     case "jam_end":
-      return `A jam ended${lasted(incident)}`;
+      return t`A jam ended${lasted(incident)}`;
     case "lost":
-      return `${who} did not come back with the saved state`;
+      return t`${who} did not come back with the saved state`;
     case "stranded":
-      return `${who} was stranded: every route to its goal was closed`;
+      return t`${who} was stranded: every route to its goal was closed`;
     case "measure_begin":
-      return `Measure ${incident.actor} began`;
+      return t`Measure ${incident.actor} began`;
     case "measure_end":
-      return `Measure ${incident.actor} ended`;
+      return t`Measure ${incident.actor} ended`;
     case "rule_started":
-      return `${who} began rule ${incident.rule}${values(incident)}`;
+      return t`${who} began rule ${rule}${values(incident)}`;
     case "rule_acted":
-      return `${who}: ${incident.detail ?? ""} (rule ${incident.rule})`;
+      return t`${who}: ${detail} (rule ${rule})`;
     case "rule_ended":
-      return `${who} has done rule ${incident.rule}`;
+      return t`${who} has done rule ${rule}`;
     case "rule_failed":
-      return `${who} could not do rule ${incident.rule ?? ""}: ${incident.detail ?? ""}`;
+      return t`${who} could not do rule ${rule}: ${detail}`;
     case "rule_overridden":
-      return `${who} stopped rule ${incident.rule}: ${incident.detail ?? ""}`;
+      return t`${who} stopped rule ${rule}: ${detail}`;
     default:
       return [who, incident.kind.replaceAll("_", " ")].filter(Boolean).join(": ");
   }
 }
 
-const queued = ({ queue }: Incident): string => (queue ? ` of ${count(queue, "vehicle")}` : "");
+const queued = ({ queue }: Incident): string =>
+  queue ? t` of ${plural(queue, { one: "# vehicle", other: "# vehicles" })}` : "";
 const lasted = ({ waited }: Incident): string =>
-  waited ? ` after ${waited < 60 ? `${Math.round(waited)} s` : hoursMinutes(waited)}` : "";
+  waited ? t` after ${waited < 60 ? t`${Math.round(waited)} s` : hoursMinutes(waited)}` : "";
 
 function values(incident: Incident): string {
   const known = Object.entries(incident.values ?? {});
   return known.length === 0
     ? ""
-    : ` (${known.map(([name, value]) => `${name} ${value.toFixed(2)}`).join(", ")})`;
+    : ` (${known.map(([name, value]) => `${name} ${fixed(value, 2)}`).join(", ")})`;
 }
 
 function named(id: string, categories: ReadonlyMap<string, Category>): string {
   const category = categories.get(id);
-  return !category || id.toLowerCase().startsWith(category) ? id : `${CATEGORY_WORD[category]} ${id}`;
+  return !category || id.toLowerCase().startsWith(category) ? id : `${CATEGORY_WORD()[category]} ${id}`;
 }
 
 /** What is drawn at a time: all incidents up to then, the newest most visible. */

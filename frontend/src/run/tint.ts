@@ -1,3 +1,7 @@
+import { t } from "@lingui/core/macro";
+
+import { speedText } from "../language/units";
+import { localized } from "../language/localized";
 import type { Tint } from "../map/scene";
 import { FLAG_BRAKE, FLAG_LEFT, FLAG_RIGHT } from "../map/movingLayer";
 import { nth } from "../lists";
@@ -32,43 +36,57 @@ const below = (bounds: readonly number[], value: number): number => {
   return found < 0 ? bounds.length : found;
 };
 
-export const SCALES: Record<Exclude<ColourBy, "kind">, Scale> = {
+/** The bounds are round in km/h; in other units they are what they are. */
+function speedLegend(): string[] {
+  const [, a, b, c] = SPEEDS;
+  const [, first, second, third] = [a, a, b, c].map(speedText);
+  const from = (speed: number): string => speedText(speed).split(" ")[0] ?? "";
+  return [
+    t({ message: "Stopped", context: "a vehicle" }),
+    t`Below ${first ?? ""}`,
+    t`${from(a)} to ${second ?? ""}`,
+    t`${from(b)} to ${third ?? ""}`,
+    t`${third ?? ""} and more`,
+  ];
+}
+
+export const SCALES = localized((): Record<Exclude<ColourBy, "kind">, Scale> => ({
   speed: {
-    word: "Speed",
+    word: t`Speed`,
     colors: [...COLD_TO_HOT].reverse(),
-    legend: ["Stopped", "Below 20 km/h", "20 to 40 km/h", "40 to 60 km/h", "60 km/h and more"],
+    legend: speedLegend(),
     of: (frame, row) => below(SPEEDS, nth(frame.rows, 6 * row + 4)),
   },
   delay: {
-    word: "Stopped delay",
+    word: t`Stopped delay`,
     colors: COLD_TO_HOT,
-    legend: ["Not stopped yet", "Stopped for 1 to 10 s", "10 to 30 s", "30 to 60 s", "1 min and more"],
+    legend: [t`Not stopped yet`, t`Stopped for 1 to 10 s`, t`10 to 30 s`, t`30 to 60 s`, t`1 min and more`],
     of: (frame, row) => below(DELAYS, frame.stopped?.[row] ?? 0),
   },
   lamps: {
-    word: "Brakes and indicators",
+    word: t`Brakes and indicators`,
     colors: ["#8b949d", "#ffab00", "#e8251b"],
-    legend: ["Neither", "Indicator", "Brakes"],
+    legend: [t`Neither`, t`Indicator`, t`Brakes`],
     of: (frame, row) => {
       const flags = nth(frame.rows, 6 * row + 5);
       return flags & FLAG_BRAKE ? 2 : flags & (FLAG_LEFT | FLAG_RIGHT) ? 1 : 0;
     },
   },
-};
+}));
 
 /** Choices of colours; a recording has no lamps. */
 export const coloursFor = (live: boolean): { value: ColourBy; label: string }[] => [
-  { value: "kind", label: "Kind" },
+  { value: "kind", label: t`Kind` },
   ...(["speed", "delay", ...(live ? (["lamps"] as const) : [])] as const).map((value) => ({
     value,
-    label: SCALES[value].word,
+    label: SCALES()[value].word,
   })),
 ];
 
 /** Colours of the rows of a frame that are drawn; nothing where kinds have theirs. */
 export function tintOf(by: ColourBy, frame: Frame, drawn: ArrayLike<number>): Tint | null {
   if (by === "kind") return null;
-  const { colors, of } = SCALES[by];
+  const { colors, of } = SCALES()[by];
   return { colors, group: Uint8Array.from(drawn, (row) => of(frame, row)) };
 }
 

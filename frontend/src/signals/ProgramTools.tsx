@@ -10,8 +10,11 @@ import {
   Switch,
   Text,
 } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { localized } from "../language/localized";
 import {
   type CorridorWish,
   type CrossingTurn,
@@ -29,11 +32,11 @@ interface Editable {
   editing: SignalEditing;
 }
 
-const TREATMENTS = [
-  { value: "permissive", label: "Gaps" },
-  { value: "both", label: "Gaps and arrow" },
-  { value: "protected", label: "Arrow only" },
-];
+const TREATMENTS = localized(() => [
+  { value: "permissive", label: t`Gaps` },
+  { value: "both", label: t`Gaps and arrow` },
+  { value: "protected", label: t`Arrow only` },
+]);
 const SAME = "same";
 
 /** Whose program runs, and how; the program of the map made one of the scenario. */
@@ -44,24 +47,24 @@ export function ProgramControl({ light, junction, editing }: Editable) {
   return (
     <>
       <Select
-        label="Control of this light"
+        label={t`Control of this light`}
         data={[
-          { value: SAME, label: `As all lights of the scenario (${all})` },
-          { value: "fixed", label: "Fixed-time" },
-          { value: "actuated", label: "Actuated: vehicles and pedestrians call" },
+          { value: SAME, label: t`As all lights of the scenario (${all})` },
+          { value: "fixed", label: t`Fixed-time` },
+          { value: "actuated", label: t`Actuated: vehicles and pedestrians call` },
         ]}
         value={timing?.control ?? SAME}
         allowDeselect={false}
         onChange={(value) => {
           const next = value === "fixed" || value === "actuated" ? value : null;
           if (value)
-            void edit({ kind: "set_timing", junction, control: next }, `Control of light ${junction}`);
+            void edit({ kind: "set_timing", junction, control: next }, t`Control of light ${junction}`);
         }}
       />
       <Group gap="xs">
         {!own && (
           <Button size="compact-sm" variant="default" onClick={() => void editing.takeOver()}>
-            Make the program the scenario’s own
+            <Trans>Make the program the scenario’s own</Trans>
           </Button>
         )}
         {timing && (
@@ -70,7 +73,7 @@ export function ProgramControl({ light, junction, editing }: Editable) {
             variant="default"
             onClick={() => void edit({ kind: "clear_timing", junction: timing.junction })}
           >
-            Back to the program of the map
+            <Trans>Back to the program of the map</Trans>
           </Button>
         )}
       </Group>
@@ -88,10 +91,12 @@ export function TurnChoices({ light, junction, editing }: Editable) {
   };
   return (
     <>
-      <h3>Turns across oncoming traffic</h3>
+      <h3>
+        <Trans>Turns across oncoming traffic</Trans>
+      </h3>
       {!own && (
         <Text size="sm" c="dimmed">
-          They can be changed once the program is the scenario’s own.
+          <Trans>They can be changed once the program is the scenario’s own.</Trans>
         </Text>
       )}
       {light.turns.map((turn) => (
@@ -102,7 +107,7 @@ export function TurnChoices({ light, junction, editing }: Editable) {
           {turn.alone ? (
             <SegmentedControl
               size="xs"
-              data={TREATMENTS}
+              data={TREATMENTS()}
               value={turn.treatment}
               disabled={!own}
               aria-label={`${turn.approach} ${turn.turn}`}
@@ -110,7 +115,7 @@ export function TurnChoices({ light, junction, editing }: Editable) {
             />
           ) : (
             <Text size="xs" c="dimmed">
-              through gaps: it has no lane for itself
+              <Trans>through gaps: it has no lane for itself</Trans>
             </Text>
           )}
         </div>
@@ -129,8 +134,8 @@ export function StageCall({ light, junction, editing, stage }: Editable & { stag
   return (
     <Switch
       size="xs"
-      label="only when called"
-      aria-label={`Stage ${stage} only when a pedestrian calls`}
+      label={t`only when called`}
+      aria-label={t`Stage ${stage} only when a pedestrian calls`}
       checked={one.on_call}
       onChange={(event) => void editing.edit(change(event.currentTarget.checked))}
     />
@@ -147,27 +152,29 @@ export function StageBounds({ junction, editing }: Omit<Editable, "light">) {
   };
   return (
     <details>
-      <summary>Shortest and longest greens</summary>
+      <summary>
+        <Trans>Shortest and longest greens</Trans>
+      </summary>
       <div className="signal-bounds">
         {stages.map(({ id, green, min_green, max_green }) => (
           <Group key={id} grow gap="xs" wrap="nowrap">
             <Committed
-              label={`Stage ${id}, shortest`}
-              suffix=" s"
+              label={t`Stage ${id}, shortest`}
+              suffix={" s"}
               min={0}
               max={3600}
               digits={1}
-              placeholder={`${green} s`}
+              placeholder={t`${green} s`}
               value={min_green ?? ""}
               onCommit={(value) => set(id, { min_green: value })}
             />
             <Committed
-              label={`Stage ${id}, longest`}
-              suffix=" s"
+              label={t`Stage ${id}, longest`}
+              suffix={" s"}
               min={0}
               max={3600}
               digits={1}
-              placeholder={`${green} s`}
+              placeholder={t`${green} s`}
               value={max_green ?? ""}
               onCommit={(value) => set(id, { max_green: value })}
             />
@@ -178,11 +185,11 @@ export function StageBounds({ junction, editing }: Omit<Editable, "light">) {
   );
 }
 
-const DIRECTIONS = [
-  { value: "both", label: "both directions" },
-  { value: "out", label: "in this order" },
-  { value: "back", label: "back" },
-];
+const DIRECTIONS = localized(() => [
+  { value: "both", label: t`both directions` },
+  { value: "out", label: t`in this order` },
+  { value: "back", label: t`back` },
+]);
 
 /** Programs timed by rule, coordinated, and from and to files. */
 export function TimingTools({
@@ -204,7 +211,9 @@ export function TimingTools({
   };
   return (
     <>
-      <h3>Times by rule</h3>
+      <h3>
+        <Trans>Times by rule</Trans>
+      </h3>
       <Group gap="xs">
         <Button
           size="compact-sm"
@@ -212,7 +221,7 @@ export function TimingTools({
           loading={busy}
           onClick={() => void ask((version) => signals.webster(name, version, [junction]))}
         >
-          Time it after the demand (Webster)
+          <Trans>Time it after the demand (Webster)</Trans>
         </Button>
         {junctions.length > 1 && (
           <Button
@@ -221,7 +230,7 @@ export function TimingTools({
             loading={busy}
             onClick={() => void ask((version) => signals.webster(name, version, []))}
           >
-            Time all {junctions.length} lights
+            <Trans>Time all {junctions.length} lights</Trans>
           </Button>
         )}
       </Group>
@@ -241,24 +250,26 @@ export function TimingTools({
         >
           {(props) => (
             <Button {...props} size="compact-sm" variant="default" loading={busy}>
-              Import programs …
+              <Trans>Import programs …</Trans>
             </Button>
           )}
         </FileButton>
         {editing.timing && (
           <Anchor size="sm" href={signals.exportUrl(name)} download>
-            Export for SUMO
+            <Trans>Export for SUMO</Trans>
           </Anchor>
         )}
       </Group>
       <div role="status">
         {result && (
           <>
-            <List size="sm" aria-label="What has been done">
+            <List size="sm" aria-label={t`What has been done`}>
               {result.notes.length > 0 ? (
                 result.notes.map((note) => <List.Item key={note}>{note}</List.Item>)
               ) : (
-                <List.Item>Done. Undo brings the times of before back.</List.Item>
+                <List.Item>
+                  <Trans>Done. Undo brings the times of before back.</Trans>
+                </List.Item>
               )}
             </List>
             {result.picture && (
@@ -285,18 +296,20 @@ function Corridor({
   const [favoured, setFavoured] = useState<CorridorWish["favoured"]>("both");
   return (
     <details>
-      <summary>Green wave along several lights</summary>
+      <summary>
+        <Trans>Green wave along several lights</Trans>
+      </summary>
       <div className="signal-corridor">
         <MultiSelect
-          label="Junctions in driving order"
+          label={t`Junctions in driving order`}
           data={[...junctions]}
           value={chosen}
           onChange={setChosen}
           searchable
         />
         <Select
-          label="Widest band"
-          data={DIRECTIONS}
+          label={t`Widest band`}
+          data={DIRECTIONS()}
           value={favoured}
           allowDeselect={false}
           onChange={(value) => setFavoured(value === "out" || value === "back" ? value : "both")}
@@ -307,7 +320,7 @@ function Corridor({
           disabled={chosen.length < 2}
           onClick={() => onWish({ junctions: chosen, along: [], favoured, speed: null, cycle: null })}
         >
-          Coordinate {chosen.length < 2 ? "two lights or more" : `${chosen.length} lights`}
+          <Trans>Coordinate {chosen.length < 2 ? t`two lights or more` : t`${chosen.length} lights`}</Trans>
         </Button>
       </div>
     </details>

@@ -1,14 +1,24 @@
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
+import { lengthText } from "../language/units";
 import type { Queue } from "./queues";
 
 /** Who waits now, by approach. */
 export function QueueTable({ queues }: { queues: readonly Queue[] }) {
   return (
-    <table className="signal-table" aria-label="Queues now">
+    <table className="signal-table" aria-label={t`Queues now`}>
       <thead>
         <tr>
-          <th scope="col">Approach</th>
-          <th scope="col">Queued</th>
-          <th scope="col">Back of queue</th>
+          <th scope="col">
+            <Trans>Approach</Trans>
+          </th>
+          <th scope="col">
+            <Trans>Queued</Trans>
+          </th>
+          <th scope="col">
+            <Trans>Back of queue</Trans>
+          </th>
         </tr>
       </thead>
       <tbody>
@@ -16,7 +26,7 @@ export function QueueTable({ queues }: { queues: readonly Queue[] }) {
           <tr key={approach}>
             <th scope="row">{approach}</th>
             <td>{vehicles}</td>
-            <td>{vehicles > 0 ? `${Math.round(metres)} m` : "–"}</td>
+            <td>{vehicles > 0 ? lengthText(metres) : "–"}</td>
           </tr>
         ))}
       </tbody>

@@ -1,3 +1,4 @@
+import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type PointerEvent, useCallback, useEffect, useRef, useState } from "react";
 
 import type { DayPlan } from "../api/signals";
@@ -145,26 +146,26 @@ export function RingBar({ plan, keepCycle, onChange }: Props) {
           <Handle
             key={part.stage}
             grip={{ is: "green", stage: part.stage }}
-            label={`Green of stage ${part.stage}`}
+            label={t`Green of stage ${part.stage}`}
             at={beginOf(shown, n) + part.green}
             most={Math.floor(span)}
             {...grips}
           />
         ))}
-        <Handle grip={{ is: "cycle" }} label="Cycle" at={shown.cycle} most={Math.floor(span)} {...grips} />
+        <Handle grip={{ is: "cycle" }} label={t`Cycle`} at={shown.cycle} most={Math.floor(span)} {...grips} />
       </div>
       <div className="ring-offset" style={{ width: share(ring.cycle) }} aria-hidden="true" />
       <Handle
         grip={{ is: "offset" }}
-        label="Offset"
+        label={t`Offset`}
         at={shown.offset}
         most={Math.max(0, Math.ceil(ring.cycle) - 1)}
         {...grips}
       />
       <p className="ring-words" aria-live="polite">
         {draft
-          ? `${gripWords(draft.grip)} ${draft.seconds} s`
-          : "Drag an end, or choose one and use the arrow keys."}
+          ? t`${gripWords(draft.grip)} ${draft.seconds} s`
+          : t`Drag an end, or choose one and use the arrow keys.`}
       </p>
     </div>
   );
@@ -201,6 +202,6 @@ function Handle({ grip, label, at, most, handlers, value, share }: HandleProps) 
 }
 
 const gripWords = (grip: Grip): string =>
-  grip.is === "green" ? `Green of stage ${grip.stage}:` : grip.is === "cycle" ? "Cycle:" : "Offset:";
+  grip.is === "green" ? t`Green of stage ${grip.stage}:` : grip.is === "cycle" ? t`Cycle:` : t`Offset:`;
 
-const words = (seconds: number): string => `${Math.round(seconds * 10) / 10} s`;
+const words = (seconds: number): string => t`${Math.round(seconds * 10) / 10} s`;

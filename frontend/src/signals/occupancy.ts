@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import type { Detector } from "../api/signals";
 
 /** What is known of detectors at a moment of a run. */
@@ -12,7 +14,7 @@ export interface Sight {
 export function seenLive(occupied: ReadonlySet<string>): Sight {
   return {
     on: occupied,
-    words: (loops) => (loops.some(({ id }) => occupied.has(id)) ? "occupied" : "free"),
+    words: (loops) => (loops.some(({ id }) => occupied.has(id)) ? t`occupied` : t`free`),
   };
 }
 
@@ -22,7 +24,7 @@ export function seenInLog(detectors: readonly Detector[], time: number): Sight |
   const on = detectors.filter(({ calls }) => calls.some(([begin, end]) => begin <= time && time < end));
   return {
     on: new Set(on.map(({ id }) => id)),
-    words: (loops) => (loops.some(({ bus }) => bus) ? "not logged" : occupancy(loops, time)),
+    words: (loops) => (loops.some(({ bus }) => bus) ? t`not logged` : occupancy(loops, time)),
   };
 }
 
@@ -36,5 +38,5 @@ export function occupancy(loops: readonly Detector[], time: number): string {
     0,
   );
   const share = time > from ? (100 * busy) / ((time - from) * loops.length) : 0;
-  return `${on ? "occupied" : "free"}, ${Math.round(share)} % of the last minute`;
+  return t`${on ? t`occupied` : t`free`}, ${Math.round(share)} % of the last minute`;
 }

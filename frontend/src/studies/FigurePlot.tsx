@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useId } from "react";
 
 import type { FigureGroup, StudyResults } from "../api/studies";
@@ -33,11 +35,13 @@ export function FigurePlot({ results }: { results: StudyResults }) {
   return (
     <figure className="plane" aria-labelledby={id}>
       <figcaption id={id}>
-        {figure?.label ?? results.figure}
-        {unit}: each dot is a run, the bar is the mean with its 95 % confidence interval
+        <Trans>
+          {figure?.label ?? results.figure}
+          {unit}: each dot is a run, the bar is the mean with its 95 % confidence interval
+        </Trans>
       </figcaption>
       {/* The table below has all of this for readers of the screen. */}
-      <div className="plane-scroll" role="group" aria-label="Figure by variant" tabIndex={0}>
+      <div className="plane-scroll" role="group" aria-label={t`Figure by variant`} tabIndex={0}>
         <svg viewBox={`0 0 ${W} ${height}`} aria-hidden="true">
           {marks.map((mark) => (
             <g key={mark}>

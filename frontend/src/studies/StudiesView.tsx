@@ -1,10 +1,11 @@
 import { Alert, Anchor, Loader, Table, Text, Title } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useEffect } from "react";
 
 import { studies } from "../api/studies";
 import { hashOf } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
-import { count } from "../ui/words";
 import { outcomeWord } from "./groups";
 import { StudyForm } from "./StudyForm";
 import { POLL } from "./useStudy";
@@ -16,14 +17,16 @@ export function StudiesView() {
   return (
     <div className="sweeps-view">
       <Title order={1} size="h2" mb="xs">
-        Studies
+        <Trans>Studies</Trans>
       </Title>
       <Text c="dimmed" mb="md">
-        Many runs of your scenarios, with several seeds and kinds of weather, and one table of all figures.
+        <Trans>
+          Many runs of your scenarios, with several seeds and kinds of weather, and one table of all figures.
+        </Trans>
       </Text>
       <Earlier />
       <Title order={2} size="h4" mt="lg" mb="xs">
-        New study
+        <Trans>New study</Trans>
       </Title>
       <StudyForm />
     </div>
@@ -40,19 +43,25 @@ function Earlier() {
   }, [live, reload]);
   if (error)
     return (
-      <Alert color="red" title="The studies cannot be shown">
+      <Alert color="red" title={t`The studies cannot be shown`}>
         {error}
       </Alert>
     );
-  if (!value) return <Loader aria-label="Loading the studies" />;
+  if (!value) return <Loader aria-label={t`Loading the studies`} />;
   if (value.length === 0) return null;
   return (
-    <Table verticalSpacing={6} fz={14} aria-label="Studies">
+    <Table verticalSpacing={6} fz={14} aria-label={t`Studies`}>
       <Table.Thead>
         <Table.Tr>
-          <Table.Th>Study</Table.Th>
-          <Table.Th>Of</Table.Th>
-          <Table.Th>Outcome</Table.Th>
+          <Table.Th>
+            <Trans>Study</Trans>
+          </Table.Th>
+          <Table.Th>
+            <Trans>Of</Trans>
+          </Table.Th>
+          <Table.Th>
+            <Trans>Outcome</Trans>
+          </Table.Th>
         </Table.Tr>
       </Table.Thead>
       <Table.Tbody>
@@ -64,7 +73,8 @@ function Earlier() {
               </Anchor>
             </Table.Td>
             <Table.Td>
-              {count(one.scenarios.length, "scenario")}, {count(one.seeds, "seed")}
+              {plural(one.scenarios.length, { one: "# scenario", other: "# scenarios" })},{" "}
+              {plural(one.seeds, { one: "# seed", other: "# seeds" })}
             </Table.Td>
             <Table.Td>{outcomeWord(one)}</Table.Td>
           </Table.Tr>

@@ -1,4 +1,6 @@
 import { Alert, Anchor, Button, Loader, MultiSelect, NumberInput, Text, TextInput } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import { api } from "../api/client";
@@ -6,7 +8,7 @@ import { studies } from "../api/studies";
 import { go, hashOf } from "../ui/address";
 import { tellError } from "../ui/notices";
 import { useLoaded } from "../ui/useLoaded";
-import { count, weatherWord } from "../ui/words";
+import { weatherWord } from "../ui/words";
 
 /** Which scenarios, how often, in which weather. */
 export function StudyForm() {
@@ -21,17 +23,22 @@ export function StudyForm() {
   const [starting, setStarting] = useState(false);
   if (error)
     return (
-      <Alert color="red" title="The scenarios cannot be shown">
+      <Alert color="red" title={t`The scenarios cannot be shown`}>
         {error}
       </Alert>
     );
-  if (!scenarios) return <Loader aria-label="Loading the scenarios" />;
+  if (!scenarios) return <Loader aria-label={t`Loading the scenarios`} />;
   const whole = scenarios.filter((one) => one.error === null);
   if (whole.length === 0)
     return (
       <Text>
-        A study runs your scenarios, and there are none yet.{" "}
-        <Anchor href={hashOf({ view: "catalogue" })}>Make one</Anchor> first.
+        <Trans>
+          A study runs your scenarios, and there are none yet.{" "}
+          <Anchor href={hashOf({ view: "catalogue" })}>
+            <Trans>Make one</Trans>
+          </Anchor>{" "}
+          first.
+        </Trans>
       </Text>
     );
   const runs = chosen.length * (1 + weather.length) * seeds;
@@ -57,15 +64,15 @@ export function StudyForm() {
   return (
     <form
       className="plan-form"
-      aria-label="New study"
+      aria-label={t`New study`}
       onSubmit={(event) => {
         event.preventDefault();
         start();
       }}
     >
       <MultiSelect
-        label="Scenarios"
-        placeholder={chosen.length === 0 ? "Choose scenarios" : ""}
+        label={t`Scenarios`}
+        placeholder={chosen.length === 0 ? t`Choose scenarios` : ""}
         data={whole.map((one) => ({ value: one.name, label: one.title ?? one.name }))}
         value={chosen}
         onChange={setChosen}
@@ -73,8 +80,8 @@ export function StudyForm() {
         clearable
       />
       <MultiSelect
-        label="Weather, besides that of each scenario"
-        description="Each is a variant of every scenario; the results have its differences."
+        label={t`Weather, besides that of each scenario`}
+        description={t`Each is a variant of every scenario; the results have its differences.`}
         data={(assets?.weather ?? []).map((one) => ({ value: one.name, label: weatherWord(one) }))}
         value={weather}
         onChange={setWeather}
@@ -83,8 +90,8 @@ export function StudyForm() {
       />
       <div className="plan-fields">
         <NumberInput
-          label="Seeds"
-          description="Runs of each, with other chance"
+          label={t`Seeds`}
+          description={t`Runs of each, with other chance`}
           min={1}
           max={10_000}
           allowDecimal={false}
@@ -92,15 +99,15 @@ export function StudyForm() {
           onChange={(next) => setSeeds(Math.max(1, Number(next) || 1))}
         />
         <NumberInput
-          label="Minutes of each run"
-          description="Empty: as the scenario says"
+          label={t`Minutes of each run`}
+          description={t`Empty: as the scenario says`}
           min={0.1}
           value={minutes ?? ""}
           onChange={(next) => setMinutes(Number(next) > 0 ? Number(next) : null)}
         />
         <NumberInput
-          label="At a time"
-          description="At most one for each core"
+          label={t`At a time`}
+          description={t`At most one for each core`}
           min={1}
           max={256}
           allowDecimal={false}
@@ -108,8 +115,8 @@ export function StudyForm() {
           onChange={(next) => setProcesses(Math.max(1, Number(next) || 1))}
         />
         <TextInput
-          label="Name"
-          placeholder="After the first scenario"
+          label={t`Name`}
+          placeholder={t`After the first scenario`}
           maxLength={64}
           value={name}
           onChange={(event) => setName(event.currentTarget.value)}
@@ -117,7 +124,9 @@ export function StudyForm() {
       </div>
       <div>
         <Button type="submit" loading={starting} disabled={chosen.length === 0}>
-          {chosen.length === 0 ? "Start the study" : `Start ${count(runs, "run")}`}
+          {chosen.length === 0
+            ? t`Start the study`
+            : t`Start ${plural(runs, { one: "# run", other: "# runs" })}`}
         </Button>
       </div>
     </form>

@@ -1,3 +1,4 @@
+import { i18n } from "@lingui/core";
 import {
   Alert,
   Anchor,
@@ -11,13 +12,14 @@ import {
   Text,
   Title,
 } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import { type FigureGroup, type StudyInfo, type StudyResults, studies } from "../api/studies";
 import { lasting } from "../sweeps/plan";
 import { go, hashOf } from "../ui/address";
 import { tellError } from "../ui/notices";
-import { count } from "../ui/words";
 import { FigurePlot } from "./FigurePlot";
 import { matters, meanWord, outcomeWord, variantWord } from "./groups";
 import { useStudy } from "./useStudy";
@@ -30,14 +32,14 @@ export function StudyView({ study }: { study: string }) {
   return (
     <div className="sweeps-view">
       <Title order={1} size="h2" mb="xs">
-        Study {study}
+        <Trans>Study {study}</Trans>
       </Title>
       {error && (
-        <Alert color="red" title="The study cannot be shown">
+        <Alert color="red" title={t`The study cannot be shown`}>
           {error}
         </Alert>
       )}
-      {!info && !error && <Loader aria-label="Loading the study" />}
+      {!info && !error && <Loader aria-label={t`Loading the study`} />}
       {info && <Head info={info} onChanged={reload} />}
       {info && info.problems.length > 0 && <Problems info={info} onChanged={reload} />}
       {results && <Figures results={results} onChoose={choose} />}
@@ -58,54 +60,70 @@ function Head({ info, onChanged }: { info: StudyInfo; onChanged: () => void }) {
   return (
     <>
       <Text role="status">
-        {count(info.scenarios.length, "scenario")} × {count(info.variants.length, "variant")} ×{" "}
-        {count(info.seeds, "seed")}: {outcomeWord(info)}
-        {state === "running" && left !== null && `, about ${lasting(left)} left`}
-        {state === "stopped" && ". It was stopped; what is missing can be run at any time"}
-        {info.elsewhere && ". Another process works on it"}.
+        {plural(info.scenarios.length, { one: "# scenario", other: "# scenarios" })} ×{" "}
+        {plural(info.variants.length, { one: "# variant", other: "# variants" })} ×{" "}
+        {plural(info.seeds, { one: "# seed", other: "# seeds" })}: {outcomeWord(info)}
+        {state === "running" && left !== null && t`, about ${lasting(left)} left`}
+        {state === "stopped" && t`. It was stopped; what is missing can be run at any time`}
+        {info.elsewhere && t`. Another process works on it`}.
       </Text>
       {state === "running" && (
-        <Progress my="xs" size="lg" animated value={(100 * ended) / runs} aria-label="Runs that have ended" />
+        <Progress
+          my="xs"
+          size="lg"
+          animated
+          value={(100 * ended) / runs}
+          aria-label={t`Runs that have ended`}
+        />
       )}
       {state === "failed" && (
-        <Alert color="red" title="The study has failed" my="xs">
+        <Alert color="red" title={t`The study has failed`} my="xs">
           {error}
         </Alert>
       )}
       <Group my="sm">
         {state === "running" && !info.elsewhere && (
           <Button variant="default" onClick={() => ask(studies.stop(study))}>
-            Stop
+            <Trans>Stop</Trans>
           </Button>
         )}
         {(state === "stopped" || state === "failed") && (
-          <Button onClick={() => ask(studies.resume(study, 2))}>Resume</Button>
+          <Button onClick={() => ask(studies.resume(study, 2))}>
+            <Trans>Resume</Trans>
+          </Button>
         )}
         {ended > 0 && (
           <Anchor href={studies.fileUrl(study, "study.html")} target="_blank" rel="noreferrer">
-            Whole page, to keep
+            <Trans>Whole page, to keep</Trans>
           </Anchor>
         )}
         {state === "done" && (
-          <Anchor href={studies.fileUrl(study, "results.parquet")}>Table as Parquet</Anchor>
+          <Anchor href={studies.fileUrl(study, "results.parquet")}>
+            <Trans>Table as Parquet</Trans>
+          </Anchor>
         )}
         {state !== "running" && (
           <Button variant="subtle" color="gray" onClick={() => setAsking(true)}>
-            Delete the study
+            <Trans>Delete the study</Trans>
           </Button>
         )}
-        <Anchor href={hashOf({ view: "studies" })}>All studies</Anchor>
+        <Anchor href={hashOf({ view: "studies" })}>
+          <Trans>All studies</Trans>
+        </Anchor>
       </Group>
-      <Modal opened={asking} onClose={() => setAsking(false)} title={`Delete ${study}?`}>
+      <Modal opened={asking} onClose={() => setAsking(false)} title={t`Delete ${study}?`}>
         <Text size="sm" mb="md">
-          The figures of its {count(ended, "run")} are deleted for good. The scenarios stay.
+          <Trans>
+            The figures of its <Plural value={ended} one="# run" other="# runs" /> are deleted for good. The
+            scenarios stay.
+          </Trans>
         </Text>
         <Group justify="flex-end">
           <Button variant="default" onClick={() => setAsking(false)}>
-            Keep it
+            <Trans>Keep it</Trans>
           </Button>
           <Button color="red" onClick={remove}>
-            Delete
+            <Trans>Delete</Trans>
           </Button>
         </Group>
       </Modal>
@@ -119,17 +137,21 @@ function Problems({ info, onChanged }: { info: StudyInfo; onChanged: () => void 
     studies.resume(info.study, 2, true).then(onChanged, tellError);
   };
   return (
-    <Alert color="red" title={`${count(info.ended - info.completed, "run")} failed`} my="sm">
-      <ul className="study-problems" aria-label="Why runs failed">
+    <Alert
+      color="red"
+      title={t`${plural(info.ended - info.completed, { one: "# run", other: "# runs" })} failed`}
+      my="sm"
+    >
+      <ul className="study-problems" aria-label={t`Why runs failed`}>
         {info.problems.map(({ words, runs }) => (
           <li key={words}>
-            {count(runs, "run")}: {words}
+            {plural(runs, { one: "# run", other: "# runs" })}: {words}
           </li>
         ))}
       </ul>
       {info.state === "done" && (
         <Button mt="xs" size="compact-sm" variant="white" onClick={again}>
-          Run those again
+          <Trans>Run those again</Trans>
         </Button>
       )}
     </Alert>
@@ -141,7 +163,7 @@ function Figures({ results, onChoose }: { results: StudyResults; onChoose: (figu
   return (
     <>
       <Select
-        label="Figure"
+        label={t`Figure`}
         maw={360}
         mt="md"
         searchable
@@ -157,19 +179,21 @@ function Figures({ results, onChoose }: { results: StudyResults; onChoose: (figu
       />
       <FigurePlot results={results} />
       <Title order={2} size="h4" mt="lg" mb="xs">
-        Means
+        <Trans>Means</Trans>
       </Title>
-      <GroupTable groups={results.groups} label="Means" />
+      <GroupTable groups={results.groups} label={t`Means`} />
       {results.differences.length > 0 && (
         <>
           <Title order={2} size="h4" mt="lg" mb="xs">
-            Differences from the first variant
+            <Trans>Differences from the first variant</Trans>
           </Title>
           <Text size="sm" mb="xs">
-            Between runs of the same scenario and seed, so that what they share does not count. Where the
-            interval does not reach 0, the variant makes a difference.
+            <Trans>
+              Between runs of the same scenario and seed, so that what they share does not count. Where the
+              interval does not reach 0, the variant makes a difference.
+            </Trans>
           </Text>
-          <GroupTable groups={results.differences} label="Differences" judged />
+          <GroupTable groups={results.differences} label={t`Differences`} judged />
         </>
       )}
     </>
@@ -182,11 +206,23 @@ function GroupTable({ groups, label, judged }: { groups: FigureGroup[]; label: s
       <Table verticalSpacing={4} fz={14} aria-label={label}>
         <Table.Thead>
           <Table.Tr>
-            <Table.Th>Scenario</Table.Th>
-            <Table.Th>Variant</Table.Th>
-            <Table.Th>Runs</Table.Th>
-            <Table.Th>Mean, 95 % interval</Table.Th>
-            {judged && <Table.Th>More than chance</Table.Th>}
+            <Table.Th>
+              <Trans>Scenario</Trans>
+            </Table.Th>
+            <Table.Th>
+              <Trans>Variant</Trans>
+            </Table.Th>
+            <Table.Th>
+              <Trans>Runs</Trans>
+            </Table.Th>
+            <Table.Th>
+              <Trans>Mean, 95 % interval</Trans>
+            </Table.Th>
+            {judged && (
+              <Table.Th>
+                <Trans>More than chance</Trans>
+              </Table.Th>
+            )}
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
@@ -194,9 +230,9 @@ function GroupTable({ groups, label, judged }: { groups: FigureGroup[]; label: s
             <Table.Tr key={`${one.scenario}/${one.variant}`}>
               <Table.Td>{one.scenario}</Table.Td>
               <Table.Td>{variantWord(one.variant)}</Table.Td>
-              <Table.Td>{one.runs.toLocaleString("en")}</Table.Td>
+              <Table.Td>{one.runs.toLocaleString(i18n.locale)}</Table.Td>
               <Table.Td>{meanWord(one)}</Table.Td>
-              {judged && <Table.Td>{matters(one) ? "yes" : "no"}</Table.Td>}
+              {judged && <Table.Td>{matters(one) ? t`yes` : t`no`}</Table.Td>}
             </Table.Tr>
           ))}
         </Table.Tbody>

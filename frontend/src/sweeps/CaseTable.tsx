@@ -1,4 +1,7 @@
+import { i18n } from "@lingui/core";
 import { Button, Table, Text, UnstyledButton } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useMemo, useState } from "react";
 
 import type { SweepCase, SweepCases } from "../api/sweeps";
@@ -36,11 +39,11 @@ export function CaseTable({ table, onOpen }: { table: SweepCases; onOpen: (name:
   return (
     <>
       <Table.ScrollContainer minWidth={640}>
-        <Table verticalSpacing={4} fz={14} aria-label="Cases of the sweep" className="case-table">
+        <Table verticalSpacing={4} fz={14} aria-label={t`Cases of the sweep`} className="case-table">
           <Table.Thead>
             <Table.Tr>
-              {head("Case", { kind: "case" })}
-              {head("Outcome", { kind: "safe" })}
+              {head(t`Case`, { kind: "case" })}
+              {head(t`Outcome`, { kind: "safe" })}
               {table.parameters.map(({ name, unit }, at) =>
                 head(withUnit(name, unit), { kind: "value", at }),
               )}
@@ -59,7 +62,7 @@ export function CaseTable({ table, onOpen }: { table: SweepCases; onOpen: (name:
       </Table.ScrollContainer>
       {shown.length < rows.length && (
         <Button variant="default" mt="sm" onClick={() => setWhole(true)}>
-          Show all {rows.length.toLocaleString("en")}
+          <Trans>Show all {rows.length.toLocaleString(i18n.locale)}</Trans>
         </Button>
       )}
     </>
@@ -85,7 +88,7 @@ function Row({
           size="compact-sm"
           variant="subtle"
           disabled={one.status === "refused"}
-          aria-label={`Open ${one.case} in the editor`}
+          aria-label={t`Open ${one.case} in the editor`}
           onClick={() => onOpen(one.case)}
         >
           {one.case}
@@ -93,7 +96,7 @@ function Row({
       </Table.Td>
       <Table.Td>
         <span className="verdict" data-verdict={verdict}>
-          {verdict === "other" ? one.status : VERDICT_WORD[verdict]}
+          {verdict === "other" ? one.status : VERDICT_WORD()[verdict]}
         </span>
         {one.detail && (
           <Text size="xs" c="dimmed">
@@ -119,6 +122,6 @@ const withUnit = (name: string, unit: string): string => (unit ? `${name}, ${uni
 
 const measureWord = (name: string | undefined, value: number | null): string => {
   if (value === null) return "";
-  if (name === "collision") return value ? "yes" : "no";
+  if (name === "collision") return value ? t`yes` : t`no`;
   return String(Number(value.toPrecision(4)));
 };

@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useId } from "react";
 
 import type { SweepCase, SweepCases } from "../api/sweeps";
@@ -27,10 +29,15 @@ export function Parallel({ table, onOpen }: { table: SweepCases; onOpen: (name: 
   return (
     <figure className="plane parallel" aria-labelledby={id}>
       <figcaption id={id}>
-        Parallel coordinates: each line is a case; it ends where a case has no value
+        <Trans>Parallel coordinates: each line is a case; it ends where a case has no value</Trans>
       </figcaption>
       {/* The table below has all of this for readers of the screen. */}
-      <div className="plane-scroll" role="group" aria-label="Parallel coordinates of the cases" tabIndex={0}>
+      <div
+        className="plane-scroll"
+        role="group"
+        aria-label={t`Parallel coordinates of the cases`}
+        tabIndex={0}
+      >
         <svg viewBox={`0 0 ${W} ${H}`} aria-hidden="true">
           {lines.map(({ one, verdict, path }) => (
             <path

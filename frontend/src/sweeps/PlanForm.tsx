@@ -9,8 +9,12 @@ import {
   Text,
   TextInput,
 } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useMemo, useRef, useState } from "react";
 
+import { fixed } from "../language/numbers";
+import { localized } from "../language/localized";
 import { allFigures } from "../api/figures";
 import { type PlannedSweep, sweeps } from "../api/sweeps";
 import type { ScenarioDocument } from "../api/types";
@@ -18,14 +22,14 @@ import { shortNumber } from "../editor/parameters";
 import { go } from "../ui/address";
 import { reasonOf } from "../ui/reason";
 import { useLoaded } from "../ui/useLoaded";
-import { bytes, count } from "../ui/words";
+import { bytes } from "../ui/words";
 import { countOf, faultOf, lasting, METHODS, newForm, type SweepForm, type Varied, wishOf } from "./plan";
 
-const HOW = [
-  { value: "fixed", label: "Fixed" },
-  { value: "range", label: "Range" },
-  { value: "set", label: "Set" },
-];
+const HOW = localized(() => [
+  { value: "fixed", label: t`Fixed` },
+  { value: "range", label: t`Range` },
+  { value: "set", label: t`Set` },
+]);
 
 /** What is varied and how; says what it takes before it starts. */
 export function PlanForm({ scenario, document }: { scenario: string; document: ScenarioDocument }) {
@@ -80,25 +84,25 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
       ))}
       <div className="plan-fields">
         <Select
-          label="Plan"
-          data={[...METHODS]}
+          label={t`Plan`}
+          data={[...METHODS()]}
           value={form.method}
           allowDeselect={false}
           onChange={(method) => {
-            const found = METHODS.find((one) => one.value === method);
+            const found = METHODS().find((one) => one.value === method);
             if (found) set({ method: found.value });
           }}
         />
         {!grid && (
           <>
             <Whole
-              label="Number of cases"
+              label={t`Number of cases`}
               value={form.samples}
               onValue={(samples) => set({ samples })}
               least={1}
             />
             <Whole
-              label="Random seed of the samples"
+              label={t`Random seed of the samples`}
               value={form.sampleSeed}
               onValue={(sampleSeed) => set({ sampleSeed })}
               least={0}
@@ -106,33 +110,33 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           </>
         )}
         <NumberInput
-          label="Random seed of the runs"
-          placeholder={`the scenario's, ${document.seed}`}
+          label={t`Random seed of the runs`}
+          placeholder={t`the scenario's, ${document.seed}`}
           allowDecimal={false}
           min={0}
           value={form.seed ?? ""}
           onChange={(next) => set({ seed: typeof next === "number" ? next : null })}
         />
         <Bound
-          label="Least time to collision of a safe case"
-          suffix=" s"
+          label={t`Least time to collision of a safe case`}
+          suffix={" s"}
           value={form.ttc}
           onValue={(ttc) => set({ ttc })}
         />
         <Bound
-          label="Least post-encroachment time"
-          suffix=" s"
+          label={t`Least post-encroachment time`}
+          suffix={" s"}
           value={form.pet}
           onValue={(pet) => set({ pet })}
         />
         <Bound
-          label="Most braking needed"
-          suffix=" m/s²"
+          label={t`Most braking needed`}
+          suffix={" m/s²"}
           value={form.drac}
           onValue={(drac) => set({ drac })}
         />
         <Whole
-          label="Runs at a time"
+          label={t`Runs at a time`}
           value={form.processes}
           onValue={(processes) => set({ processes })}
           least={1}
@@ -140,16 +144,16 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
         />
         <TagsInput
           className="plan-wide"
-          label="Figures of runs as more columns"
-          placeholder="for example mean_speed"
+          label={t`Figures of runs as more columns`}
+          placeholder={t`for example mean_speed`}
           data={(figures ?? []).map(({ name }) => name)}
           value={[...form.figures]}
           onChange={(names) => set({ figures: names })}
         />
         <TagsInput
           className="plan-wide"
-          label="More limits of a safe case, of any column"
-          placeholder="for example mean_speed >= 8"
+          label={t`More limits of a safe case, of any column`}
+          placeholder={t`for example mean_speed >= 8`}
           value={[...form.limits]}
           onChange={(limits) => set({ limits })}
         />
@@ -160,11 +164,14 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
         </Text>
       ) : (
         <Text size="sm" role="status">
-          {count(cases, "case")}, each a run of {shortNumber(document.simulation.duration)} s.
+          <Trans>
+            <Plural value={cases} one="# case" other="# cases" />, each a run of{" "}
+            {shortNumber(document.simulation.duration)} s.
+          </Trans>
         </Text>
       )}
       {failure && (
-        <Alert color="red" title="This sweep is not possible">
+        <Alert color="red" title={t`This sweep is not possible`}>
           {failure}
         </Alert>
       )}
@@ -173,7 +180,7 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           ref={answer}
           role="status"
           color={planned.disk > planned.free ? "red" : "blue"}
-          title={planned.disk > planned.free ? "Not enough disk space" : "What it takes"}
+          title={planned.disk > planned.free ? t`Not enough disk space` : t`What it takes`}
         >
           {costOf(planned)}
         </Alert>
@@ -185,11 +192,13 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           disabled={fault !== null || busy !== null}
           onClick={plan}
         >
-          Plan the sweep
+          <Trans>Plan the sweep</Trans>
         </Button>
         {planned && (
           <Button loading={busy === "start"} disabled={busy !== null} onClick={start}>
-            Run {count(planned.cases, "case")}
+            <Trans>
+              Run <Plural value={planned.cases} one="# case" other="# cases" />
+            </Trans>
           </Button>
         )}
       </Group>
@@ -200,12 +209,12 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
 /** The forecast in a sentence. */
 export function costOf(planned: PlannedSweep): string {
   const { cases, tried, case_seconds, seconds, disk, free, processes, patience } = planned;
-  const room = `${bytes(disk)} of disk (${bytes(free)} free)`;
+  const room = t`${bytes(disk)} of disk (${bytes(free)} free)`;
   if (seconds === null)
-    return `${count(cases, "case")}. One of them, ${tried}, was tried and takes more than ${patience} s.`;
-  const one = `One of them, ${tried}, was tried and took ${case_seconds.toFixed(1)} s`;
-  const together = processes === 1 ? "one after another" : `${processes} at a time`;
-  return `${count(cases, "case")}. ${one}: about ${lasting(seconds)} for all, ${together}, and ${room}.`;
+    return t`${plural(cases, { one: "# case", other: "# cases" })}. One of them, ${tried}, was tried and takes more than ${patience} s.`;
+  const one = t`One of them, ${tried}, was tried and took ${fixed(case_seconds, 1)} s`;
+  const together = processes === 1 ? t`one after another` : t`${processes} at a time`;
+  return t`${plural(cases, { one: "# case", other: "# cases" })}. ${one}: about ${lasting(seconds)} for all, ${together}, and ${room}.`;
 }
 
 /** A limit of a safe case; without a number there is none. */
@@ -223,7 +232,7 @@ function Bound({
   return (
     <NumberInput
       label={label}
-      placeholder="no limit"
+      placeholder={t`no limit`}
       suffix={suffix}
       min={0}
       step={0.1}
@@ -285,7 +294,7 @@ function VariedRow({
   const number = (label: string, key: "low" | "high") => (
     <NumberInput
       label={label}
-      aria-label={`${label} of ${name}`}
+      aria-label={t`${label} of ${name}`}
       suffix={suffix}
       value={varied[key]}
       onChange={(next) => {
@@ -294,34 +303,36 @@ function VariedRow({
     />
   );
   return (
-    <section className="fold varied" aria-label={`Parameter ${name}`}>
+    <section className="fold varied" aria-label={t`Parameter ${name}`}>
       <div className="varied-name">
         <Text fw={600} size="sm">
           {name}
         </Text>
         <Text size="xs" c="dimmed">
-          {[description, `now ${shortNumber(value)}${suffix}`].filter(Boolean).join(", ")}
+          {[description, t`now ${shortNumber(value)}${suffix}`].filter(Boolean).join(", ")}
         </Text>
       </div>
       {computed !== undefined ? (
-        <Text size="sm">Computed: {computed}</Text>
+        <Text size="sm">
+          <Trans>Computed: {computed}</Trans>
+        </Text>
       ) : (
         <SegmentedControl
           size="xs"
-          aria-label={`How ${name} is varied`}
-          data={HOW}
+          aria-label={t`How ${name} is varied`}
+          data={HOW()}
           value={varied.how}
           onChange={(how) => onVaried({ ...varied, how: how as Varied["how"] })}
         />
       )}
       {varied.how === "range" && (
         <>
-          {number("From", "low")}
-          {number("To", "high")}
+          {number(t`From`, "low")}
+          {number(t`To`, "high")}
           {grid && (
             <NumberInput
-              label="Values"
-              aria-label={`Values of ${name}`}
+              label={t`Values`}
+              aria-label={t`Values of ${name}`}
               allowDecimal={false}
               min={2}
               max={10_000}
@@ -335,8 +346,8 @@ function VariedRow({
       )}
       {varied.how === "set" && (
         <TextInput
-          label={`Values, between commas${unit ? `, ${unit}` : ""}`}
-          aria-label={`Values of ${name}`}
+          label={t`Values, between commas${unit ? `, ${unit}` : ""}`}
+          aria-label={t`Values of ${name}`}
           value={varied.values}
           onChange={(event) => onVaried({ ...varied, values: event.currentTarget.value })}
         />

@@ -1,5 +1,6 @@
 import { Group, Select } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
+import { t } from "@lingui/core/macro";
 import { useId, useState } from "react";
 
 import type { SweepCases } from "../api/sweeps";
@@ -57,17 +58,18 @@ export function Plane({ table, onOpen }: { table: SweepCases; onOpen: (name: str
   return (
     <figure className="plane" aria-labelledby={id}>
       <figcaption id={id}>
-        Safe and not: each dot is a case
-        {plane && line && ", the line is the boundary, half-way between neighbours"}
+        {plane && line
+          ? t`Safe and not: each dot is a case, the line is the boundary, half-way between neighbours`
+          : t`Safe and not: each dot is a case`}
       </figcaption>
       {axes.length > 2 && (
         <Group gap="sm" mb={6}>
-          {pick("Across", 0)}
-          {pick("Up", 1)}
+          {pick(t`Across`, 0)}
+          {pick(t`Up`, 1)}
         </Group>
       )}
       {/* The table below has all of this for readers of the screen. */}
-      <div className="plane-scroll" role="group" aria-label="Plane of the cases" tabIndex={0}>
+      <div className="plane-scroll" role="group" aria-label={t`Plane of the cases`} tabIndex={0}>
         <svg viewBox={`0 0 ${W} ${H}`} aria-hidden="true">
           {xs.map((v) => (
             <g key={v}>
@@ -118,7 +120,7 @@ export function Plane({ table, onOpen }: { table: SweepCases; onOpen: (name: str
       <div className="plane-key" aria-hidden="true">
         {ORDER.filter((verdict) => dots.some((dot) => dot.verdict === verdict)).map((verdict) => (
           <span key={verdict} className="verdict" data-verdict={verdict}>
-            {VERDICT_WORD[verdict]} ({dots.filter((dot) => dot.verdict === verdict).length})
+            {VERDICT_WORD()[verdict]} ({dots.filter((dot) => dot.verdict === verdict).length})
           </span>
         ))}
       </div>

@@ -1,10 +1,11 @@
 import { Alert, Anchor, Button, Group, Loader, Modal, Progress, Text, Title } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Plural, Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import { type SweepInfo, sweeps } from "../api/sweeps";
 import { go, hashOf } from "../ui/address";
 import { tell, tellError } from "../ui/notices";
-import { count } from "../ui/words";
 import { CaseTable } from "./CaseTable";
 import { Parallel } from "./Parallel";
 import { lasting } from "./plan";
@@ -21,7 +22,7 @@ export function SweepView({ scenario, sweep }: { scenario: string; sweep: string
     setOpening(true);
     sweeps.open(sweep, name).then(
       (saved) => {
-        tell(`${name} is saved as the scenario ${saved.name}. Run it: its figures are those of the sweep.`);
+        tell(t`${name} is saved as the scenario ${saved.name}. Run it: its figures are those of the sweep.`);
         go({ view: "editor", scenario: saved.name });
       },
       (reason: unknown) => {
@@ -33,26 +34,28 @@ export function SweepView({ scenario, sweep }: { scenario: string; sweep: string
   return (
     <div className="sweeps-view">
       <Title order={1} size="h2" mb="xs">
-        Sweep {sweep}
+        <Trans>Sweep {sweep}</Trans>
       </Title>
       {error && (
-        <Alert color="red" title="The sweep cannot be shown">
+        <Alert color="red" title={t`The sweep cannot be shown`}>
           {error}
         </Alert>
       )}
-      {!info && !error && <Loader aria-label="Loading the sweep" />}
+      {!info && !error && <Loader aria-label={t`Loading the sweep`} />}
       {info && <Head scenario={scenario} info={info} onChanged={reload} />}
-      {info && info.state !== "running" && !cases && !error && <Loader aria-label="Loading the cases" />}
+      {info && info.state !== "running" && !cases && !error && <Loader aria-label={t`Loading the cases`} />}
       {cases && (
         <>
           <Plane table={cases} onOpen={open} />
           <Parallel table={cases} onOpen={open} />
           <Title order={2} size="h4" mt="lg" mb="xs">
-            Cases
+            <Trans>Cases</Trans>
           </Title>
           <Text size="sm" mb="xs">
-            Safe: {cases.limits.join("; ")}. A click on a case opens it in the editor as a scenario of its
-            own, which runs alone with the same figures.
+            <Trans>
+              Safe: {cases.limits.join("; ")}. A click on a case opens it in the editor as a scenario of its
+              own, which runs alone with the same figures.
+            </Trans>
           </Text>
           <CaseTable table={cases} onOpen={open} />
         </>
@@ -74,14 +77,16 @@ function Head({ scenario, info, onChanged }: { scenario: string; info: SweepInfo
   return (
     <>
       <Text role="status">
-        {count(cases, "case")} of {info.parameters.join(", ")}
-        {state === "done" && `: ${safe ?? 0} safe, ${unsafe ?? 0} not`}
+        <Trans>
+          <Plural value={cases} one="# case" other="# cases" /> of {info.parameters.join(", ")}
+        </Trans>
+        {state === "done" && t`: ${safe ?? 0} safe, ${unsafe ?? 0} not`}
         {state === "done" &&
           (safe ?? 0) + (unsafe ?? 0) < cases &&
-          `, ${cases - (safe ?? 0) - (unsafe ?? 0)} not run`}
-        {state !== "done" && `: ${ended} have ended`}
-        {state === "running" && left !== null && `, about ${lasting(left)} left`}
-        {state === "stopped" && ". It was stopped; what is missing can be run at any time"}.
+          t`, ${cases - (safe ?? 0) - (unsafe ?? 0)} not run`}
+        {state !== "done" && t`: ${ended} have ended`}
+        {state === "running" && left !== null && t`, about ${lasting(left)} left`}
+        {state === "stopped" && t`. It was stopped; what is missing can be run at any time`}.
       </Text>
       {state === "running" && (
         <Progress
@@ -89,48 +94,57 @@ function Head({ scenario, info, onChanged }: { scenario: string; info: SweepInfo
           size="lg"
           animated
           value={(100 * ended) / cases}
-          aria-label="Cases that have ended"
+          aria-label={t`Cases that have ended`}
         />
       )}
       {state === "failed" && (
-        <Alert color="red" title="The sweep has failed" my="xs">
+        <Alert color="red" title={t`The sweep has failed`} my="xs">
           {error}
         </Alert>
       )}
       <Group my="sm">
         {state === "running" && (
           <Button variant="default" onClick={() => ask(sweeps.stop(sweep))}>
-            Stop
+            <Trans>Stop</Trans>
           </Button>
         )}
         {(state === "stopped" || state === "failed") && (
-          <Button onClick={() => ask(sweeps.resume(sweep, 2))}>Resume</Button>
+          <Button onClick={() => ask(sweeps.resume(sweep, 2))}>
+            <Trans>Resume</Trans>
+          </Button>
         )}
         {state === "done" && (
           <>
             <Anchor href={sweeps.fileUrl(sweep, "sweep.html")} target="_blank" rel="noreferrer">
-              Whole page, to keep
+              <Trans>Whole page, to keep</Trans>
             </Anchor>
-            <Anchor href={sweeps.fileUrl(sweep, "cases.parquet")}>Table as Parquet</Anchor>
+            <Anchor href={sweeps.fileUrl(sweep, "cases.parquet")}>
+              <Trans>Table as Parquet</Trans>
+            </Anchor>
           </>
         )}
         {state !== "running" && (
           <Button variant="subtle" color="gray" onClick={() => setAsking(true)}>
-            Delete the sweep
+            <Trans>Delete the sweep</Trans>
           </Button>
         )}
-        <Anchor href={hashOf({ view: "sweeps", scenario })}>All sweeps</Anchor>
+        <Anchor href={hashOf({ view: "sweeps", scenario })}>
+          <Trans>All sweeps</Trans>
+        </Anchor>
       </Group>
-      <Modal opened={asking} onClose={() => setAsking(false)} title={`Delete ${sweep}?`}>
+      <Modal opened={asking} onClose={() => setAsking(false)} title={t`Delete ${sweep}?`}>
         <Text size="sm" mb="md">
-          Its {count(ended, "run")} are deleted for good. Scenarios that were made of its cases stay.
+          <Trans>
+            Its <Plural value={ended} one="# run" other="# runs" /> are deleted for good. Scenarios that were
+            made of its cases stay.
+          </Trans>
         </Text>
         <Group justify="flex-end">
           <Button variant="default" onClick={() => setAsking(false)}>
-            Keep it
+            <Trans>Keep it</Trans>
           </Button>
           <Button color="red" onClick={remove}>
-            Delete
+            <Trans>Delete</Trans>
           </Button>
         </Group>
       </Modal>

@@ -1,4 +1,6 @@
 import { Alert, Anchor, Button, Loader, Table, Text, Title } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useCallback, useEffect } from "react";
 
 import { api } from "../api/client";
@@ -6,7 +8,6 @@ import { type SweepInfo, sweeps } from "../api/sweeps";
 import { hashOf } from "../ui/address";
 import { useLearnedTitle, useTitle } from "../ui/titles";
 import { useLoaded } from "../ui/useLoaded";
-import { count } from "../ui/words";
 import { PlanForm } from "./PlanForm";
 import { POLL } from "./useSweep";
 import "./sweeps.css";
@@ -20,34 +21,36 @@ export function SweepsView({ scenario }: { scenario: string }) {
   return (
     <div className="sweeps-view">
       <Title order={1} size="h2" mb="md">
-        Sweeps of {title}
+        <Trans>Sweeps of {title}</Trans>
       </Title>
       <Earlier scenario={scenario} />
       <Title order={2} size="h4" mt="lg" mb="xs">
-        New sweep
+        <Trans>New sweep</Trans>
       </Title>
       {error && (
-        <Alert color="red" title="The scenario cannot be shown">
+        <Alert color="red" title={t`The scenario cannot be shown`}>
           {error}
         </Alert>
       )}
-      {!value && !error && <Loader aria-label="Loading the scenario" />}
+      {!value && !error && <Loader aria-label={t`Loading the scenario`} />}
       {value &&
         (Object.keys(value.document.parameters).length > 0 ? (
           <PlanForm scenario={scenario} document={value.document} />
         ) : (
           <>
             <Text mb="sm">
-              A sweep varies the parameters of a scenario, and this one has none. In the step Parameters of
-              the editor, any of its numbers can become one.
+              <Trans>
+                A sweep varies the parameters of a scenario, and this one has none. In the step Parameters of
+                the editor, any of its numbers can become one.
+              </Trans>
             </Text>
             <Button component="a" href={editor}>
-              To the editor
+              <Trans>To the editor</Trans>
             </Button>
           </>
         ))}
       <Anchor display="block" mt="lg" href={editor}>
-        Back to the editor
+        <Trans>Back to the editor</Trans>
       </Anchor>
     </div>
   );
@@ -63,18 +66,24 @@ function Earlier({ scenario }: { scenario: string }) {
   }, [live, reload]);
   if (error)
     return (
-      <Alert color="red" title="The sweeps cannot be shown">
+      <Alert color="red" title={t`The sweeps cannot be shown`}>
         {error}
       </Alert>
     );
   if (!value || value.length === 0) return null;
   return (
-    <Table verticalSpacing={6} fz={14} aria-label="Sweeps of this scenario">
+    <Table verticalSpacing={6} fz={14} aria-label={t`Sweeps of this scenario`}>
       <Table.Thead>
         <Table.Tr>
-          <Table.Th>Sweep</Table.Th>
-          <Table.Th>Parameters</Table.Th>
-          <Table.Th>Outcome</Table.Th>
+          <Table.Th>
+            <Trans>Sweep</Trans>
+          </Table.Th>
+          <Table.Th>
+            <Trans>Parameters</Trans>
+          </Table.Th>
+          <Table.Th>
+            <Trans>Outcome</Trans>
+          </Table.Th>
         </Table.Tr>
       </Table.Thead>
       <Table.Tbody>
@@ -95,7 +104,7 @@ function Earlier({ scenario }: { scenario: string }) {
 }
 
 function outcome({ state, cases, ended, safe, unsafe }: SweepInfo): string {
-  if (state === "done") return `${safe ?? 0} of ${(safe ?? 0) + (unsafe ?? 0)} cases safe`;
-  const far = `${ended} of ${count(cases, "case")}`;
-  return state === "running" ? `running, ${far}` : `${state}, ${far}`;
+  if (state === "done") return t`${safe ?? 0} of ${(safe ?? 0) + (unsafe ?? 0)} cases safe`;
+  const far = t`${ended} of ${plural(cases, { one: "# case", other: "# cases" })}`;
+  return state === "running" ? t`running, ${far}` : `${state}, ${far}`;
 }

@@ -1,3 +1,7 @@
+import { t } from "@lingui/core/macro";
+
+import { fixed } from "../language/numbers";
+import { localized } from "../language/localized";
 import type { SweepCase, SweepCases, SweepWish, VaryWish } from "../api/sweeps";
 import type { ScenarioDocument } from "../api/types";
 import { shortNumber } from "../editor/parameters";
@@ -33,12 +37,12 @@ export interface SweepForm {
   processes: number;
 }
 
-export const METHODS: readonly { value: Method; label: string }[] = [
-  { value: "grid", label: "Grid: all combinations" },
-  { value: "sobol", label: "Samples: Sobol sequence" },
-  { value: "latin", label: "Samples: Latin hypercube" },
-  { value: "random", label: "Samples: random" },
-];
+export const METHODS = localized((): readonly { value: Method; label: string }[] => [
+  { value: "grid", label: t`Grid: all combinations` },
+  { value: "sobol", label: t`Samples: Sobol sequence` },
+  { value: "latin", label: t`Samples: Latin hypercube` },
+  { value: "random", label: t`Samples: random` },
+]);
 
 /** What a form begins with: each parameter with bounds takes five values between them. */
 export function newForm({
@@ -86,12 +90,12 @@ const LIMIT = /^\s*[A-Za-z_]\w*\s*(>=|<=|>|<)\s*[+-]?\d+(\.\d+)?([eE][+-]?\d+)?\
 /** What is wrong with a form, or null. */
 export function faultOf({ varied, limits }: SweepForm): string | null {
   const odd = limits.find((one) => !LIMIT.test(one));
-  if (odd !== undefined) return `${odd}: write a column, >=, <=, > or <, and a number.`;
+  if (odd !== undefined) return t`${odd}: write a column, >=, <=, > or <, and a number.`;
   const chosen = Object.entries(varied).filter(([, { how }]) => how !== "fixed");
-  if (chosen.length === 0) return "Vary at least one parameter.";
+  if (chosen.length === 0) return t`Vary at least one parameter.`;
   for (const [name, { how, low, high, values }] of chosen) {
-    if (how === "set" && setOf(values) === null) return `${name}: write numbers between commas.`;
-    if (how === "range" && low >= high) return `${name}: the range must end above its begin.`;
+    if (how === "set" && setOf(values) === null) return t`${name}: write numbers between commas.`;
+    if (how === "range" && low >= high) return t`${name}: the range must end above its begin.`;
   }
   return null;
 }
@@ -136,12 +140,12 @@ function limitsOf({ ttc, pet, drac, limits }: SweepForm): string[] {
 
 /** How a case went, as its dot and its row are coloured. */
 export type Verdict = "safe" | "calm" | "unsafe" | "other";
-export const VERDICT_WORD: Record<Verdict, string> = {
+export const VERDICT_WORD = localized((): Record<Verdict, string> => ({
   safe: "safe",
-  calm: "safe, no encounter",
-  unsafe: "not safe",
-  other: "not run",
-};
+  calm: t`safe, no encounter`,
+  unsafe: t`not safe`,
+  other: t`not run`,
+}));
 
 export function verdictOf({ safe, measures }: SweepCase, columns: SweepCases["columns"]): Verdict {
   if (safe === null) return "other";
@@ -184,9 +188,9 @@ export function marksOf(low: number, high: number, parts = 6): number[] {
 
 /** Wall time in words. */
 export function lasting(seconds: number): string {
-  if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;
-  if (seconds < 5400) return `${Math.round(seconds / 60)} min`;
-  return `${(seconds / 3600).toFixed(1)} h`;
+  if (seconds < 90) return t`${Math.max(1, Math.round(seconds))} s`;
+  if (seconds < 5400) return t`${Math.round(seconds / 60)} min`;
+  return t`${fixed(seconds / 3600, 1)} h`;
 }
 
 /** Something of cases that has a number, on an axis. */
@@ -232,6 +236,6 @@ export function titleOf(one: SweepCase, { parameters }: SweepCases, verdict: Ver
     `${name} ${shortNumber(one.values[n] ?? 0)} ${unit}`.trim(),
   );
   const word =
-    verdict === "other" ? [one.status, one.detail].filter(Boolean).join(": ") : VERDICT_WORD[verdict];
+    verdict === "other" ? [one.status, one.detail].filter(Boolean).join(": ") : VERDICT_WORD()[verdict];
   return `${one.case}: ${values.join(", ")}: ${word}`;
 }

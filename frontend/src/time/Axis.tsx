@@ -104,7 +104,7 @@ function edgeOf(sight: Sight, time: number): "left" | "right" | "middle" {
 }
 
 const word = (time: number, longest: number): string =>
-  longest >= 3600 ? longClock(time, longest) : clock(time).replace(/\.0$/, "");
+  longest >= 3600 ? longClock(time, longest) : clock(time).replace(/[.,]0$/, "");
 
 /** Lines through all rows: the scale, and the moment that is shown. */
 export function Lines({ sight, moment }: { sight: Sight; moment: number | null }): ReactNode {

@@ -1,3 +1,4 @@
+import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type PointerEvent, useRef } from "react";
 
 import { CATEGORY_COLOR, FLOW, MARK_COLOR, MEASURE } from "../map/colors";
@@ -119,10 +120,10 @@ function placeOfWords(left: number, right: number, width: number): { left: numbe
 }
 
 function nameOf({ kind, id }: Block, grip: Grip): string {
-  if (kind === "actor") return `Departure of ${id}`;
-  if (kind === "rule") return `Time of rule ${id}`;
-  const what = kind === "flow" ? `flow ${id}` : `measure ${id}`;
-  return grip === "all" ? `Time of ${what}` : grip === "begin" ? `Begin of ${what}` : `End of ${what}`;
+  if (kind === "actor") return t`Departure of ${id}`;
+  if (kind === "rule") return t`Time of rule ${id}`;
+  const what = kind === "flow" ? t`flow ${id}` : `measure ${id}`;
+  return grip === "all" ? t`Time of ${what}` : grip === "begin" ? t`Begin of ${what}` : t`End of ${what}`;
 }
 
 export function colorOf({ kind, category }: Block): string {

@@ -1,8 +1,13 @@
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
 import "./time.css";
 
 import { Button } from "@mantine/core";
 import { type MouseEvent, type ReactNode, useEffect, useMemo, useState } from "react";
 
+import { fixed } from "../language/numbers";
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import { MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
@@ -107,17 +112,17 @@ export function RunBar({
     if (one) onShow(one);
   };
   return (
-    <section className="run-time" aria-label="Time bar" data-live={onSeek === null}>
+    <section className="run-time" aria-label={t`Time bar`} data-live={onSeek === null}>
       <div className="table-bar">
         {onSeek && (
-          <span role="group" aria-label="Events" className="time-buttons">
+          <span role="group" aria-label={t`Events`} className="time-buttons">
             <Button
               size="compact-xs"
               variant="default"
               disabled={!neighbour(incidents, time, -1)}
               onClick={() => step(-1)}
             >
-              Event before
+              <Trans>Event before</Trans>
             </Button>
             <Button
               size="compact-xs"
@@ -125,7 +130,7 @@ export function RunBar({
               disabled={!neighbour(incidents, time, 1)}
               onClick={() => step(1)}
             >
-              Next event
+              <Trans>Next event</Trans>
             </Button>
           </span>
         )}
@@ -135,7 +140,7 @@ export function RunBar({
         <Legend kinds={kinds} signals={bands.length > 0} />
         {open && <ZoomButtons onZoom={zoom} onWhole={() => setChosen(null)} />}
         <Button size="compact-xs" variant="subtle" aria-expanded={open} onClick={() => setOpen(!open)}>
-          {open ? "Hide the time bar" : "Show the time bar"}
+          {open ? t`Hide the time bar` : t`Show the time bar`}
         </Button>
       </div>
       <div
@@ -157,8 +162,8 @@ export function RunBar({
           </div>
           <Row
             name="rules"
-            label="Rules"
-            note={rules.length === 0 ? "none fired" : String(firings.length)}
+            label={t`Rules`}
+            note={rules.length === 0 ? t`none fired` : String(firings.length)}
             onChoose={(event) => choose(event, rules)}
           >
             {firings.map(({ begin: from, end: to }, n) => (
@@ -176,31 +181,31 @@ export function RunBar({
           </Row>
           <Row
             name="incidents"
-            label="Incidents"
-            note={others.length === 0 ? "none" : others.length.toLocaleString("en")}
+            label={t`Incidents`}
+            note={others.length === 0 ? t`none` : others.length.toLocaleString(i18n.locale)}
             onChoose={(event) => choose(event, others)}
           >
             <Marks marks={thinnedMarks(others, apart)} sight={sight} categories={categories} />
           </Row>
           <Row
             name="light"
-            label={junction === null ? "Traffic light" : `Light ${junction}`}
-            note={junction === null ? "none on the map" : shownWords(bands, time)}
+            label={junction === null ? t`Traffic light` : t`Light ${junction}`}
+            note={junction === null ? t`none on the map` : shownWords(bands, time)}
             onChoose={(event) => choose(event, [])}
           >
             {bands.length > 0 && <Signals bands={bands} sight={sight} />}
           </Row>
           <Row
             name="ttc"
-            label="Time to collision"
+            label={t`Time to collision`}
             note={
               ttc.ego === null
-                ? "no ego"
+                ? t`no ego`
                 : now === null
-                  ? `${ttc.ego}: not on the road`
+                  ? t`${ttc.ego}: not on the road`
                   : now.ttc === null
-                    ? `${ttc.ego}: above ${SEEN} s`
-                    : `${ttc.ego}: ${now.ttc.toFixed(1)} s to ${now.other}`
+                    ? t`${ttc.ego}: above ${SEEN} s`
+                    : t`${ttc.ego}: ${fixed(now.ttc, 1)} s to ${now.other ?? ""}`
             }
             onChoose={(event) => choose(event, [])}
           >
@@ -214,10 +219,10 @@ export function RunBar({
                   y2={levelOf(SERIOUS)}
                 />
                 <text x={2} y={levelOf(SERIOUS) - 3}>
-                  {SERIOUS} s
+                  <Trans>{SERIOUS} s</Trans>
                 </text>
                 <text x={2} y={10}>
-                  {SEEN} s
+                  <Trans>{SEEN} s</Trans>
                 </text>
                 <path
                   className="time-ttc"
@@ -313,23 +318,25 @@ function Signals({ bands, sight }: { bands: readonly Band[]; sight: Sight }) {
 /** What the signs of the bar mean; only those that are in it. */
 function Legend({ kinds, signals }: { kinds: ReadonlySet<ReturnType<typeof markKind>>; signals: boolean }) {
   return (
-    <ul className="time-legend" aria-label="Signs of the time bar">
+    <ul className="time-legend" aria-label={t`Signs of the time bar`}>
       {[...kinds].map((kind) => (
         <li key={kind}>
           <i className="time-mark" style={{ background: MARK_COLOR[kind] }} aria-hidden="true">
             {GLYPH[kind]}
           </i>
-          {MARK_WORD[kind]}
+          {MARK_WORD()[kind]}
         </li>
       ))}
       {signals && (
         <li>
-          <svg width={34} height={14} aria-hidden="true" style={{ background: "#1b1f24", borderRadius: 3 }}>
-            <path d="M2 7H11" stroke={SIGNAL_COLOR.green} strokeWidth={10} />
-            <path d="M12 7H21" stroke={SIGNAL_COLOR.yellow} strokeWidth={7} />
-            <path d="M22 7H32" stroke={SIGNAL_COLOR.red} strokeWidth={2.5} />
-          </svg>
-          Green, yellow, red
+          <Trans>
+            <svg width={34} height={14} aria-hidden="true" style={{ background: "#1b1f24", borderRadius: 3 }}>
+              <path d="M2 7H11" stroke={SIGNAL_COLOR.green} strokeWidth={10} />
+              <path d="M12 7H21" stroke={SIGNAL_COLOR.yellow} strokeWidth={7} />
+              <path d="M22 7H32" stroke={SIGNAL_COLOR.red} strokeWidth={2.5} />
+            </svg>
+            Green, yellow, red
+          </Trans>
         </li>
       )}
     </ul>

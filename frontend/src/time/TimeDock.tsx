@@ -1,3 +1,6 @@
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
 import "./time.css";
 
 import { Button, Tooltip } from "@mantine/core";
@@ -6,7 +9,6 @@ import { type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 import { rowsInSight } from "../editor/windowed";
 import type { EditorNow } from "../editor/useEditing";
 import { nth } from "../lists";
-import { count } from "../ui/words";
 import { Axis, Lines } from "./Axis";
 import { panned, type Sight, zoomed } from "./sight";
 import { type Block, blocksOf, keyOf } from "./blocks";
@@ -90,18 +92,18 @@ export function TimeDock({
         {open && <ZoomButtons onZoom={zoom} onWhole={() => setChosen({ begin: 0, seconds: longest })} />}
         {moment !== null && (
           <Button size="compact-xs" variant="default" onClick={() => onMoment(null)}>
-            Back to the starts
+            <Trans>Back to the starts</Trans>
           </Button>
         )}
         <Button size="compact-xs" variant="subtle" aria-expanded={open} onClick={() => onOpen(!open)}>
-          {open ? "Hide the time bar" : "Show the time bar"}
+          {open ? t`Hide the time bar` : t`Show the time bar`}
         </Button>
       </div>
       <div
         className="time"
         hidden={!open}
         role="region"
-        aria-label="Time bar"
+        aria-label={t`Time bar`}
         onWheel={({ deltaX, deltaY, ctrlKey, shiftKey }) => {
           if (ctrlKey) zoom(Math.exp(-deltaY * 0.002));
           else if (deltaX || shiftKey)
@@ -113,7 +115,7 @@ export function TimeDock({
           ref={rows}
           tabIndex={0}
           role="group"
-          aria-label="Departures, flows, measures and rules"
+          aria-label={t`Departures, flows, measures and rules`}
           onScroll={({ currentTarget: { scrollTop, clientHeight } }) =>
             setScroll({ top: scrollTop, height: clientHeight })
           }
@@ -121,15 +123,19 @@ export function TimeDock({
           <div className="time-inner">
             <Lines sight={sight} moment={moment} />
             <div className="time-head">
-              <span className="time-label">{count(blocks.length, "entry", "entries")}</span>
+              <span className="time-label">
+                {plural(blocks.length, { one: "# entry", other: "# entries" })}
+              </span>
               <div className="time-track" ref={box}>
                 <Axis
                   sight={sight}
                   longest={longest}
                   moment={moment ?? 0}
-                  label="Planned moment"
+                  label={t`Planned moment`}
                   says={(time) =>
-                    planned ? `${count(planned.there(time).length, "road user")} on the road` : ""
+                    planned
+                      ? t`${plural(planned.there(time).length, { one: "# road user", other: "# road users" })} on the road`
+                      : ""
                   }
                   onMoment={onMoment}
                 />
@@ -137,7 +143,7 @@ export function TimeDock({
             </div>
             {blocks.length === 0 && (
               <p className="table-empty">
-                Nothing has a time yet: place a road user, or add a flow, a measure or a rule.
+                <Trans>Nothing has a time yet: place a road user, or add a flow, a measure or a rule.</Trans>
               </p>
             )}
             <div style={{ height: first * ROW }} />
@@ -190,19 +196,22 @@ function clipped(
 }
 
 function statusOf({ planned, busy, error }: Plan, moment: number | null): string {
-  if (error) return `No plan: ${error}`;
-  if (!planned) return "Planning …";
+  if (error) return t`No plan: ${error}`;
+  if (!planned) return t`Planning …`;
   const { leftOut, notPlanned } = planned;
   const said = [
     moment === null
-      ? "Drag the blocks; a moment chosen on the scale shows the plan on the map."
-      : `Planned, not simulated: ${count(planned.there(moment).length, "road user")} on the road.`,
+      ? t`Drag the blocks; a moment chosen on the scale shows the plan on the map.`
+      : t`Planned, not simulated: ${plural(planned.there(moment).length, { one: "# road user", other: "# road users" })} on the road.`,
   ];
-  if (busy) said.unshift("Planning …");
+  if (busy) said.unshift(t`Planning …`);
   if (leftOut.length > 0) {
     const names = `${leftOut.slice(0, 3).join(", ")}${leftOut.length > 3 ? ", …" : ""}`;
-    said.push(`Not planned: ${names}.`);
+    said.push(t`Not planned: ${names}.`);
   }
-  if (notPlanned > 0) said.push(`The last ${count(notPlanned, "road user")} are not planned.`);
+  if (notPlanned > 0)
+    said.push(
+      t`The last ${plural(notPlanned, { one: "# road user", other: "# road users" })} are not planned.`,
+    );
   return said.join(" ");
 }

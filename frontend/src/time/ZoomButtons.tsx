@@ -1,4 +1,5 @@
 import { ActionIcon, Tooltip } from "@mantine/core";
+import { t } from "@lingui/core/macro";
 import type { ReactNode } from "react";
 
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
@@ -6,14 +7,14 @@ import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 /** Shows less of the time in a time bar, more of it, or all. */
 export function ZoomButtons({ onZoom, onWhole }: { onZoom: (factor: number) => void; onWhole: () => void }) {
   return (
-    <span className="time-buttons" role="group" aria-label="What is in sight">
-      <Tool label="Show less time" onClick={() => onZoom(2)}>
+    <span className="time-buttons" role="group" aria-label={t`What is in sight`}>
+      <Tool label={t`Show less time`} onClick={() => onZoom(2)}>
         <IconPlus size={15} />
       </Tool>
-      <Tool label="Show more time" onClick={() => onZoom(0.5)}>
+      <Tool label={t`Show more time`} onClick={() => onZoom(0.5)}>
         <IconMinus size={15} />
       </Tool>
-      <Tool label="Show the whole run" onClick={onWhole}>
+      <Tool label={t`Show the whole run`} onClick={onWhole}>
         <IconFit size={15} />
       </Tool>
     </span>

@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import { nth } from "../lists";
 import { type Shown, shownOf } from "../signals/heads";
 
@@ -50,7 +52,7 @@ export function shownWords(bands: readonly Band[], time: number): string {
   }
   const words: [Shown, string][] = [
     ["green", "green"],
-    ["permissive", "give way"],
+    ["permissive", t`give way`],
     ["yellow", "yellow"],
     ["red", "red"],
     ["off", "off"],

@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import type { Actor, Edit, Flow, ScenarioDocument } from "../api/types";
 import { KIND, type Measure } from "../editor/measures";
 import { type Condition, draftOf, isGroup, type Rule, ruleOf } from "../editor/rules/draft";
@@ -53,7 +55,7 @@ function ruleBlock(rule: Rule): Block[] {
     {
       kind: "rule",
       id: rule.id,
-      word: `Rule of ${rule.actor}`,
+      word: t`Rule of ${rule.actor}`,
       begin: after,
       end: null,
       ends: false,
@@ -89,7 +91,7 @@ function waitingUntil(condition: Condition, after: number): Condition {
 const measureBlock = (measure: Measure, duration: number): Block => ({
   kind: "measure",
   id: measure.id,
-  word: KIND[measure.kind],
+  word: KIND()[measure.kind],
   begin: measure.begin,
   end: measure.end,
   ends: true,
@@ -111,7 +113,7 @@ const flowBlock = (flow: Flow): Block => ({
 const actorBlock = (actor: Actor, duration = 0): Block => ({
   kind: "actor",
   id: actor.id,
-  word: actor.ego ? `${CATEGORY_WORD[actor.category]}, ego` : CATEGORY_WORD[actor.category],
+  word: actor.ego ? t`${CATEGORY_WORD()[actor.category]}, ego` : CATEGORY_WORD()[actor.category],
   begin: actor.depart,
   end: null,
   ends: false,
@@ -148,19 +150,19 @@ export function editOf(
     case "actor":
       return {
         edit: { kind: "change_actor", actor: id, depart: begin },
-        label: `Departure of ${id}`,
+        label: t`Departure of ${id}`,
       };
     case "flow":
       return {
         edit: { kind: "change_flow", flow: id, begin, ...(end !== null && { end }) },
-        label: `Time of ${id}`,
+        label: t`Time of ${id}`,
       };
     case "measure": {
       const measure = document.measures.find((one) => one.id === id);
       if (!measure) return null;
       return {
         edit: { kind: "set_measure", measure: { ...measure, begin, end } },
-        label: `Time of ${id}`,
+        label: t`Time of ${id}`,
       };
     }
     case "rule": {
@@ -169,7 +171,7 @@ export function editOf(
       const draft = draftOf(rule);
       return {
         edit: { kind: "set_rule", rule: ruleOf({ ...draft, when: waitingUntil(draft.when, begin) }) },
-        label: `Time of ${id}`,
+        label: t`Time of ${id}`,
       };
     }
   }
@@ -177,9 +179,9 @@ export function editOf(
 
 /** When a block is, in words. */
 export function wordsOf({ kind, ends }: Block, { begin, end }: Times, until: number): string {
-  if (kind === "rule") return `after ${clock(begin)}`;
-  if (ends) return `${clock(begin)} to ${end === null ? "the end" : clock(end)}`;
+  if (kind === "rule") return t`after ${clock(begin)}`;
+  if (ends) return t`${clock(begin)} to ${end === null ? t`the end` : clock(end)}`;
   return until > begin
-    ? `departs ${clock(begin)}, planned to arrive ${clock(until)}`
-    : `departs ${clock(begin)}`;
+    ? t`departs ${clock(begin)}, planned to arrive ${clock(until)}`
+    : t`departs ${clock(begin)}`;
 }

@@ -1,3 +1,4 @@
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 
 import type { EditorNow } from "../editor/useEditing";
@@ -53,7 +54,7 @@ export function usePlannedView(now: EditorNow, wanted: boolean): PlannedView {
     hint:
       moment === null
         ? ""
-        : `Planned, not simulated, at ${clock(moment)}: each alone on the road, without lights or other traffic`,
+        : t`Planned, not simulated, at ${clock(moment)}: each alone on the road, without lights or other traffic`,
     pick: ({ x, y, reach }) => {
       if (!planned || moment === null) return;
       const { count, pose } = planned.at(moment, null);

@@ -1,4 +1,6 @@
 import { Alert, Button, Group, Loader, Modal, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useEffect, useState } from "react";
 
 import { type Facts, type Kind, removal } from "../api/removal";
@@ -49,16 +51,16 @@ export function RemovalDialog({
         if (item) removal.restore(item.id).then(() => onChanged(gone, true), tellError);
       };
       tell(
-        item ? `${gone.name} is in the wastebasket.` : `${gone.name} is removed.`,
-        item ? { label: "Undo", run: undo } : undefined,
+        item ? t`${gone.name} is in the wastebasket.` : t`${gone.name} is removed.`,
+        item ? { label: t`Undo`, run: undo } : undefined,
       );
       onChanged(gone, false);
     }, tellError);
   };
   const busy = what?.kind === "run" && facts?.live === 1;
   return (
-    <Modal opened={what !== null} onClose={onClose} centered title={`Remove ${what?.name ?? ""}?`}>
-      {!facts && !error && <Loader size="sm" aria-label="Looking what depends on it" />}
+    <Modal opened={what !== null} onClose={onClose} centered title={t`Remove ${what?.name ?? ""}?`}>
+      {!facts && !error && <Loader size="sm" aria-label={t`Looking what depends on it`} />}
       {error && <Alert color="red">{error}</Alert>}
       {facts &&
         factsWords(facts).map((line) => (
@@ -68,7 +70,7 @@ export function RemovalDialog({
         ))}
       <Group justify="flex-end" mt="lg">
         <Button variant="default" data-autofocus onClick={onClose}>
-          Keep it
+          <Trans>Keep it</Trans>
         </Button>
         <Button
           color="red"
@@ -77,7 +79,7 @@ export function RemovalDialog({
             if (what) remove(what);
           }}
         >
-          Remove
+          <Trans>Remove</Trans>
         </Button>
       </Group>
     </Modal>

@@ -24,6 +24,12 @@ function icon(path: ReactNode) {
   };
 }
 
+export const IconLanguage = icon(
+  <>
+    <circle cx="12" cy="12" r="9" />
+    <path d="M3 12h18M12 3c3 3 3 15 0 18M12 3c-3 3-3 15 0 18" />
+  </>,
+);
 export const IconPlus = icon(<path d="M12 5v14M5 12h14" />);
 export const IconMinus = icon(<path d="M5 12h14" />);
 export const IconFit = icon(<path d="M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5" />);

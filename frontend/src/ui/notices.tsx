@@ -1,4 +1,5 @@
 import { Alert, Button, CloseButton, Stack } from "@mantine/core";
+import { t } from "@lingui/core/macro";
 import { create } from "zustand";
 
 import { reasonOf } from "./reason";
@@ -68,7 +69,7 @@ export function NoticeList() {
               size="sm"
               variant="transparent"
               c="white"
-              aria-label="Close this message"
+              aria-label={t`Close this message`}
               onClick={() => close(one.key)}
             />
           </div>

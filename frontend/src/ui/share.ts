@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import { tell, tellError } from "./notices";
 import { write } from "./kept";
 
@@ -17,11 +19,11 @@ export function copyLink(): void {
   const text = location.href;
   // Browsers give the clipboard only to pages that are served safely.
   const clipboard = navigator.clipboard as Clipboard | undefined;
-  if (!clipboard) return tell(`The link to this view: ${text}`);
+  if (!clipboard) return tell(t`The link to this view: ${text}`);
   clipboard
     .writeText(text)
     .then(
-      () => tell("The link to this view is copied. It keeps map, step, selection and moment."),
+      () => tell(t`The link to this view is copied. It keeps map, step, selection and moment.`),
       tellError,
     );
 }
@@ -30,7 +32,7 @@ export function copyLink(): void {
 export function savePicture(canvas: HTMLCanvasElement, name: string): void {
   canvas.toBlob((blob) => {
     if (blob) saveFile(blob, `${name}.png`);
-    else tell("The picture could not be made.");
+    else tell(t`The picture could not be made.`);
   }, "image/png");
 }
 

@@ -1,6 +1,10 @@
-import { createTheme, type CSSVariablesResolver, Modal, ModalHeader } from "@mantine/core";
+import { createTheme, type CSSVariablesResolver, Modal, ModalHeader, NumberInput } from "@mantine/core";
+import { t } from "@lingui/core/macro";
 
-export const theme = createTheme({
+import { localized } from "../language/localized";
+import { decimalSign } from "../language/numbers";
+
+export const theme = localized(() => createTheme({
   primaryColor: "blue",
   primaryShade: 8,
   fontFamily: "system-ui, 'Segoe UI', 'Helvetica Neue', Arial, 'DejaVu Sans', sans-serif",
@@ -10,11 +14,15 @@ export const theme = createTheme({
   // Folds and dialogues of the library move by script, which the style sheet cannot stop.
   respectReducedMotion: true,
   components: {
-    Modal: Modal.extend({ defaultProps: { closeButtonProps: { "aria-label": "Close" } } }),
+    Modal: Modal.extend({ defaultProps: { closeButtonProps: { "aria-label": t`Close` } } }),
     // A window's head is not a second head of the page.
     ModalHeader: ModalHeader.extend({ defaultProps: { role: "presentation" } }),
+    // Whoever is used to a point may type one where a comma is shown.
+    NumberInput: NumberInput.extend({
+      defaultProps: { decimalSeparator: decimalSign(), allowedDecimalSeparators: [".", ","] },
+    }),
   },
-});
+}));
 
 /** Secondary text and light alerts with a contrast of 4.5 at least, which Mantine's own colours miss. */
 export const contrast: CSSVariablesResolver = () => ({

@@ -30,7 +30,7 @@ test("colours tell speeds from stopped to fast, at the bounds that the legend na
     0, 0, 1, 1, 2, 3, 3, 4,
   ]);
   expect(tintOf("kind", seen, [0])).toBeNull();
-  for (const { colors, legend } of Object.values(SCALES)) expect(colors.length).toBe(legend.length);
+  for (const { colors, legend } of Object.values(SCALES())) expect(colors.length).toBe(legend.length);
 });
 
 test("brakes come before indicators, and neither is grey", () => {
@@ -109,7 +109,7 @@ test("what colours say is chosen on the map; a recording has no lamps", async ()
   ]);
   const shown = { categories: new Set(["car"] as const), ego: false, lights: false, lamps: false };
   again(<Legend {...shown} marks={new Set()} by="delay" />);
-  expect(screen.getAllByRole("listitem").map((one) => one.textContent)).toEqual([...SCALES.delay.legend]);
+  expect(screen.getAllByRole("listitem").map((one) => one.textContent)).toEqual([...SCALES().delay.legend]);
 });
 
 test("signs that would hide each other are one with their number, but for a rule that is looked at", () => {

@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import { stationsOf } from "../placing";
 import { type Carrier, type Editing, onFoot, placeHover } from "./handler";
 
@@ -10,8 +12,8 @@ export function carrier(editing: Editing, id: string): Carrier {
   return {
     hint:
       others.length === 0
-        ? `Moving ${id}: drop it on a free point`
-        : `Moving ${others.length + 1} road users: drop them where ${id} starts`,
+        ? t`Moving ${id}: drop it on a free point`
+        : t`Moving ${others.length + 1} road users: drop them where ${id} starts`,
     under: ({ x, y, reach }) => {
       const to = starts.near(x, y, reach, walk);
       return placeHover(to, to && one?.goal ? stationsOf({ ...one, spawn: to.id }) : undefined);
@@ -19,7 +21,7 @@ export function carrier(editing: Editing, id: string): Carrier {
     drop: ({ x, y, reach }) => {
       const to = starts.near(x, y, reach, walk);
       if (to) changes.move([id, ...others], to);
-      else say(starts.reasonAt(x, y, reach, walk, "road user"));
+      else say(starts.reasonAt(x, y, reach, walk, t`road user`));
     },
   };
 }

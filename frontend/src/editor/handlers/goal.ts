@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../../language/localized";
 import type { Actor, Flow } from "../../api/types";
 import type { Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
@@ -7,13 +10,13 @@ import { nearestOne } from "../scene";
 import { type Carrier, type Editing, LOOKING, onFoot, placeHover, type Tool } from "./handler";
 import { selectFrame } from "./select";
 
-const NOWHERE = "No goal can be here: it lies on a lane or walkway inside the region.";
+const NOWHERE = localized(() => t`No goal can be here: it lies on a lane or walkway inside the region.`);
 
 /** Chooses where one goes: a goal that is suggested, or any point of the region. */
 export const goalTool = (id: string): Tool => ({
   key: `goal ${id}`,
-  help: `Now click where ${id} goes: a diamond, or any other point of the region. Escape stops.`,
-  elsewhere: "Use the first suggestion",
+  help: t`Now click where ${id} goes: a diamond, or any other point of the region. Escape stops.`,
+  elsewhere: t`Use the first suggestion`,
   goals: true,
   makes: false,
   handler: (editing) => {
@@ -25,15 +28,15 @@ export const goalTool = (id: string): Tool => ({
       under: (at) => (one ? goalHover(editing, one, at) : null),
       hint: (hover) =>
         hover?.is === "place"
-          ? `${id} goes to ${placeWord(editing.graph, hover.place.id)}`
-          : `Point at where ${id} goes`,
+          ? t`${id} goes to ${placeWord(editing.graph, hover.place.id)}`
+          : t`Point at where ${id} goes`,
       pick: (at) => {
         if (one && take(editing, one, at)) editing.done();
       },
       frame: (area) => selectFrame(editing, area),
       somewhere: () => {
         const [first] = editing.goals ?? [];
-        if (!one || !first) return editing.say("No goal can be reached from the start.");
+        if (!one || !first) return editing.say(t`No goal can be reached from the start.`);
         editing.changes.setGoal(one, first.id);
         editing.done();
       },
@@ -49,7 +52,7 @@ export function chosenGoalAt({ graph, one }: Editing, at: Pointed): Place | null
 
 /** Takes the goal of the selected one along. */
 export const goalCarrier = (editing: Editing, one: Actor | Flow): Carrier => ({
-  hint: `Moving the goal of ${one.id}: drop it on any point that it can reach`,
+  hint: t`Moving the goal of ${one.id}: drop it on any point that it can reach`,
   under: (at) => goalHover(editing, one, at),
   drop: (at) => void take(editing, one, at),
 });
@@ -61,7 +64,7 @@ function goalHover(editing: Editing, one: Actor | Flow, at: Pointed) {
 
 function take(editing: Editing, one: Actor | Flow, at: Pointed): boolean {
   const place = goalNear(editing, one, at);
-  if (!place) editing.say(NOWHERE);
+  if (!place) editing.say(NOWHERE());
   else if (place.id !== one.goal) editing.changes.setGoal(one, place.id);
   return place !== null;
 }

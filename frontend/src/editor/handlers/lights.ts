@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import { type Editing, type Handler } from "./handler";
 import { goalAt, oneAt } from "./select";
 
@@ -12,7 +14,7 @@ export function withLights(handler: Handler, editing: Editing): Handler {
     },
     hint: (hover) =>
       hover?.is === "light"
-        ? `Traffic light of junction ${hover.junction}: click to see its program`
+        ? t`Traffic light of junction ${hover.junction}: click to see its program`
         : handler.hint(hover),
     pick: (at) => {
       // Road users and goals that lie on a stop line come first.

@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../../language/localized";
 import type { Pointed } from "../../map/MapCanvas";
 import { nth } from "../../lists";
 import type { Place } from "../../map/graph";
@@ -12,17 +15,17 @@ const LANE_REACH = 6;
 const LIGHT_REACH = 20;
 const NODE_REACH = 2;
 
-const PROMPT: Record<PickBy, string> = {
-  segment: "Click a road or junction. Escape stops choosing.",
-  lane: "Click a lane. Escape stops choosing.",
-  turn: "Click the road that the turn leads from. Escape stops choosing.",
-  point: "Click the point of a lane. Escape stops choosing.",
-  light: "Click a traffic light. Escape stops choosing.",
-  node: "Click a point of a lane inside the region. Escape stops choosing.",
-  goal: "Click a point of a lane or walkway. Escape stops choosing.",
-  place: "Click a point of a lane or walkway, or the ground. Escape stops choosing.",
-  ground: "Click the ground, point after point. Escape stops choosing.",
-};
+const PROMPT = localized((): Record<PickBy, string> => ({
+  segment: t`Click a road or junction. Escape stops choosing.`,
+  lane: t`Click a lane. Escape stops choosing.`,
+  turn: t`Click the road that the turn leads from. Escape stops choosing.`,
+  point: t`Click the point of a lane. Escape stops choosing.`,
+  light: t`Click a traffic light. Escape stops choosing.`,
+  node: t`Click a point of a lane inside the region. Escape stops choosing.`,
+  goal: t`Click a point of a lane or walkway. Escape stops choosing.`,
+  place: t`Click a point of a lane or walkway, or the ground. Escape stops choosing.`,
+  ground: t`Click the ground, point after point. Escape stops choosing.`,
+}));
 
 /** Names places for a form: a segment, a lane, a turn by its two roads, a point of a lane, a light. */
 export const pickingHandler = (editing: Editing): Handler => {
@@ -46,11 +49,11 @@ export const pickingHandler = (editing: Editing): Handler => {
       else if (by === "light") {
         const junction = lights?.junctionAt({ ...at, reach: Math.max(at.reach, LIGHT_REACH) });
         if (junction) take(junction);
-        else editing.say("There is no traffic light here.");
+        else editing.say(t`There is no traffic light here.`);
       } else if (by === "goal" || by === "place" || by === "ground") pickPoint(editing, at, by);
       else {
         const place = laneAt(editing, at, by);
-        if (!place) editing.say(MISSED[by]);
+        if (!place) editing.say(MISSED()[by]);
         else if (by === "node") take(place.id);
         else take(laneKey(editing.graph, place.index), nth(editing.graph.columns.s, place.index));
       }
@@ -58,17 +61,17 @@ export const pickingHandler = (editing: Editing): Handler => {
   };
 };
 
-const MISSED: Record<"lane" | "point" | "node", string> = {
-  lane: "There is no lane here.",
-  point: "There is no lane outside junctions here.",
-  node: "There is no lane of the region here, or it lies in a junction.",
-};
+const MISSED = localized((): Record<"lane" | "point" | "node", string> => ({
+  lane: t`There is no lane here.`,
+  point: t`There is no lane outside junctions here.`,
+  node: t`There is no lane of the region here, or it lies in a junction.`,
+}));
 
 /** The nearest node of a lane or walkway, or the ground itself. */
 function pickPoint(editing: Editing, at: Pointed, by: "goal" | "place" | "ground"): void {
   const place = by === "ground" ? null : anyPlaceAt(editing, at);
   if (!place && by === "goal") {
-    editing.say("There is no lane or walkway here.");
+    editing.say(t`There is no lane or walkway here.`);
     return;
   }
   const { x, y, hdg } = place ?? { ...at, hdg: 0 };
@@ -87,7 +90,8 @@ function pickSegment(editing: Editing, at: Pointed, by: PickBy, take: (name: str
   if (row === null) return;
   const segment = graph.segmentId(row);
   if (by === "segment") take(segment);
-  else if (nth(graph.columns.segments, row).kind === "junction") say("A turn leads from a road into a road.");
+  else if (nth(graph.columns.segments, row).kind === "junction")
+    say(t`A turn leads from a road into a road.`);
   else if (pick.now?.from) take(`${pick.now.from}>${segment}`);
   else pick.begin(segment);
 }
@@ -111,13 +115,13 @@ function laneAt({ graph, picker, roi }: Editing, at: Pointed, by: PickBy): Place
 }
 
 function said({ graph, pick }: Editing, by: PickBy, hover: Hover | null): string {
-  if (hover?.is === "light") return `Traffic light of junction ${hover.junction}`;
+  if (hover?.is === "light") return t`Traffic light of junction ${hover.junction}`;
   if (hover?.is === "place") return laneWord(graph, hover.place.id);
   const from = pick.now?.from;
   if (hover?.is === "segment") {
     const segment = graph.segmentId(hover.row);
     if (by === "segment" || !from) return segment;
-    if (segment !== from) return `From ${from} into ${segment}`;
+    if (segment !== from) return t`From ${from} into ${segment}`;
   }
-  return from ? `From ${from}: click the road that the turn leads into.` : PROMPT[by];
+  return from ? t`From ${from}: click the road that the turn leads into.` : PROMPT()[by];
 }

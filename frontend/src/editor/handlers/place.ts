@@ -1,16 +1,16 @@
 import type { Category } from "../../api/types";
-import { CATEGORY_WORD } from "../../ui/words";
+import { inSentence, CATEGORY_WORD } from "../../ui/words";
 import type { Tool } from "./handler";
 import { NEXT_POINT, startHelp, startingHandler, startPrompt } from "./starting";
 
 /** Places one road user of a kind with each click. */
 export function placeTool(category: Category): Tool {
   const walks = category === "pedestrian";
-  const who = CATEGORY_WORD[category].toLowerCase();
+  const who = inSentence(CATEGORY_WORD()[category]);
   return {
     key: `place ${category}`,
     help: startHelp(who, walks),
-    elsewhere: NEXT_POINT,
+    elsewhere: NEXT_POINT(),
     goals: false,
     makes: true,
     handler: (editing) =>

@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import { type Editing, type Handler, LOOKING } from "./handler";
 import { rowsWithin } from "../regions";
 import { segmentAt, segmentHover } from "./segments";
@@ -10,10 +12,10 @@ export const regionHandler = ({ graph, picker, roi, region, changes }: Editing):
   hint: (hover) => {
     const segment = hover?.is === "segment" ? graph.segmentId(hover.row) : null;
     if (segment !== null && region.inside.includes(segment) && !region.removable.includes(segment)) {
-      return "This segment holds the region together and cannot be removed";
+      return t`This segment holds the region together and cannot be removed`;
     }
     return roi.length === 0
-      ? "Click a road or junction to begin the region, or drag a rectangle with Shift, a line around it with Ctrl"
+      ? t`Click a road or junction to begin the region, or drag a rectangle with Shift, a line around it with Ctrl`
       : null;
   },
   frame: (area) => changes.extendRegion(rowsWithin(graph, area)),

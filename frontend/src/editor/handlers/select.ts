@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import type { Area } from "../../map/areas";
 import type { Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
@@ -14,7 +16,7 @@ export const selectHandler = (editing: Editing): Handler => ({
   under: (at) =>
     oneAt(editing, at) || chosenGoalAt(editing, at) || goalAt(editing, at) ? null : routeHover(editing, at),
   hint: (hover) =>
-    hover?.is === "route" ? `Drag the route of ${hover.id} to lead it through another place` : null,
+    hover?.is === "route" ? t`Drag the route of ${hover.id} to lead it through another place` : null,
   pick: (at) => {
     editing.openActors();
     const goal = goalAt(editing, at);

@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../../language/localized";
 import type { Category } from "../../api/types";
 import type { Place } from "../../map/graph";
 import { laneWord } from "../placeWords";
@@ -45,7 +48,7 @@ export function startingHandler(
         ones.flatMap((one) => graph.place(one.spawn) ?? []),
       );
       if (to) apply(to);
-      else say("No free point is left inside the region.");
+      else say(t`No free point is left inside the region.`);
     },
   };
 }
@@ -53,16 +56,20 @@ export function startingHandler(
 /** Lane and compass heading of a start. */
 function whereabouts({ graph }: Editing, { place }: Extract<Hover, { is: "place" }>): string {
   const degrees = Math.round((((90 - (place.hdg * 180) / Math.PI) % 360) + 360) % 360);
-  return `${laneWord(graph, place.id)}${place.walk ? "" : `, heading ${degrees}°`}`;
+  return `${laneWord(graph, place.id)}${place.walk ? "" : t`, heading ${degrees}°`}`;
 }
 
 /** The button for those who do not point. */
-export const NEXT_POINT = "Use the next free point";
+export const NEXT_POINT = localized(() => t`Use the next free point`);
 
 /** What is said beside the map of a tool that makes something new. */
 export const startHelp = (who: string, walks: boolean): string =>
-  `Now click where the ${who} starts: a ${walks ? "yellow" : "blue"} point on the map. Escape stops placing.`;
+  walks
+    ? t`Now click where the ${who} starts: a yellow point on the map. Escape stops placing.`
+    : t`Now click where the ${who} starts: a blue point on the map. Escape stops placing.`;
 
 /** What is said on the map of a tool that makes something new. */
 export const startPrompt = (who: string, walks: boolean): string =>
-  `Point at the ${walks ? "edge of a road" : "lane"} where the ${who} starts`;
+  walks
+    ? t`Point at the edge of a road where the ${who} starts`
+    : t`Point at the lane where the ${who} starts`;

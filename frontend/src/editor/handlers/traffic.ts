@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import { type Editing, type Handler, LOOKING } from "./handler";
 import { segmentHover } from "./segments";
 
@@ -5,5 +7,5 @@ import { segmentHover } from "./segments";
 export const trafficHandler = ({ graph, picker }: Editing): Handler => ({
   ...LOOKING,
   under: (at) => segmentHover(picker, at),
-  hint: (hover) => (hover?.is === "segment" ? `Id for tables: ${graph.segmentId(hover.row)}` : null),
+  hint: (hover) => (hover?.is === "segment" ? t`Id for tables: ${graph.segmentId(hover.row)}` : null),
 });

@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { localized } from "../../language/localized";
 import type { Actor } from "../../api/types";
 import type { Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
@@ -8,7 +11,9 @@ import { nearestLeg, withWaypoint } from "../waypoints";
 import { type Carrier, type Editing, type Hover, LOOKING, onFoot, placeHover, type Tool } from "./handler";
 import { selectFrame } from "./select";
 
-const NOWHERE = "No route leads here: a waypoint lies on a lane or walkway inside the region.";
+const NOWHERE = localized(
+  () => t`No route leads here: a waypoint lies on a lane or walkway inside the region.`,
+);
 /** Share of the reach of the pointer within which it is on the line of a route. */
 const ON_LINE = 0.5;
 
@@ -39,7 +44,7 @@ export function waypointGrab(editing: Editing, at: Pointed): Carrier | null {
   const slot = one && slotAt(editing, one, at);
   if (!one || !slot) return null;
   return {
-    hint: `Drop it where the route of ${one.id} is to pass`,
+    hint: t`Drop it where the route of ${one.id} is to pass`,
     needsRoute: true,
     under: (to) => tried(one, placeNear(editing, one, to), slot),
     drop: (to) => void take(editing, one, to, slot),
@@ -55,8 +60,8 @@ export function routeHover(editing: Editing, at: Pointed): Hover | null {
 /** Chooses one more place that a route leads through, by a click or without the pointer. */
 export const waypointTool = (id: string): Tool => ({
   key: `waypoint ${id}`,
-  help: `Now click where the route of ${id} is to pass. Escape stops.`,
-  elsewhere: "Use the middle of the route",
+  help: t`Now click where the route of ${id} is to pass. Escape stops.`,
+  elsewhere: t`Use the middle of the route`,
   goals: false,
   makes: false,
   handler: (editing) => {
@@ -73,8 +78,8 @@ export const waypointTool = (id: string): Tool => ({
       under: (at) => (one ? tried(one, placeNear(editing, one, at), slot(at)) : null),
       hint: (hover) =>
         hover?.is === "place"
-          ? `${id} passes ${placeWord(editing.graph, hover.place.id)}`
-          : `Point at where the route of ${id} is to pass`,
+          ? t`${id} passes ${placeWord(editing.graph, hover.place.id)}`
+          : t`Point at where the route of ${id} is to pass`,
       pick: (at) => {
         if (one && take(editing, one, at, slot(at))) editing.done();
       },
@@ -82,7 +87,7 @@ export const waypointTool = (id: string): Tool => ({
       somewhere: () => {
         const longest = [...editing.legs].sort((a, b) => b.length - a.length)[0] ?? [];
         const [x, y] = longest[Math.floor(longest.length / 2)] ?? [NaN, NaN];
-        if (!one || Number.isNaN(x)) return editing.say("There is no route yet: choose a goal first.");
+        if (!one || Number.isNaN(x)) return editing.say(t`There is no route yet: choose a goal first.`);
         if (take(editing, one, { x, y, reach: 0, shift: false }, slot({ x, y }))) editing.done();
       },
     };
@@ -101,11 +106,11 @@ function tried(one: Actor, place: Place | null, { index, replaces }: Slot): Hove
 function take(editing: Editing, one: Actor, at: Pointed, { index, replaces }: Slot): boolean {
   const place = placeNear(editing, one, at);
   if (!place) {
-    editing.say(NOWHERE);
+    editing.say(NOWHERE());
     return false;
   }
   const via = withWaypoint(one.via, index, place.id, replaces);
   if (via.join("\n") !== one.via.join("\n"))
-    editing.changes.change({ kind: "change_actor", actor: one.id, via }, `Waypoint of ${one.id}`);
+    editing.changes.change({ kind: "change_actor", actor: one.id, via }, t`Waypoint of ${one.id}`);
   return true;
 }

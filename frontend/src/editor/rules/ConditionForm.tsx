@@ -1,18 +1,22 @@
 import { Button, Group, SegmentedControl, Select } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { inSentence } from "../../ui/words";
+import { localized } from "../../language/localized";
 import { Committed } from "../Committed";
 import { CONDITION_KINDS, conditionKind } from "./conditionKinds";
 import { type Condition, type ConditionGroup, isGroup, type Join, newCondition, NOW, settled } from "./draft";
 import { type About, FieldInput } from "./FieldInput";
 
-const JOIN_WORD: Record<Join, string> = {
-  all: "All of several hold",
-  any: "Any of several holds",
-  not: "Something does not hold",
-};
-const isJoin = (kind: string): kind is Join => kind in JOIN_WORD;
-const EDGE = { none: "As long as it is true", rising: "Only as it becomes true" };
+const JOIN_WORD = localized((): Record<Join, string> => ({
+  all: t`All of several hold`,
+  any: t`Any of several holds`,
+  not: t`Something does not hold`,
+}));
+const isJoin = (kind: string): kind is Join => kind in JOIN_WORD();
+const EDGE = localized(() => ({ none: t`As long as it is true`, rising: t`Only as it becomes true` }));
 
 type ConditionProps = About & {
   others: readonly string[];
@@ -35,12 +39,12 @@ export function WhenForm({ condition, onChange, ...about }: ConditionProps) {
   return (
     <>
       {listed ? (
-        <Parts group={listed} label="Condition" root onChange={onChange} {...about} />
+        <Parts group={listed} label={t`Condition`} root onChange={onChange} {...about} />
       ) : (
-        <ConditionForm label="Condition" condition={condition} timed onChange={onChange} {...about} />
+        <ConditionForm label={t`Condition`} condition={condition} timed onChange={onChange} {...about} />
       )}
       <Button size="compact-sm" variant="default" onClick={add}>
-        Add a condition
+        <Trans>Add a condition</Trans>
       </Button>
       {listed && <TimingFields condition={listed} onChange={onChange} />}
     </>
@@ -89,10 +93,10 @@ function Parts({
       {root && group.of.length > 1 && (
         <SegmentedControl
           fullWidth
-          aria-label="How conditions are joined"
+          aria-label={t`How conditions are joined`}
           data={[
-            { value: "all", label: "All hold" },
-            { value: "any", label: "Any holds" },
+            { value: "all", label: t`All hold` },
+            { value: "any", label: t`Any holds` },
           ]}
           value={group.join}
           onChange={(join) => onChange({ ...group, join: join === "any" ? join : "all" })}
@@ -104,7 +108,7 @@ function Parts({
           variant="default"
           onClick={() => put([...group.of, newCondition("time", about.others)])}
         >
-          {`Add one to ${label.toLowerCase()}`}
+          {t`Add one to ${inSentence(label)}`}
         </Button>
       )}
     </>
@@ -126,7 +130,7 @@ function ConditionForm({
 }) {
   const { others, rules } = about;
   const [shown, setShown] = useState(timed);
-  const kinds = Object.entries(CONDITION_KINDS).filter(([value]) => value !== "rule" || rules.length > 0);
+  const kinds = Object.entries(CONDITION_KINDS()).filter(([value]) => value !== "rule" || rules.length > 0);
   const kind = isGroup(condition) ? condition.join : condition.kind;
   const choose = (next: string): void => {
     const { delay, edge } = condition;
@@ -141,7 +145,7 @@ function ConditionForm({
         label={label}
         data={[
           ...kinds.map(([value, one]) => ({ value, label: one.label })),
-          ...Object.entries(JOIN_WORD).map(([value, word]) => ({ value, label: word })),
+          ...Object.entries(JOIN_WORD()).map(([value, word]) => ({ value, label: word })),
         ]}
         value={kind}
         allowDeselect={false}
@@ -171,20 +175,20 @@ function ConditionForm({
           <Button
             size="compact-sm"
             variant="default"
-            aria-label={`When it counts: ${label.toLowerCase()}`}
+            aria-label={t`When it counts: ${inSentence(label)}`}
             onClick={() => setShown(true)}
           >
-            When it counts
+            <Trans>When it counts</Trans>
           </Button>
         )}
         {onRemove && (
           <Button
             size="compact-sm"
             variant="default"
-            aria-label={`Remove ${label.toLowerCase()}`}
+            aria-label={t`Remove ${inSentence(label)}`}
             onClick={onRemove}
           >
-            Remove
+            <Trans>Remove</Trans>
           </Button>
         )}
       </Group>
@@ -203,8 +207,8 @@ function TimingFields({
   return (
     <Group grow align="flex-start">
       <Committed
-        label="Delay"
-        suffix=" s"
+        label={t`Delay`}
+        suffix={" s"}
         min={0}
         max={1e6}
         digits={1}
@@ -212,8 +216,8 @@ function TimingFields({
         onCommit={(delay) => onChange({ ...condition, delay: delay ?? 0 })}
       />
       <Select
-        label="Counts"
-        data={Object.entries(EDGE).map(([value, word]) => ({ value, label: word }))}
+        label={t({ message: "Counts", context: "a condition" })}
+        data={Object.entries(EDGE()).map(([value, word]) => ({ value, label: word }))}
         value={condition.edge}
         allowDeselect={false}
         onChange={(edge) => onChange({ ...condition, edge: edge === "rising" ? edge : "none" })}

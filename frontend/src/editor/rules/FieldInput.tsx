@@ -1,5 +1,7 @@
 import { Select, Switch, Text } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { short } from "../../language/numbers";
 import { Committed } from "../Committed";
 import { CommittedText, PickButton } from "../FormParts";
 import type { PlacePick } from "../pick";
@@ -138,7 +140,7 @@ function NumberField({
       min={min}
       max={max}
       digits={digits}
-      placeholder={start === undefined ? "not given" : undefined}
+      placeholder={start === undefined ? t`not given` : undefined}
       value={typeof value === "number" ? value * scale : ""}
       onCommit={(next) => {
         if (next !== null) onChange(next / scale);
@@ -170,7 +172,7 @@ export function ChoiceInput({
       data={known ? [...data] : [...data, { value: shown, label: shown }]}
       value={shown}
       clearable={optional}
-      placeholder={optional ? "not given" : undefined}
+      placeholder={optional ? t`not given` : undefined}
       allowDeselect={false}
       onChange={onChange}
     />
@@ -206,7 +208,7 @@ function PlaceInput({
         by={by}
         onTake={(picked) => onChange(picked.name || [picked.x, picked.y])}
       >
-        {`${label} on the map`}
+        {t`${label} on the map`}
       </PickButton>
     </>
   );
@@ -214,8 +216,8 @@ function PlaceInput({
 
 function rowsWords(rows: unknown): string {
   if (!Array.isArray(rows) || rows.length === 0)
-    return "No trajectory: odscen replay reads one from a table.";
+    return t`No trajectory: odscen replay reads one from a table.`;
   const last: unknown = rows.at(-1);
   const seconds = Array.isArray(last) && typeof last[0] === "number" ? last[0] : 0;
-  return `${rows.length} recorded rows over ${Number(seconds.toFixed(1))} s; odscen replay reads others.`;
+  return t`${rows.length} recorded rows over ${short(seconds, 1)} s; odscen replay reads others.`;
 }

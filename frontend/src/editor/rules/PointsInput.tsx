@@ -1,5 +1,8 @@
 import { Group, Select } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { inSentence } from "../../ui/words";
+import { localized } from "../../language/localized";
 import { nth } from "../../lists";
 import { Committed } from "../Committed";
 import { CommittedText, ListButtons, PickButton } from "../FormParts";
@@ -9,12 +12,12 @@ import type { FieldProps } from "./FieldInput";
 import type { PlainField, Values } from "./fields";
 
 type Timed = "none" | "speed" | "speeds" | "times";
-const TIMED: Record<Timed, string> = {
-  none: "Its own speed",
-  speed: "One speed",
-  speeds: "A speed at each point",
-  times: "A time at each point",
-};
+const TIMED = localized((): Record<Timed, string> => ({
+  none: t`Its own speed`,
+  speed: t`One speed`,
+  speeds: t`A speed at each point`,
+  times: t`A time at each point`,
+}));
 /** What a new path is driven with, m/s, and the seconds between its points. */
 const SPEED = 5;
 const APART = 2;
@@ -90,8 +93,8 @@ export function PointsInput({
             </div>
           )}
           <ListButtons
-            earlier={`Move ${label.toLowerCase()} ${n + 1} earlier`}
-            removal={`Remove ${label.toLowerCase()} ${n + 1}`}
+            earlier={t`Move ${inSentence(label)} ${n + 1} earlier`}
+            removal={t`Remove ${inSentence(label)} ${n + 1}`}
             first={n === 0}
             only={false}
             onEarlier={() => swap(n)}
@@ -101,8 +104,8 @@ export function PointsInput({
       ))}
       <CommittedText
         key={points.length}
-        label={`${label}: one more`}
-        placeholder="a node, or x, y in metres"
+        label={t`${label}: one more`}
+        placeholder={t`a node, or x, y in metres`}
         value=""
         onCommit={(typed) => add(readPlace(typed))}
       />
@@ -113,7 +116,7 @@ export function PointsInput({
         many
         onTake={({ x, y }) => add([x, y])}
       >
-        {`${label} on the map`}
+        {t`${label} on the map`}
       </PickButton>
       {timed && <PathSpeed values={values} points={points.length} onChange={onChange} />}
     </section>
@@ -146,24 +149,24 @@ function PathSpeed({
     onChange({ ...rest, ...made });
   };
   // A speed or time at each of no points would be lost: an empty list says none.
-  const choices = Object.entries(TIMED).filter(
+  const choices = Object.entries(TIMED()).filter(
     ([value]) => points > 0 || value === "none" || value === "speed",
   );
   return (
     <>
       <Select
-        label="How fast"
+        label={t`How fast`}
         data={choices.map(([value, label]) => ({ value, label }))}
         value={kind}
         allowDeselect={false}
         onChange={(next) => {
-          if (next !== null && next in TIMED) choose(next as Timed);
+          if (next !== null && next in TIMED()) choose(next as Timed);
         }}
       />
       {kind === "speed" && (
         <Committed
-          label="Speed"
-          suffix=" km/h"
+          label={t`Speed`}
+          suffix={" km/h"}
           min={0.1}
           max={360}
           digits={1}
@@ -191,7 +194,7 @@ function AtPoint({
   const scale = kind === "speeds" ? 3.6 : 1;
   return (
     <Committed
-      label={kind === "speeds" ? `Speed ${point}` : `Time ${point}`}
+      label={kind === "speeds" ? t`Speed ${point}` : t`Time ${point}`}
       suffix={kind === "speeds" ? " km/h" : " s"}
       min={kind === "speeds" ? 0 : 0.1}
       max={kind === "speeds" ? 360 : 1e6}
@@ -226,7 +229,7 @@ export function PoseInput({
     <>
       <CommittedText
         label={label}
-        placeholder="where it is placed; or x, y in metres"
+        placeholder={t`where it is placed; or x, y in metres`}
         value={pose.length === 3 ? `${x}, ${y}` : ""}
         onCommit={(typed) => {
           const place = readPlace(typed);
@@ -236,7 +239,7 @@ export function PoseInput({
       />
       {pose.length === 3 && (
         <Committed
-          label="Heading (from east, counter-clockwise)"
+          label={t`Heading (from east, counter-clockwise)`}
           suffix="°"
           min={-360}
           max={360}
@@ -251,7 +254,7 @@ export function PoseInput({
         by="place"
         onTake={(picked) => onChange([picked.x, picked.y, picked.hdg])}
       >
-        {`${label} on the map`}
+        {t`${label} on the map`}
       </PickButton>
     </>
   );

@@ -1,4 +1,6 @@
 import { Button, Group, Stack, Text } from "@mantine/core";
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
 import { useEffect } from "react";
 
 import { useKeptForm } from "../../ui/keptForm";
@@ -41,9 +43,9 @@ export function RuleForm({
   const about = { actors, rules, pick, others: actors.filter((one) => one !== draft.actor) };
   return (
     <Stack gap={8}>
-      <CommittedText label="Name" value={draft.id} maxLength={60} onCommit={(id) => put({ id })} />
+      <CommittedText label={t`Name`} value={draft.id} maxLength={60} onCommit={(id) => put({ id })} />
       <ChoiceInput
-        label="Who acts"
+        label={t`Who acts`}
         value={draft.actor}
         data={actors.map((one) => ({ value: one, label: one }))}
         onChange={(actor) => put({ actor: actor ?? "" })}
@@ -51,8 +53,8 @@ export function RuleForm({
       <WhenForm condition={draft.when} onChange={(when) => put({ when })} {...about} />
       <ThenForm then={draft.then} onChange={(then) => put({ then })} {...about} />
       <Committed
-        label="Fires at most"
-        suffix={draft.times === 1 ? " time" : " times"}
+        label={t`Fires at most`}
+        suffix={draft.times === 1 ? t` time` : t` times`}
         min={1}
         max={100_000}
         digits={0}
@@ -62,14 +64,22 @@ export function RuleForm({
       <Text size="sm" role="status">
         {sentence(draft)}
       </Text>
-      {lacking.length > 0 && <Text size="sm">Still to give: {lacking.join(", ")}.</Text>}
-      {taken && <Text size="sm">There is a rule {draft.id} already; choose another name.</Text>}
+      {lacking.length > 0 && (
+        <Text size="sm">
+          <Trans>Still to give: {lacking.join(", ")}.</Trans>
+        </Text>
+      )}
+      {taken && (
+        <Text size="sm">
+          <Trans>There is a rule {draft.id} already; choose another name.</Trans>
+        </Text>
+      )}
       <Group gap={6}>
         <Button disabled={lacking.length > 0 || taken} onClick={() => onSave(draft)}>
           {saveLabel}
         </Button>
         <Button variant="default" onClick={onCancel}>
-          Cancel
+          <Trans>Cancel</Trans>
         </Button>
       </Group>
     </Stack>

@@ -1,7 +1,9 @@
 import { Button, Text } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
 import type { Edit, ScenarioDocument } from "../../api/types";
 import { forgetForm, useKeptForm } from "../../ui/keptForm";
-import { count } from "../../ui/words";
 import { PartCard } from "../DemandParts";
 import { OpenAndShow } from "../FormParts";
 import type { PlacePick } from "../pick";
@@ -52,7 +54,9 @@ export function RulesStep({
   const opened = (id: string): void => turnTo(open === id ? null : id);
   return (
     <>
-      <Text size="sm">When something holds, a road user does something; the rest is left to SUMO.</Text>
+      <Text size="sm">
+        <Trans>When something holds, a road user does something; the rest is left to SUMO.</Trans>
+      </Text>
       {rules.map((rule) => {
         const draft = draftOf(rule);
         return (
@@ -72,22 +76,22 @@ export function RulesStep({
               onOpen={() => opened(rule.id)}
               onShow={() => onShow(rule)}
             />
-            {open === rule.id && form(draft, "Save the rule")}
+            {open === rule.id && form(draft, t`Save the rule`)}
           </PartCard>
         );
       })}
       {open === "" ? (
-        <section className="fold" aria-label="New rule">
-          {form(newDraft(ids, rules), "Add the rule")}
+        <section className="fold" aria-label={t`New rule`}>
+          {form(newDraft(ids, rules), t`Add the rule`)}
         </section>
       ) : (
         <Button disabled={ids.length === 0} onClick={() => opened("")}>
-          Add a rule
+          <Trans>Add a rule</Trans>
         </Button>
       )}
       {ids.length === 0 && (
         <Text size="sm">
-          {flows.length > 0 ? "Rules are made for single road users." : "Place a road user first."}
+          {flows.length > 0 ? t`Rules are made for single road users.` : t`Place a road user first.`}
         </Text>
       )}
     </>
@@ -95,4 +99,4 @@ export function RulesStep({
 }
 
 export const ruleNote = (rules: readonly Rule[]): string =>
-  rules.length === 0 ? "When this, then that" : count(rules.length, "rule");
+  rules.length === 0 ? t`When this, then that` : plural(rules.length, { one: "# rule", other: "# rules" });

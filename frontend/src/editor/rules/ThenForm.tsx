@@ -1,5 +1,9 @@
 import { Button, Group, Select } from "@mantine/core";
 
+import { t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+import { inSentence } from "../../ui/words";
+import { localized } from "../../language/localized";
 import { nth } from "../../lists";
 import { ListButtons } from "../FormParts";
 import { ACTION_KINDS, actionKind } from "./actionKinds";
@@ -8,7 +12,7 @@ import { type About, FieldInput } from "./FieldInput";
 
 type Then = readonly (readonly Item[])[];
 
-const KINDS = Object.entries(ACTION_KINDS).map(([value, { label }]) => ({ value, label }));
+const KINDS = localized(() => Object.entries(ACTION_KINDS()).map(([value, { label }]) => ({ value, label })));
 
 /** What the road user then does: actions in their order, of which each may be several at once. */
 export function ThenForm({
@@ -29,13 +33,13 @@ export function ThenForm({
   return (
     <>
       {then.map((items, n) => {
-        const label = then.length > 1 ? `Action ${n + 1}` : "Action";
+        const label = then.length > 1 ? t`Action ${n + 1}` : t`Action`;
         return (
           <section key={n} className="fold" aria-label={label}>
             {items.map((item, m) => (
               <ActionForm
                 key={m}
-                label={items.length > 1 ? `${label}, part ${m + 1}` : label}
+                label={items.length > 1 ? t`${label}, part ${m + 1}` : label}
                 item={item}
                 onChange={(next) =>
                   put(
@@ -59,15 +63,15 @@ export function ThenForm({
               <Button
                 size="compact-sm"
                 variant="default"
-                aria-label={`At the same time as ${label.toLowerCase()}`}
+                aria-label={t`At the same time as ${inSentence(label)}`}
                 onClick={() => put(n, [...items, fresh()])}
               >
-                At the same time
+                <Trans>At the same time</Trans>
               </Button>
               {then.length > 1 && (
                 <ListButtons
-                  earlier={`Move ${label.toLowerCase()} earlier`}
-                  removal={`Remove ${label.toLowerCase()}`}
+                  earlier={t`Move ${inSentence(label)} earlier`}
+                  removal={t`Remove ${inSentence(label)}`}
                   first={n === 0}
                   only={false}
                   onEarlier={() => swap(n)}
@@ -79,7 +83,7 @@ export function ThenForm({
         );
       })}
       <Button size="compact-sm" variant="default" onClick={() => onChange([...then, [fresh()]])}>
-        Then another action
+        <Trans>Then another action</Trans>
       </Button>
     </>
   );
@@ -104,7 +108,7 @@ function ActionForm({
     <>
       <Select
         label={label}
-        data={KINDS}
+        data={KINDS()}
         value={item.kind}
         allowDeselect={false}
         onChange={(kind) => {
@@ -125,10 +129,10 @@ function ActionForm({
         <Button
           size="compact-sm"
           variant="default"
-          aria-label={`Remove ${label.toLowerCase()}`}
+          aria-label={t`Remove ${inSentence(label)}`}
           onClick={onRemove}
         >
-          Remove
+          <Trans>Remove</Trans>
         </Button>
       )}
     </>

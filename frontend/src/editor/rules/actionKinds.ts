@@ -1,3 +1,6 @@
+import { plural, t } from "@lingui/core/macro";
+
+import { localized } from "../../language/localized";
 import type { ScenarioDocument } from "../../api/types";
 import {
   amount,
@@ -20,32 +23,37 @@ import { sentence } from "../../ui/words";
 type Action = ScenarioDocument["rules"][number]["then"][number];
 export type ActionKind = Exclude<keyof Action, "together">;
 
-const side = (by: unknown): string =>
-  typeof by === "number"
-    ? `${Math.abs(by)} lane${Math.abs(by) === 1 ? "" : "s"} to the ${by < 0 ? "right" : "left"}`
-    : "…";
+function side(by: unknown): string {
+  if (typeof by !== "number") return "…";
+  const lanes = Math.abs(by);
+  return by < 0
+    ? plural(lanes, { one: "# lane to the right", other: "# lanes to the right" })
+    : plural(lanes, { one: "# lane to the left", other: "# lanes to the left" });
+}
 
-const SHAPES = { linear: "Linear", cosine: "Cosine", step: "At once" };
+const SHAPES = localized(() => ({ linear: t`Linear`, cosine: t`Cosine`, step: t`At once` }));
 const isStep = (values: Values): boolean => values.shape === "step";
 
-const LIGHTS: Record<string, string> = {
-  brake: "brake lights",
-  front: "headlights",
-  high_beam: "high beam",
-  fog: "fog lights",
-  emergency: "emergency lights",
-};
+const LIGHTS = localized((): Record<string, string> => ({
+  brake: t`brake lights`,
+  front: t`headlights`,
+  high_beam: t`high beam`,
+  fog: t`fog lights`,
+  emergency: t`emergency lights`,
+}));
 function lightWords(values: Values): string {
-  const on = Object.entries(LIGHTS).flatMap(([name, word]) => (values[name] === true ? [word] : []));
+  const on = Object.entries(LIGHTS()).flatMap(([name, word]) => (values[name] === true ? [word] : []));
   if (given(values.indicator) && values.indicator !== "off")
-    on.unshift(`indicator ${text(values.indicator)}`);
+    on.unshift(t`indicator ${text(values.indicator)}`);
   const any = Object.values(values).some(given);
-  return any ? `set lights: ${on.length > 0 ? on.join(", ") : "all off"}` : "leave the lights to the driver";
+  return any
+    ? t`set lights: ${on.length > 0 ? on.join(", ") : t`all off`}`
+    : t`leave the lights to the driver`;
 }
 
 function ignored({ red, right_of_way: right }: Values): string {
-  const what = [...(red === false ? [] : ["red lights"]), ...(right === true ? ["right of way"] : [])];
-  return `ignore ${what.length > 0 ? what.join(" and ") : "nothing"}`;
+  const what = [...(red === false ? [] : [t`red lights`]), ...(right === true ? [t`right of way`] : [])];
+  return t`ignore ${what.length > 0 ? what.join(t` and `) : t`nothing`}`;
 }
 
 function pathWords(values: Values): string {
@@ -54,230 +62,236 @@ function pathWords(values: Values): string {
   const timed = Array.isArray(times) && times.length > 0;
   const paced = Array.isArray(speeds) && speeds.length > 0;
   const how = timed
-    ? ", with a time at each"
+    ? t`, with a time at each`
     : paced
-      ? ", with a speed at each"
-      : maybe(values.speed, " at", "km/h", 3.6);
-  const from = given(values.relative_to) ? ` ahead of where ${text(values.relative_to)} is` : "";
-  return `follow a path through ${many} point${many === 1 ? "" : "s"}${from}${how}`;
+      ? t`, with a speed at each`
+      : maybe(values.speed, t` at`, "km/h", 3.6);
+  const from = given(values.relative_to) ? t` ahead of where ${text(values.relative_to)} is` : "";
+  const through = plural(many, { one: "# point", other: "# points" });
+  return t`follow a path through ${through}${from}${how}`;
 }
 
 /** Every kind of action that a document can have. */
-export const ACTION_KINDS: Record<ActionKind, Kind> = {
+export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   cut_in: {
-    label: "Cut in",
-    fields: [TO, OVER, number("gap", "Gap in the end", " m", undefined, { min: 0.1 })],
+    label: t`Cut in`,
+    fields: [TO(), OVER(), number("gap", t`Gap in the end`, " m", undefined, { min: 0.1 })],
     words: (v) =>
-      `cut in before ${text(v.to)} over ${amount(v.over, "s")}` + maybe(v.gap, " with a gap of", "m"),
+      t`cut in before ${text(v.to)} over ${amount(v.over, "s")}` + maybe(v.gap, t` with a gap of`, "m"),
   },
   lane: {
-    label: "Change lane",
+    label: t`Change lane`,
     fields: [
       {
         is: "one",
-        label: "Which lane",
+        label: t`Which lane`,
         of: [
-          number("by", "Lanes to the left (negative: right)", "", 1, { min: -10, max: 10, digits: 0 }),
-          place("to", "Lane to a place"),
+          number("by", t`Lanes to the left (negative: right)`, "", 1, { min: -10, max: 10, digits: 0 }),
+          place("to", t`Lane to a place`),
         ],
       },
-      OVER,
+      OVER(),
     ],
     words: (v) =>
-      `change ${given(v.to) ? `to the lane to ${text(v.to)}` : side(v.by)} over ${amount(v.over, "s")}`,
+      t`change ${given(v.to) ? t`to the lane to ${text(v.to)}` : side(v.by)} over ${amount(v.over, "s")}`,
   },
   speed: {
-    label: "Reach a speed",
+    label: t`Reach a speed`,
     fields: [
-      speed("to", "Speed", 10),
-      { is: "choice", name: "shape", label: "Change of speed", choices: SHAPES },
+      speed("to", t`Speed`, 10),
+      { is: "choice", name: "shape", label: t`Change of speed`, choices: SHAPES() },
       {
         is: "one",
-        label: "How",
+        label: t`How`,
         of: [
-          number("rate", "At a rate", " m/s²", 2, { min: 0.1, max: 100 }),
-          number("over", "In a time", " s", 3, { min: 0.1 }),
-          number("within", "In a distance", " m", 20, { min: 0.1 }),
+          number("rate", t`At a rate`, " m/s²", 2, { min: 0.1, max: 100 }),
+          number("over", t`In a time`, " s", 3, { min: 0.1 }),
+          number("within", t`In a distance`, " m", 20, { min: 0.1 }),
         ],
         without: isStep,
       },
     ],
     words: (v) => {
       const how = isStep(v)
-        ? "at once"
+        ? t`at once`
         : given(v.rate)
-          ? `at ${amount(v.rate, "m/s²")}`
+          ? t`at ${amount(v.rate, "m/s²")}`
           : given(v.over)
-            ? `over ${amount(v.over, "s")}`
-            : `within ${amount(v.within, "m")}`;
-      return `reach ${amount(v.to, "km/h", 3.6)} ${how}${v.shape === "cosine" ? ", smoothly" : ""}`;
+            ? t`over ${amount(v.over, "s")}`
+            : t`within ${amount(v.within, "m")}`;
+      return t`reach ${amount(v.to, "km/h", 3.6)} ${how}${v.shape === "cosine" ? t`, smoothly` : ""}`;
     },
   },
   brake: {
-    label: "Brake",
+    label: t`Brake`,
     fields: [
-      number("by", "Deceleration", " m/s²", 6, { min: 0.1, max: 100 }),
-      number("hold", "Drives on after", " s", undefined, { max: 1e6 }),
+      number("by", t`Deceleration`, " m/s²", 6, { min: 0.1, max: 100 }),
+      number("hold", t`Drives on after`, " s", undefined, { max: 1e6 }),
     ],
     words: (v) =>
-      `brake at ${amount(v.by, "m/s²")} to a standstill` + maybe(v.hold, " and drive on after", "s"),
+      t`brake at ${amount(v.by, "m/s²")} to a standstill` + maybe(v.hold, t` and drive on after`, "s"),
   },
   stop: {
-    label: "Stop",
-    fields: [number("within", "Within", " m", undefined, { min: 0.1 })],
-    words: (v) => (given(v.within) ? `stop within ${amount(v.within, "m")}` : "stop at once"),
+    label: t({ message: "Stop", context: "a vehicle" }),
+    fields: [number("within", t`Within`, " m", undefined, { min: 0.1 })],
+    words: (v) => (given(v.within) ? t`stop within ${amount(v.within, "m")}` : t`stop at once`),
   },
-  go: { label: "Resume", fields: [], words: () => "resume its own speed" },
+  go: { label: t`Resume`, fields: [], words: () => t`resume its own speed` },
   offset: {
-    label: "Move within the lane",
-    fields: [number("to", "Left of the lane's centre", " m", 0.5, { min: -10, max: 10, digits: 2 }), OVER],
-    words: (v) =>
-      `move to ${amount(typeof v.to === "number" ? Math.abs(v.to) : v.to, "m")} ${
-        typeof v.to === "number" && v.to < 0 ? "right" : "left"
-      } of the lane's centre over ${amount(v.over, "s")}`,
+    label: t`Move within the lane`,
+    fields: [number("to", t`Left of the lane's centre`, " m", 0.5, { min: -10, max: 10, digits: 2 }), OVER()],
+    words: (v) => {
+      const far = amount(typeof v.to === "number" ? Math.abs(v.to) : v.to, "m");
+      const over = amount(v.over, "s");
+      return typeof v.to === "number" && v.to < 0
+        ? t`move to ${far} right of the lane's centre over ${over}`
+        : t`move to ${far} left of the lane's centre over ${over}`;
+    },
   },
   keep_gap: {
-    label: "Keep a gap",
+    label: t`Keep a gap`,
     fields: [
-      TO,
+      TO(),
       {
         is: "one",
-        label: "Gap",
+        label: t`Gap`,
         of: [
-          number("metres", "In metres", " m", 10, { min: 0.1 }),
-          number("seconds", "In seconds", " s", 2, { min: 0.1 }),
+          number("metres", t`In metres`, " m", 10, { min: 0.1 }),
+          number("seconds", t`In seconds`, " s", 2, { min: 0.1 }),
         ],
       },
-      { is: "flag", name: "ahead", label: "Ahead of it, not behind", otherwise: false },
-      number("rate", "Acceleration at most", " m/s²", 3, { min: 0.1, max: 100 }),
-      number("lasting", "For", " s", undefined, { min: 0.1 }),
-      { is: "flag", name: "once", label: "Only until it is reached", otherwise: false },
+      { is: "flag", name: "ahead", label: t`Ahead of it, not behind`, otherwise: false },
+      number("rate", t`Acceleration at most`, " m/s²", 3, { min: 0.1, max: 100 }),
+      number("lasting", t`For`, " s", undefined, { min: 0.1 }),
+      { is: "flag", name: "once", label: t`Only until it is reached`, otherwise: false },
     ],
-    words: (v) =>
-      `${v.once === true ? "reach" : "keep"} a gap of ` +
-      `${given(v.metres) ? amount(v.metres, "m") : amount(v.seconds, "s")} ` +
-      `${v.ahead === true ? "ahead of" : "to"} ${text(v.to)}` +
-      `, at ${amount(v.rate, "m/s²")} at most` +
-      maybe(v.lasting, ", for", "s"),
+    words: (v) => {
+      const gap = given(v.metres) ? amount(v.metres, "m") : amount(v.seconds, "s");
+      const whom = v.ahead === true ? t`ahead of ${text(v.to)}` : t`to ${text(v.to)}`;
+      const how = t`, at ${amount(v.rate, "m/s²")} at most` + maybe(v.lasting, t`, for`, "s");
+      return v.once === true ? t`reach a gap of ${gap} ${whom}${how}` : t`keep a gap of ${gap} ${whom}${how}`;
+    },
   },
   walk: {
-    label: "Walk to",
+    label: t`Walk to`,
     fields: [
-      place("to", "Place"),
-      { is: "points", name: "through", label: "Through", timed: false },
-      number("speed", "Speed", " km/h", undefined, { min: 0.1, max: 54, scale: 3.6 }),
+      place("to", t`Place`),
+      { is: "points", name: "through", label: t`Through`, timed: false },
+      number("speed", t`Speed`, " km/h", undefined, { min: 0.1, max: 54, scale: 3.6 }),
     ],
     words: (v) => {
       const through =
-        Array.isArray(v.through) && v.through.length > 0 ? ` through ${v.through.length} others` : "";
-      return `walk to ${text(v.to)}${through}${maybe(v.speed, " at", "km/h", 3.6)}`;
+        Array.isArray(v.through) && v.through.length > 0
+          ? ` ${plural(v.through.length, { one: "through # other", other: "through # others" })}`
+          : "";
+      return t`walk to ${text(v.to)}${through}${maybe(v.speed, t` at`, "km/h", 3.6)}`;
     },
   },
   goal: {
-    label: "Change its goal",
-    fields: [{ is: "place", name: "to", label: "Goal", by: "goal", hint: "a node" }],
-    words: (v) => `go to ${text(v.to)} instead`,
+    label: t`Change its goal`,
+    fields: [{ is: "place", name: "to", label: t`Goal`, by: "goal", hint: t`a node` }],
+    words: (v) => t`go to ${text(v.to)} instead`,
   },
   path: {
-    label: "Follow a path",
+    label: t`Follow a path`,
     fields: [
-      { is: "points", name: "points", label: "Points", timed: true },
+      { is: "points", name: "points", label: t`Points`, timed: true },
       {
         is: "actor",
         name: "relative_to",
-        label: "Metres ahead and left of (empty: places of the map)",
+        label: t`Metres ahead and left of (empty: places of the map)`,
         optional: true,
       },
     ],
     words: pathWords,
   },
   replay: {
-    label: "Follow a recorded trajectory",
-    fields: [{ is: "rows", name: "rows", label: "Trajectory" }],
-    words: (v) => `follow a trajectory of ${Array.isArray(v.rows) ? v.rows.length : 0} recorded rows`,
+    label: t`Follow a recorded trajectory`,
+    fields: [{ is: "rows", name: "rows", label: t`Trajectory` }],
+    words: (v) => t`follow a trajectory of ${Array.isArray(v.rows) ? v.rows.length : 0} recorded rows`,
   },
   arrive: {
-    label: "Arrive together",
+    label: t`Arrive together`,
     fields: [
-      place("at", "Arrives at"),
-      TO,
-      place("when_at", "When the other one is at"),
-      number("speed", "Speed on arrival", " km/h", undefined, { max: 360, scale: 3.6 }),
+      place("at", t`Arrives at`),
+      TO(),
+      place("when_at", t`When the other one is at`),
+      number("speed", t`Speed on arrival`, " km/h", undefined, { max: 360, scale: 3.6 }),
       {
-        ...number("steady", "Reached before the place", " m"),
+        ...number("steady", t`Reached before the place`, " m"),
         without: (v) => !given(v.speed) && !v.steady,
       },
     ],
     words: (v) =>
-      `arrive at ${text(v.at)} when ${text(v.to)} is at ${text(v.when_at)}` +
-      maybe(v.speed, ", at", "km/h", 3.6) +
-      (v.steady === 0 ? "" : maybe(v.steady, " for the last", "m")),
+      t`arrive at ${text(v.at)} when ${text(v.to)} is at ${text(v.when_at)}` +
+      maybe(v.speed, t`, at`, "km/h", 3.6) +
+      (v.steady === 0 ? "" : maybe(v.steady, t` for the last`, "m")),
   },
   appear: {
-    label: "Appear",
+    label: t`Appear`,
     fields: [
-      { is: "pose", name: "at", label: "Appears at" },
-      number("speed", "Speed", " km/h", undefined, { max: 360, scale: 3.6 }),
+      { is: "pose", name: "at", label: t`Appears at` },
+      number("speed", t`Speed`, " km/h", undefined, { max: 360, scale: 3.6 }),
     ],
     words: (v) =>
-      `appear${Array.isArray(v.at) ? ` at ${text(v.at.slice(0, 2))}` : ""}${maybe(v.speed, " at", "km/h", 3.6)}`,
+      t`appear${Array.isArray(v.at) ? t` at ${text(v.at.slice(0, 2))}` : ""}${maybe(v.speed, t` at`, "km/h", 3.6)}`,
   },
-  end: { label: "End the run", fields: [], words: () => "end the run" },
-  vanish: { label: "Leave the simulation", fields: [], words: () => "leave the simulation" },
+  end: { label: t`End the run`, fields: [], words: () => t`end the run` },
+  vanish: { label: t`Leave the simulation`, fields: [], words: () => t`leave the simulation` },
   signal: {
-    label: "Switch a traffic light",
+    label: t`Switch a traffic light`,
     fields: [
       light(),
       {
         is: "choice",
         name: "shows",
-        label: "To",
-        choices: { green: "Green for a movement", off: "Off", program: "Its program" },
+        label: t({ message: "To", context: "a state" }),
+        choices: { green: t`Green for a movement`, off: t`Off`, program: t`Its program` },
       },
       { ...movement(), without: (values) => values.shows === "off" || values.shows === "program" },
     ],
     words: (v) => {
-      if (v.shows === "off") return `switch light ${text(v.light)} off`;
-      if (v.shows === "program") return `let light ${text(v.light)} run its program again`;
-      return `switch light ${text(v.light)} to green for ${text(v.movement)}`;
+      if (v.shows === "off") return t`switch light ${text(v.light)} off`;
+      if (v.shows === "program") return t`let light ${text(v.light)} run its program again`;
+      return t`switch light ${text(v.light)} to green for ${text(v.movement)}`;
     },
   },
   lights: {
-    label: "Set its lights",
+    label: t`Set its lights`,
     fields: [
       {
         is: "choice",
         name: "indicator",
-        label: "Indicator",
-        choices: { off: "Off", left: "Left", right: "Right", hazard: "Hazard lights" },
+        label: t`Indicator`,
+        choices: { off: t`Off`, left: t`Left`, right: t`Right`, hazard: t`Hazard lights` },
         optional: true,
       },
-      ...Object.entries(LIGHTS).map(([name, word]) => ({
+      ...Object.entries(LIGHTS()).map(([name, word]) => ({
         is: "choice" as const,
         name,
         label: sentence(word),
-        choices: { true: "On", false: "Off" },
+        choices: { true: t`On`, false: t`Off` },
         optional: true,
       })),
     ],
     words: lightWords,
   },
-  horn: { label: "Sound the horn", fields: [], words: () => "sound the horn" },
+  horn: { label: t`Sound the horn`, fields: [], words: () => t`sound the horn` },
   ignore: {
-    label: "Ignore traffic rules",
+    label: t`Ignore traffic rules`,
     fields: [
-      { is: "flag", name: "red", label: "Red lights", otherwise: true },
-      { is: "flag", name: "right_of_way", label: "Right of way", otherwise: false },
+      { is: "flag", name: "red", label: t`Red lights`, otherwise: true },
+      { is: "flag", name: "right_of_way", label: t`Right of way`, otherwise: false },
     ],
     words: ignored,
   },
-  release: { label: "Release", fields: [], words: () => "drive as if there had been no rule" },
+  release: { label: t`Release`, fields: [], words: () => t`drive as if there had been no rule` },
   own: {
-    label: "Of an installed package",
-    fields: OWN,
-    words: (v) => `do ${text(v.kind)} of an installed package`,
+    label: t`Of an installed package`,
+    fields: OWN(),
+    words: (v) => t`do ${text(v.kind)} of an installed package`,
   },
-};
+}));
 
 export const actionKind = (kind: string): Kind | undefined =>
-  (ACTION_KINDS as Partial<Record<string, Kind>>)[kind];
+  (ACTION_KINDS() as Partial<Record<string, Kind>>)[kind];

@@ -1,3 +1,6 @@
+import { t } from "@lingui/core/macro";
+
+import { short } from "../../language/numbers";
 import type { EditOf, ScenarioDocument } from "../../api/types";
 import { actionKind } from "./actionKinds";
 import { conditionKind } from "./conditionKinds";
@@ -100,14 +103,14 @@ function conditionWords(condition: Condition, actor: string, inner = false): str
   const words = isGroup(condition)
     ? groupWords(condition, actor, inner)
     : (conditionKind(condition.kind)?.words(condition.values, actor) ?? condition.kind);
-  const rising = edge === "rising" ? `${words} (as it becomes true)` : words;
-  return delay > 0 ? `${rising} (${Number(delay.toFixed(2))} s later)` : rising;
+  const rising = edge === "rising" ? t`${words} (as it becomes true)` : words;
+  return delay > 0 ? t`${rising} (${short(delay, 2)} s later)` : rising;
 }
 
 function groupWords({ join, of }: ConditionGroup, actor: string, inner: boolean): string {
   const parts = of.map((one) => conditionWords(one, actor, true));
-  if (join === "not") return `not (${parts.join("")})`;
-  const words = parts.join(join === "all" ? " and " : " or ");
+  if (join === "not") return t`not (${parts.join("")})`;
+  const words = parts.join(join === "all" ? t` and ` : t` or `);
   return inner && parts.length > 1 ? `(${words})` : words;
 }
 
@@ -115,14 +118,14 @@ function groupWords({ join, of }: ConditionGroup, actor: string, inner: boolean)
 export function sentence({ actor, when, then, times }: Draft): string {
   const { delay, edge } = when;
   const words = conditionWords({ ...when, ...NOW }, actor);
-  const first = edge === "rising" ? `it becomes true that ${words}` : words;
-  const wait = delay > 0 ? `, ${Number(delay.toFixed(2))} s later` : "";
+  const first = edge === "rising" ? t`it becomes true that ${words}` : words;
+  const wait = delay > 0 ? t`, ${short(delay, 2)} s later` : "";
   const acts = then
     .map((items) =>
-      items.map(({ kind, values }) => actionKind(kind)?.words(values, actor) ?? kind).join(" and at once "),
+      items.map(({ kind, values }) => actionKind(kind)?.words(values, actor) ?? kind).join(t` and at once `),
     )
-    .join(", then ");
-  return `When ${first}${wait}, ${acts}${times > 1 ? `, up to ${times} times` : ""}.`;
+    .join(t`, then `);
+  return t`When ${first}${wait}, ${acts}${times > 1 ? t`, up to ${times} times` : ""}.`;
 }
 
 // New parts
@@ -198,8 +201,8 @@ export function missing({ id, actor, when, then }: Draft): string[] {
       })
       .map(({ label }) => label);
   return [
-    ...(id.trim() ? [] : ["Name"]),
-    ...(actor ? [] : ["Who acts"]),
+    ...(id.trim() ? [] : [t`Name`]),
+    ...(actor ? [] : [t`Who acts`]),
     ...leavesOf(when).flatMap((one) => of(one, conditionKind(one.kind))),
     ...then.flat().flatMap((one) => of(one, actionKind(one.kind))),
   ];

@@ -1,3 +1,8 @@
+import { t } from "@lingui/core/macro";
+
+import { shownAs } from "../../language/units";
+import { short } from "../../language/numbers";
+import { localized } from "../../language/localized";
 import type { PickBy } from "../pick";
 
 /** Fields of a condition or action, without those that are not given. */
@@ -83,35 +88,40 @@ export const place = (name: string, label: string): PlainField => ({
   name,
   label,
   by: "place",
-  hint: "a node, or x, y in metres",
+  hint: t`a node, or x, y in metres`,
 });
 
 export const light = (): PlainField => ({
   is: "place",
   name: "light",
-  label: "Traffic light",
+  label: t`Traffic light`,
   by: "light",
-  hint: "its junction",
+  hint: t`its junction`,
 });
 
 export const movement = (): PlainField => ({
   is: "place",
   name: "movement",
-  label: "Movement",
+  label: t`Movement`,
   by: "turn",
-  hint: "r1>r2, or walk r1",
+  hint: t`r1>r2, or walk r1`,
 });
 
-export const OF: Field = { is: "actor", name: "of", label: "Whose (its own if empty)", optional: true };
-export const TO: Field = { is: "actor", name: "to", label: "Other road user" };
-export const OVER = number("over", "Duration", " s", 3, { min: 0.1 });
+export const OF = localized((): Field => ({
+  is: "actor",
+  name: "of",
+  label: t`Whose (its own if empty)`,
+  optional: true,
+}));
+export const TO = localized((): Field => ({ is: "actor", name: "to", label: t`Other road user` }));
+export const OVER = localized(() => number("over", t`Duration`, " s", 3, { min: 0.1 }));
 
 /** Of a kind that an installed package gives. */
-export const OWN: readonly Field[] = [
-  { is: "name", name: "kind", label: "Its name" },
-  { is: "given", name: "values", label: "Values" },
-  { is: "actor", name: "to", label: "Other road user (may be empty)", optional: true },
-];
+export const OWN = localized((): readonly Field[] => [
+  { is: "name", name: "kind", label: t`Its name` },
+  { is: "given", name: "values", label: t`Values` },
+  { is: "actor", name: "to", label: t`Other road user (may be empty)`, optional: true },
+]);
 
 /** Values by name, as in "gap 3, side left". */
 export const listed = (values: unknown): string =>
@@ -122,10 +132,10 @@ export const listed = (values: unknown): string =>
 /** Below or above a value. */
 export const bound = (suffix: string, start: number, scale = 1, min = 0): Field => ({
   is: "one",
-  label: "Bound",
+  label: t`Bound`,
   of: [
-    number("below", "Below", suffix, start, { digits: 2, scale, min, max: 1e6 }),
-    number("above", "Above", suffix, start, { digits: 2, scale, min, max: 1e6 }),
+    number("below", t`Below`, suffix, start, { digits: 2, scale, min, max: 1e6 }),
+    number("above", t`Above`, suffix, start, { digits: 2, scale, min, max: 1e6 }),
   ],
 });
 
@@ -140,8 +150,12 @@ export const text = (value: unknown): string =>
       ? value
       : "…";
 
-export const amount = (value: unknown, unit: string, scale = 1): string =>
-  typeof value !== "number" ? `… ${unit}` : `${Number((value * scale).toFixed(2))} ${unit}`;
+export function amount(value: unknown, unit: string, scale = 1): string {
+  const shown = shownAs(` ${unit}`);
+  return typeof value === "number"
+    ? `${short(value * scale * shown.scale, 2)}${shown.suffix}`
+    : `…${shown.suffix}`;
+}
 
 /** Words with an amount if there is one. */
 export const maybe = (value: unknown, words: string, unit: string, scale = 1): string =>
@@ -149,10 +163,10 @@ export const maybe = (value: unknown, words: string, unit: string, scale = 1): s
 
 export const limit = (values: Values, unit: string, scale = 1): string =>
   given(values.above)
-    ? `above ${amount(values.above, unit, scale)}`
-    : `below ${amount(values.below, unit, scale)}`;
+    ? t`above ${amount(values.above, unit, scale)}`
+    : t`below ${amount(values.below, unit, scale)}`;
 
 export const whose = (values: Values, actor: string): string => (given(values.of) ? text(values.of) : actor);
 
 export const between = (values: Values): string =>
-  given(values.of) ? `of ${text(values.of)} to ${text(values.to)}` : `to ${text(values.to)}`;
+  given(values.of) ? t`of ${text(values.of)} to ${text(values.to)}` : t`to ${text(values.to)}`;

@@ -1,3 +1,5 @@
+import { t } from "@lingui/core/macro";
+
 import type { Bounds, ScenarioDocument } from "../../api/types";
 import type { Graph, Place } from "../../map/graph";
 import type { SceneLine, ScenePin } from "../../map/scene";
@@ -46,7 +48,7 @@ function addRule(
   };
   for (const { kind, values } of leavesOf(when)) {
     const at = pointOf(graph, values.place);
-    pin(values.place, "?", `${id}: when`);
+    pin(values.place, "?", t`${id}: when`);
     const within = kind === "reaches" ? values.within : kind === "distance" ? values.below : null;
     if (at && typeof within === "number") lines.push({ points: circle(at, within), strong, arrow: false });
   }
@@ -70,16 +72,16 @@ function signsOf(kind: string, values: Item["values"]): [unknown, string, string
     case "arrive":
       return [
         [values.at, "!", "arrives"],
-        [values.when_at, "?", `when ${String(values.to)} is here`],
+        [values.when_at, "?", t`when ${String(values.to)} is here`],
       ];
     case "appear":
       return [[Array.isArray(values.at) ? values.at.slice(0, 2) : null, "+", "appears"]];
     case "lane":
-      return [[values.to, "!", "lane to"]];
+      return [[values.to, "!", t`lane to`]];
     case "goal":
       return [[values.to, "■", "goal"]];
     case "walk":
-      return [[values.to, "■", "walks to"]];
+      return [[values.to, "■", t`walks to`]];
     default:
       return [];
   }

@@ -1,0 +1,29 @@
+import { i18n, type Messages } from "@lingui/core";
+
+import { type Language, LANGUAGES, usePreferences } from "./preferences";
+
+/** The catalogues, each loaded when its language is first chosen. */
+const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
+  en: () => import("../locales/en.po"),
+  de: () => import("../locales/de.po"),
+};
+
+/** Shows the page in a language; what is shown changes when its catalogue is there. */
+async function speak(language: Language): Promise<void> {
+  const { messages } = await CATALOGUES[language]();
+  // Another may have been chosen meanwhile.
+  if (usePreferences.getState().language !== language) return;
+  i18n.loadAndActivate({ locale: language, messages });
+  document.documentElement.lang = language;
+}
+
+/** Loads the language of this reader, and follows their choice from then on. */
+export async function startSpeaking(): Promise<void> {
+  usePreferences.subscribe(({ language }, before) => {
+    if (language !== before.language) void speak(language);
+  });
+  await speak(usePreferences.getState().language);
+}
+
+export const languageChoices = (): { value: Language; label: string }[] =>
+  (Object.keys(LANGUAGES) as Language[]).map((value) => ({ value, label: LANGUAGES[value] }));
