@@ -50,7 +50,7 @@ def scenario_arrays(workspace: Workspace, scenario: Scenario | Path) -> dict[str
 def scenario_from_arrays(arrays: Mapping[str, Array]) -> Scenario:
     """Make a scenario of its arrays, as they were written or as they have been changed.
 
-    Nothing is run or placed: :func:`odscen.check` says what is wrong with it on its map.
+    Nothing is run or placed: ``odscen.check`` says what is wrong with it on its map.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def _arrays(
 
 
 def _read(stream: IO[bytes], size: int) -> Array:
-    """One array; :class:`ValueError` says what is wrong with it."""
+    """One array; ``ValueError`` says what is wrong with it."""
     version = np.lib.format.read_magic(stream)
     readers = {
         (1, 0): np.lib.format.read_array_header_1_0,

@@ -57,7 +57,9 @@ def from_npz(data: bytes, *, file: str | None = None) -> Scenario:
 
 
 def from_arrays(arrays: Mapping[str, Array], *, file: str | None = None) -> Scenario:
-    """Read a scenario from its array form; inverse of :func:`~.array_form.to_arrays`.
+    """Read a scenario from its array form.
+
+    Inverse of :func:`~odscen.scenario.forms.array_form.to_arrays`.
 
     Parameters
     ----------
