@@ -22,7 +22,8 @@ export function RunGone({
       </Title>
       <Alert color="red">
         {watched
-          ? "It was removed, or the server was ended by force while it went on and nothing of it is kept. The scenario is as it was; run again, it gives the same results."
+          ? "It was removed, or the server was ended by force while it went on, and nothing of it is kept. " +
+            "The scenario is as it was; run again, it gives the same results."
           : reason}
       </Alert>
       <Group mt="md" gap="xs">
