@@ -24,11 +24,13 @@ export function RunGone({
       </Title>
       <Alert color="red">
         {watched
-          ? t`It was removed, or the server was ended by force while it went on and nothing of it is kept. The scenario is as it was; run again, it gives the same results.`
+          ? t`It was removed, or the server was ended by force while it went on, and nothing of it is kept. The scenario is as it was; run again, it gives the same results.`
           : reason}
       </Alert>
       <Group mt="md" gap="xs">
-        <Button onClick={() => go({ view: "editor", scenario })}><Trans>Back to the editor</Trans></Button>
+        <Button onClick={() => go({ view: "editor", scenario })}>
+          <Trans>Back to the editor</Trans>
+        </Button>
         {watched && (
           <Button variant="default" loading={busy} onClick={() => start({ scenario, speed: 1 })}>
             <Trans>Run again</Trans>
