@@ -1,12 +1,12 @@
 """Time and memory as the network and its traffic grow, against bare ``sumo``.
 
-``python -m bench network_size [MAP...] [--vehicles N...] [--seconds S]``: each map (the shipped
-town, and ten of it joined, if not given; ``python -m tools.make_maps --only towns_100`` writes a
-hundred) is added, scenarios with so many vehicles under way at once are sampled on it, and each is
-run by ``odscen run --no-report`` and by ``sumo`` from the same files with the same output. Wall
-seconds, CPU seconds and memory of each, with all processes that it has started: CPU seconds are
-the figure to compare on a machine with other work. Memory is the most that all of them held at one
-time (pages that they share count once for each), looked at five times a second.
+``python -m bench network_size [--maps MAP...] [--vehicles N...] [--seconds S]``: each map (the
+shipped town, and ten of it joined, if not given; ``python -m tools.make_maps --only towns_100``
+writes a hundred) is added, scenarios with so many vehicles under way at once are sampled on it, and
+each is run by ``odscen run --no-report`` and by ``sumo`` from the same files with the same output.
+Wall seconds, CPU seconds and memory of each, with all processes that it has started: CPU seconds
+are the figure to compare on a machine with other work. Memory is the most that all of them held at
+one time (pages that they share count once for each), looked at five times a second.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Cost(NamedTuple):
 
 def main() -> None:
     options = argparse.ArgumentParser(prog="bench network_size")
-    options.add_argument("maps", nargs="*", type=Path)
+    options.add_argument("--maps", nargs="+", type=Path)
     options.add_argument("--vehicles", type=int, nargs="+", default=[1000])
     options.add_argument("--seconds", type=float, default=120.0, help="simulated")
     options.add_argument("--workspace", type=Path, help="one that has the maps already")

@@ -32,7 +32,7 @@ from pathlib import Path
 
 import dask
 import psutil
-from distributed import LocalCluster
+from distributed import LocalCluster, Status
 
 from bench.studies import QUIET
 from odscen.app.studies.map_packs import CACHE_VARIABLE
@@ -211,10 +211,16 @@ def killed_workers(trial: Trial, every: float) -> None:
 
         def go_on() -> None:
             while not ended.wait(every):
-                workers = [one.pid for one in cluster.workers.values() if one.pid is not None]
-                killed.append(workers[len(killed) % len(workers)] if workers else 0)
-                with suppress(ProcessLookupError):
-                    os.kill(killed[-1] or 2**22 + 1, signal.SIGKILL)
+                # A nanny gives up for good if its worker dies before it has started.
+                workers = [
+                    one.process.pid
+                    for one in cluster.workers.values()
+                    if one.process is not None and one.process.status is Status.running
+                ]
+                if workers:
+                    killed.append(workers[len(killed) % len(workers)])
+                    with suppress(ProcessLookupError):
+                        os.kill(killed[-1], signal.SIGKILL)
 
         killer = threading.Thread(target=go_on)
         began = time.perf_counter()
@@ -223,8 +229,7 @@ def killed_workers(trial: Trial, every: float) -> None:
         ended.set()
         killer.join()
         took = time.perf_counter() - began
-    count = sum(1 for one in killed if one)
-    trial.told(f"Dask, {count} workers killed in {took:.0f} s, exit code {code}")
+    trial.told(f"Dask, {len(killed)} workers killed in {took:.0f} s, exit code {code}")
 
 
 def killed_scheduler(trial: Trial) -> None:
