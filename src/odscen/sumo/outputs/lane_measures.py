@@ -80,7 +80,8 @@ def lane_table(
         schema={"lane": pl.String, "length": pl.Float64},
     )
     # SUMO leads teleported vehicles over the first lane of an edge, be it a sidewalk.
-    rows, entered = _named(lanes, lengths).join(own, on="lane"), ()
+    rows = _named(lanes, lengths).join(own, on="lane")
+    entered: tuple[pl.Expr, ...] = ()
     if emissions is not None:
         measured = _named(emissions, lengths).select("begin", "lane", *_emitted())
         rows = rows.join(measured, on=["begin", "lane"], how="left")
