@@ -59,7 +59,7 @@ def beyond_columns(ways: Ways, states: GapStates) -> FloatArray:
     pace = np.where(room < _ROOM[-1], np.maximum(speed, 0.0) / 15.0, 1.0)
     slowest = np.ones(count)
     np.minimum.at(slowest, ways.root, pace)
-    means = (
+    means: tuple[FloatArray, ...] = (
         np.exp(-room / 30.0),
         stands * np.exp(-room / 20.0),
         near,
