@@ -49,8 +49,8 @@ def beyond_columns(ways: Ways, states: GapStates) -> FloatArray:
     speed = np.where(taken, states.speed[entry], states.leader[entry])
     seen = speed >= 0.0
     room = np.where(seen, np.clip(gap, 0.0, FREE), FREE)
-    stands = seen & (speed < STOPPED)
-    near = np.minimum(states.near[entry] + taken, 4.0) / 4.0
+    stands = (seen & (speed < STOPPED)).astype(np.float64)
+    near: FloatArray = np.minimum(states.near[entry] + taken, 4.0) / 4.0
     behind = states.queue[entry]
     queue = np.where(taken, np.where(speed < STOPPED, behind + 1.0, 0.0), behind)
     count = len(states.gap)

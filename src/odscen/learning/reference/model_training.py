@@ -91,9 +91,9 @@ class TrainingSettings:
     """
 
     seed: int = 0
-    epochs: int = 12
+    epochs: int = 24
     empty: float = 8.0
-    decay: float = 0.3
+    decay: float = 0.0
     balance: float = 0.5
 
 
