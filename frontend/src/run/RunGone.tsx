@@ -28,7 +28,9 @@ export function RunGone({
           : reason}
       </Alert>
       <Group mt="md" gap="xs">
-        <Button onClick={() => go({ view: "editor", scenario })}><Trans>Back to the editor</Trans></Button>
+        <Button onClick={() => go({ view: "editor", scenario })}>
+          <Trans>Back to the editor</Trans>
+        </Button>
         {watched && (
           <Button variant="default" loading={busy} onClick={() => start({ scenario, speed: 1 })}>
             <Trans>Run again</Trans>

@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 
 import { preferences } from "../language/preferences";
 import { localized } from "../language/localized";
+import { served } from "../language/served";
 import { longClock, sentence } from "../ui/words";
 import type { FigureInfo } from "../api/figures";
 import type { RunState, Summary } from "../api/runs";
@@ -41,8 +42,8 @@ const say = (n: number, { display }: FigureInfo): string =>
   display.clock ? longClock(n, n) : plain(n, display);
 const words = ({ name, label, definition }: FigureInfo) => ({
   name,
-  label: sentence(label),
-  definition,
+  label: sentence(served(label)),
+  definition: served(definition),
 });
 
 /** The key figures of a run; those that the run has not are left out. */

@@ -28,8 +28,7 @@ function bare(path: string): string[] {
     if (ts.isPropertyAssignment(node) && SHOWN.test(node.name.getText()))
       if (ts.isStringLiteralLike(node.initializer) && node.name.getText() !== "action")
         say(node, node.initializer.text);
-    const inside =
-      translated || (ts.isJsxElement(node) && node.openingElement.tagName.getText() === "Trans");
+    const inside = translated || (ts.isJsxElement(node) && node.openingElement.tagName.getText() === "Trans");
     ts.forEachChild(node, (child) => visit(child, inside));
   };
   visit(source, false);
