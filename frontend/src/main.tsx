@@ -1,5 +1,6 @@
 import "@mantine/core/styles.css";
 import "./ui/app.css";
+import "./ui/narrow.css";
 
 import { i18n } from "@lingui/core";
 import { I18nProvider } from "@lingui/react";

@@ -1,4 +1,4 @@
-"""Finds texts of which a part can neither be seen nor scrolled to."""
+"""Finds texts of which a part can neither be seen nor scrolled to; fields scroll by themselves."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ _CLIPPED = """() => {
     const parent = node.parentElement;
     const seen = parent.checkVisibility({ opacityProperty: true, visibilityProperty: true });
     if (!seen || !node.data.trim()) continue;
-    if (parent.closest("script, style, svg, [aria-hidden=true]")) continue;
+    // A link that is shown when it has the focus.
+    if (parent.closest("script, style, svg, [aria-hidden=true], .skip")) continue;
     const range = document.createRange();
     range.selectNodeContents(node);
     for (const box of range.getClientRects()) {
@@ -50,11 +51,6 @@ _CLIPPED = """() => {
         break;
       }
     }
-  }
-  for (const input of document.querySelectorAll("input:not([type=hidden])")) {
-    if (!input.value || !input.checkVisibility() || input === document.activeElement) continue;
-    if (input.scrollWidth > input.clientWidth + SLACK)
-      found.push(`"${input.value.slice(0, 60)}" by its field`);
   }
   return [...new Set(found)];
 }"""

@@ -64,7 +64,7 @@ def test_a_scenario_is_made_and_run_in_german(
     ).click()
     with page.expect_response(lambda answer: "/edits" in answer.url):
         page.get_by_role("button", name="Nächsten freien Punkt verwenden").click()
-    expect(page.get_by_text("Alle Änderungen gespeichert")).to_be_visible()
+    expect(page.get_by_text("Alles gespeichert")).to_be_visible()
     assert len(user.document()["actors"]) == before + 1
     page.keyboard.press("Escape")
     wrong += look(page, "editor")

@@ -24,7 +24,7 @@ def taken(user: OdscenPage, folder: Path, menu: str, entry: str) -> Path:
     user.page.get_by_role("button", name=menu).click()
     with user.page.expect_download() as download:
         user.page.get_by_role("menuitem", name=entry).click()
-    path = folder / download.value.suggested_filename
+    path = folder / f"{len(list(folder.iterdir()))}-{download.value.suggested_filename}"
     download.value.save_as(path)
     return path
 

@@ -1,3 +1,4 @@
+import { VisuallyHidden } from "@mantine/core";
 import { useCallback, useMemo, useRef, useState } from "react";
 
 import { type Assets, CATEGORIES, type MapDetails } from "../api/types";
@@ -127,6 +128,7 @@ export function Editor({
   });
   return (
     <div className="editor">
+      <VisuallyHidden component="h1">{scenario.document.name}</VisuallyHidden>
       <HeadTools
         store={store}
         onFind={openFinding}

@@ -4,7 +4,7 @@ import { Trans } from "@lingui/react/macro";
 
 import "./run.css";
 
-import { Loader, Tabs } from "@mantine/core";
+import { Loader, Tabs, VisuallyHidden } from "@mantine/core";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { FitRow } from "../api/runs";
@@ -181,6 +181,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     );
   return (
     <div className="run">
+      <VisuallyHidden component="h1">{t`Run ${run}`}</VisuallyHidden>
       <div className="run-body">
         <div className="run-map">
           {drawing ? (
@@ -323,6 +324,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
             </Tabs.Panel>
             {shownJunction && lights.heads && (
               <Tabs.Panel value="lights" className="run-panel">
+                <VisuallyHidden component="h2">Traffic lights</VisuallyHidden>
                 <SignalPanel
                   junctions={lights.heads.junctions}
                   junction={shownJunction}

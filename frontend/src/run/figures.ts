@@ -71,7 +71,7 @@ export function compared(now: Summary, before: Summary, all: readonly FigureInfo
           before: b === null ? "–" : say(b, one),
           difference,
           better:
-            a === null || b === null || difference === SAME || one.better === "neither"
+            a === null || b === null || difference === SAME() || one.better === "neither"
               ? null
               : a > b === (one.better === "higher"),
         },
@@ -79,10 +79,10 @@ export function compared(now: Summary, before: Summary, all: readonly FigureInfo
     });
 }
 
-const SAME = "same";
+const SAME = localized(() => t`same`);
 function signed(difference: number, { display }: FigureInfo): string {
   const size = plain(Math.abs(difference), display);
-  return size === plain(0, display) ? SAME : `${difference > 0 ? "+" : "−"}${size}`;
+  return size === plain(0, display) ? SAME() : `${difference > 0 ? "+" : "−"}${size}`;
 }
 
 const ENDED: readonly RunState[] = ["completed", "stopped", "failed", "interrupted"];
