@@ -1,7 +1,8 @@
 """The OpenAPI schema of the server as the page's types: ``frontend/src/api/schema.ts``.
 
-Beside it the texts of its closed lists, see :mod:`tools.server_texts`. Writes the files, or with ``--check`` says whether they are what the server says of itself now, or with
-``--json`` prints the schema. Needs neither a network nor a server that runs.
+Beside it the texts of its closed lists, see :mod:`tools.server_texts`. Writes the files, or with
+``--check`` says whether they are what the server says of itself now, or with ``--json`` prints the
+schema. Needs neither a network nor a server that runs.
 """
 
 from __future__ import annotations
