@@ -1,7 +1,8 @@
 """The OpenAPI schema of the server as the page's types: ``frontend/src/api/schema.ts``.
 
-Writes the file, or with ``--check`` says whether it is what the server says of itself now, or with
-``--json`` prints the schema. Needs neither a network nor a server that runs.
+Beside it the texts of its closed lists, see :mod:`tools.server_texts`. Writes the files, or with
+``--check`` says whether they are what the server says of itself now, or with ``--json`` prints the
+schema. Needs neither a network nor a server that runs.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 
 from odscen.web.application import create_app
 from odscen.workspace.store import Workspace
+from tools import server_texts
 
 ROOT = Path(__file__).parents[1]
 TYPES = ROOT / "frontend/src/api/schema.ts"
@@ -94,11 +96,17 @@ def main() -> None:
         sys.stdout.write(schema_json())
     elif not wish.check:
         TYPES.write_text(schema_types(), encoding="utf-8")
-    elif not TYPES.is_file() or TYPES.read_text(encoding="utf-8") != schema_types():
-        name = TYPES.relative_to(ROOT)
+        server_texts.TARGET.write_text(server_texts.server_texts(), encoding="utf-8")
+    else:
+        _check(TYPES, schema_types())
+        _check(server_texts.TARGET, server_texts.server_texts())
+
+
+def _check(file: Path, text: str) -> None:
+    if not file.is_file() or file.read_text(encoding="utf-8") != text:
         sys.exit(
-            f"{name} is not what the server says of itself now: run make api, see what the "
-            "compiler says of the page (make check), and commit both"
+            f"{file.relative_to(ROOT)} is not what the server says of itself now: run make api, "
+            "see what the compiler says of the page (make check), and commit both"
         )
 
 

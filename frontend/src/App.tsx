@@ -147,7 +147,10 @@ export function App() {
       </header>
       <main id="main" tabIndex={-1} className="main">
         {/* A view begins anew in another language or unit; what it had is saved. */}
-        <Suspense key={`${i18n.locale} ${speed} ${length} ${hours}`} fallback={<Loader m="xl" aria-label={t`Loading the page`} />}>
+        <Suspense
+          key={`${i18n.locale} ${speed} ${length} ${hours}`}
+          fallback={<Loader m="xl" aria-label={t`Loading the page`} />}
+        >
           {address.view === "catalogue" && <CatalogueView />}
           {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}
           {address.view === "imported" && <ImportView key={address.scenario} scenario={address.scenario} />}

@@ -60,7 +60,7 @@ export function AddMap({
       return await followJob(id, (job) => {
         setWork((old) => ({
           what,
-          step: stepWords(job.step ?? "preparing"),
+          step: stepWords(job.step ?? t`preparing`),
           share: job.share ?? 0,
           waiting: queue.current.length,
           job: id,

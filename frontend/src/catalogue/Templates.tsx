@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { served } from "../language/served";
 import { type Template, templates } from "../api/templates";
 import type { MapInfo } from "../api/types";
 import { go } from "../ui/address";
@@ -35,16 +36,16 @@ export function Templates({ maps }: { maps: MapInfo[] }) {
               />
               <div style={{ padding: "12px 16px 14px", display: "flex", flexDirection: "column", flex: 1 }}>
                 <Title order={3} size="h4">
-                  {one.title}
+                  {served(one.title)}
                 </Title>
                 <Text size="sm" mt={4} mb="sm" style={{ flex: 1 }}>
-                  {one.summary}
+                  {served(one.summary)}
                 </Text>
                 <Button
                   fullWidth
                   variant="default"
                   onClick={() => setChosen(one)}
-                  aria-label={t`Place on a map: ${one.title}`}
+                  aria-label={t`Place on a map: ${served(one.title)}`}
                 >
                   <Trans>Place on a map</Trans>
                 </Button>
@@ -53,7 +54,12 @@ export function Templates({ maps }: { maps: MapInfo[] }) {
           </li>
         ))}
       </ul>
-      <Modal opened={chosen !== null} onClose={() => setChosen(null)} title={chosen?.title} size="lg">
+      <Modal
+        opened={chosen !== null}
+        onClose={() => setChosen(null)}
+        title={chosen && served(chosen.title)}
+        size="lg"
+      >
         {chosen && <Placing key={chosen.name} template={chosen} maps={maps} />}
       </Modal>
     </section>
@@ -86,7 +92,7 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
     <Stack gap="sm">
       <Text size="sm">
         <Trans>
-          {template.summary} It needs {template.needs}.
+          {served(template.summary)} It needs {served(template.needs)}.
         </Trans>
       </Text>
       <Text size="xs" c="dimmed">
@@ -105,7 +111,7 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
           <NumberInput
             key={one.name}
             label={`${one.name.replace(/_/g, " ")} (${one.unit})`}
-            description={one.meaning}
+            description={served(one.meaning)}
             placeholder={t`by the others`}
             min={one.low}
             max={one.high}

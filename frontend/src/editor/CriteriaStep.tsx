@@ -2,6 +2,7 @@ import { Button, Loader, NumberInput, Select, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
+import { served } from "../language/served";
 import { type ActorMeasureInfo, actorMeasures, allFigures, type FigureInfo } from "../api/figures";
 import type { Edit, ScenarioDocument } from "../api/types";
 import { useKeptForm } from "../ui/keptForm";
@@ -107,7 +108,7 @@ function NewCriterion({
       <Select
         label={t`What`}
         description={measure?.definition}
-        data={measures.map(({ name, label }) => ({ value: name, label }))}
+        data={measures.map(({ name, label }) => ({ value: name, label: served(label) }))}
         value={made.name}
         allowDeselect={false}
         searchable

@@ -245,7 +245,7 @@ const Row = memo(function Row({
             <span>{placeWord(graph, one.goal)}</span>
           </Tooltip>
         ) : (
-          "random"
+          t`random`
         )}
       </td>
       <td>{speedWord(one)}</td>

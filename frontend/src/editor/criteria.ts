@@ -1,5 +1,6 @@
 import { plural, t } from "@lingui/core/macro";
 
+import { served } from "../language/served";
 import { localized } from "../language/localized";
 import type { ActorMeasureInfo, FigureInfo } from "../api/figures";
 import { sentence } from "../ui/words";
@@ -64,7 +65,8 @@ export function criterionWords(
   if (!measure) return text;
   const plain = PLAIN()[`${parts.name} ${parts.op} ${parts.bound}`];
   if (parts.actor !== WHOLE_RUN && plain) return `${parts.actor} ${plain}`;
-  const about = parts.actor === WHOLE_RUN ? measure.label : t`${measure.label} of ${parts.actor}`;
+  const about =
+    parts.actor === WHOLE_RUN ? served(measure.label) : t`${served(measure.label)} of ${parts.actor}`;
   const op = OPERATORS().find(([sign]) => sign === parts.op)?.[1] ?? parts.op;
   const unit = parts.unit || measure.unit;
   return `${sentence(about)}: ${op} ${parts.bound}${unit ? ` ${unit}` : ""}`;

@@ -1,4 +1,4 @@
-import { ActionIcon, Popover, Tooltip } from "@mantine/core";
+import { ActionIcon, Modal, Tooltip } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { lazy, Suspense, useState } from "react";
 
@@ -13,26 +13,17 @@ export function PreferencesButton() {
   const [open, setOpen] = useState(false);
   const words = t`Language and units`;
   return (
-    <Popover opened={open} onChange={setOpen} position="bottom-end" trapFocus withArrow shadow="md">
-      <Popover.Target>
-        <Tooltip label={words} disabled={open}>
-          <ActionIcon
-            variant="subtle"
-            color="gray"
-            size="lg"
-            aria-label={words}
-            aria-expanded={open}
-            onClick={() => setOpen(!open)}
-          >
-            <IconLanguage />
-          </ActionIcon>
-        </Tooltip>
-      </Popover.Target>
-      <Popover.Dropdown aria-label={words}>
+    <>
+      <Tooltip label={words}>
+        <ActionIcon variant="subtle" color="gray" size="lg" aria-label={words} onClick={() => setOpen(true)}>
+          <IconLanguage />
+        </ActionIcon>
+      </Tooltip>
+      <Modal opened={open} onClose={() => setOpen(false)} title={words} size="sm" centered>
         <Suspense fallback={null}>
           <PreferencesForm />
         </Suspense>
-      </Popover.Dropdown>
-    </Popover>
+      </Modal>
+    </>
   );
 }

@@ -9,7 +9,7 @@ import { ALLOWED, prefer, usePreferences } from "./preferences";
 export function PreferencesForm() {
   const { language, speed, length, hours } = usePreferences();
   return (
-    <Stack gap={10} w={230}>
+    <Stack gap="sm">
       <NativeSelect
         label={t`Language`}
         data={languageChoices()}

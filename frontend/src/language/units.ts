@@ -1,4 +1,4 @@
-import { fixed } from "./numbers";
+import { fixed, short } from "./numbers";
 import { type Preferences, preferences } from "./preferences";
 
 /** What is shown in a unit of the reader's choice; the document has m/s and metres. */
@@ -48,11 +48,11 @@ export function lengthText(metres: number, digits = 0): string {
 export function roughLength(metres: number): string {
   if (unitFor("length").sign === "m") {
     if (metres >= 10_000) return `${fixed(metres / 1000, 0)} km`;
-    return metres >= 1000 ? `${fixed(metres / 1000, 1)} km` : lengthText(metres);
+    return metres >= 1000 ? `${short(metres / 1000, 1)} km` : lengthText(metres);
   }
   const miles = metres / MILE;
   if (miles >= 10) return `${fixed(miles, 0)} mi`;
-  return miles >= 0.5 ? `${fixed(miles, 1)} mi` : lengthText(metres);
+  return miles >= 0.5 ? `${short(miles, 1)} mi` : lengthText(metres);
 }
 
 /** The longest round length up to so many metres, for a bar that shows the scale of a map. */

@@ -79,7 +79,6 @@ export function visible(view: View, size: Size): Bounds {
 export const overlaps = (a: Bounds, b: Bounds): boolean =>
   a[0] <= b[2] && a[2] >= b[0] && a[1] <= b[3] && a[3] >= b[1];
 
-
 /** Makes a canvas draw in metres. */
 export function worldTransform(
   context: CanvasRenderingContext2D,

@@ -181,7 +181,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     );
   return (
     <div className="run">
-      <VisuallyHidden component="h1">{`Run ${run}`}</VisuallyHidden>
+      <VisuallyHidden component="h1">{t`Run ${run}`}</VisuallyHidden>
       <div className="run-body">
         <div className="run-map">
           {drawing ? (

@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 
 import { preferences } from "../language/preferences";
 import { localized } from "../language/localized";
+import { served } from "../language/served";
 import { longClock, sentence } from "../ui/words";
 import type { FigureInfo } from "../api/figures";
 import type { RunState, Summary } from "../api/runs";
@@ -41,8 +42,8 @@ const say = (n: number, { display }: FigureInfo): string =>
   display.clock ? longClock(n, n) : plain(n, display);
 const words = ({ name, label, definition }: FigureInfo) => ({
   name,
-  label: sentence(label),
-  definition,
+  label: sentence(served(label)),
+  definition: served(definition),
 });
 
 /** The key figures of a run; those that the run has not are left out. */
@@ -70,7 +71,7 @@ export function compared(now: Summary, before: Summary, all: readonly FigureInfo
           before: b === null ? "–" : say(b, one),
           difference,
           better:
-            a === null || b === null || difference === SAME || one.better === "neither"
+            a === null || b === null || difference === SAME() || one.better === "neither"
               ? null
               : a > b === (one.better === "higher"),
         },
@@ -78,10 +79,10 @@ export function compared(now: Summary, before: Summary, all: readonly FigureInfo
     });
 }
 
-const SAME = "same";
+const SAME = localized(() => t`same`);
 function signed(difference: number, { display }: FigureInfo): string {
   const size = plain(Math.abs(difference), display);
-  return size === plain(0, display) ? SAME : `${difference > 0 ? "+" : "−"}${size}`;
+  return size === plain(0, display) ? SAME() : `${difference > 0 ? "+" : "−"}${size}`;
 }
 
 const ENDED: readonly RunState[] = ["completed", "stopped", "failed", "interrupted"];

@@ -2,6 +2,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useId } from "react";
 
+import { served } from "../language/served";
 import type { FigureGroup, StudyResults } from "../api/studies";
 import { scaleOf } from "../sweeps/plan";
 import { variantWord } from "./groups";
@@ -36,7 +37,7 @@ export function FigurePlot({ results }: { results: StudyResults }) {
     <figure className="plane" aria-labelledby={id}>
       <figcaption id={id}>
         <Trans>
-          {figure?.label ?? results.figure}
+          {served(figure?.label ?? results.figure)}
           {unit}: each dot is a run, the bar is the mean with its 95 % confidence interval
         </Trans>
       </figcaption>
@@ -52,7 +53,7 @@ export function FigurePlot({ results }: { results: StudyResults }) {
             </g>
           ))}
           <text x={(left + W - 20) / 2} y={height - 4} textAnchor="middle">
-            {(figure?.label ?? results.figure) + unit}
+            {served(figure?.label ?? results.figure) + unit}
           </text>
           {rows.map(({ one, name }, n) => (
             <Row

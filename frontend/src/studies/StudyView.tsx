@@ -16,6 +16,7 @@ import { plural, t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { served } from "../language/served";
 import { type FigureGroup, type StudyInfo, type StudyResults, studies } from "../api/studies";
 import { lasting } from "../sweeps/plan";
 import { go, hashOf } from "../ui/address";
@@ -170,7 +171,7 @@ function Figures({ results, onChoose }: { results: StudyResults; onChoose: (figu
         allowDeselect={false}
         data={results.figures.map(({ name, label, unit }) => ({
           value: name,
-          label: unit ? `${label}, ${unit}` : label,
+          label: unit ? `${served(label)}, ${unit}` : served(label),
         }))}
         value={results.figure}
         onChange={(next) => {

@@ -51,10 +51,10 @@ const KIND_WORD = localized((): Record<string, string> => ({
   fog: t`Fog`,
   dust: t`Dust`,
 }));
-const TIME_WORD = { day: "day", sunset: "sunset", night: "night" } as const;
+const TIME_WORD = localized(() => ({ day: t`day`, sunset: t`sunset`, night: t`night` }));
 
 export const weatherWord = (preset: WeatherPreset): string =>
-  `${kindWord(preset.kind)}, ${TIME_WORD[preset.time_of_day]}`;
+  `${kindWord(preset.kind)}, ${TIME_WORD()[preset.time_of_day]}`;
 export const kindWord = (kind: string): string => KIND_WORD()[kind] ?? kind.replaceAll("_", " ");
 
 const PARAMETER_WORD = localized((): Record<string, string> => ({
