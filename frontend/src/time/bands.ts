@@ -51,11 +51,11 @@ export function shownWords(bands: readonly Band[], time: number): string {
     if (now) count.set(now.shown, (count.get(now.shown) ?? 0) + movements);
   }
   const words: [Shown, string][] = [
-    ["green", "green"],
+    ["green", t`green`],
     ["permissive", t`give way`],
-    ["yellow", "yellow"],
-    ["red", "red"],
-    ["off", "off"],
+    ["yellow", t`yellow`],
+    ["red", t`red`],
+    ["off", t`off`],
   ];
   return words
     .flatMap(([shown, word]) => (count.has(shown) ? [`${count.get(shown)} ${word}`] : []))

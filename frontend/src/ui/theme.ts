@@ -18,7 +18,7 @@ export const theme = localized(() =>
       Modal: Modal.extend({ defaultProps: { closeButtonProps: { "aria-label": t`Close` } } }),
       // A window's head is not a second head of the page.
       ModalHeader: ModalHeader.extend({ defaultProps: { role: "presentation" } }),
-      // Whoever is used to a point may type one where a comma is shown.
+      // A point may be typed, too, where a comma is shown.
       NumberInput: NumberInput.extend({
         defaultProps: { decimalSeparator: decimalSign(), allowedDecimalSeparators: [".", ","] },
       }),

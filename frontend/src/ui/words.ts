@@ -10,7 +10,7 @@ import { isKey } from "../lists";
 /** The same words, as they begin a sentence. */
 export const sentence = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
 
-/** A word as it stands within a sentence; German writes nouns with a capital there, too. */
+/** A word as it is written within a sentence; German writes nouns with a capital there, too. */
 export const inSentence = (word: string): string => (i18n.locale === "de" ? word : word.toLowerCase());
 
 /** Words of the page: plain sentences with the terms of traffic engineers; see the help for those. */
