@@ -369,3 +369,13 @@ def test_the_rural_road_uses_what_it_is_for():
         "solid broken",
     }
     assert sum(float(r.get("length")) for r in root.iter("road") if r.get("junction") == "-1") > 4e3
+
+
+def test_varied_towns_differ_and_each_is_the_same_every_time():
+    pytest.importorskip("scenariogeneration", reason="needs the maintainers' tools")
+    from tools.make_maps.__main__ import map_text
+
+    one, again, other = (map_text(f"varied_town_{seed}") for seed in ("05", "05", "06"))
+    assert one == again
+    assert one != other
+    assert len(parse(one).junctions) >= 9

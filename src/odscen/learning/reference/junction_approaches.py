@@ -39,7 +39,7 @@ _Approach = tuple[str, int, bool]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Movement:
+class _WayThrough:
     """A way through a junction; ``turn`` in radians, ``flow`` is its share of its lane's.
 
     ``entry`` is the node that it comes out on.
@@ -94,10 +94,10 @@ def approaches(
 
 def _movements(
     lanes: LaneGraph, on_road: BoolArray, flow: FloatArray
-) -> dict[str, list[_Movement]]:
+) -> dict[str, list[_WayThrough]]:
     """Ways through each junction."""
-    onwards = _Onwards(lanes, on_road)
-    found: dict[str, list[_Movement]] = {}
+    onwards = _InsideJunctions(lanes, on_road)
+    found: dict[str, list[_WayThrough]] = {}
     for root in onwards.roots:
         lane = int(lanes.lane[root])
         key = lanes.lanes.keys[lane]
@@ -108,12 +108,12 @@ def _movements(
             points = np.column_stack([lanes.x[nodes], lanes.y[nodes]])
             name = str(lanes.lanes.junctions[lanes.lane[nodes[0]]])
             share = float(flow[root]) / len(ways)
-            one = _Movement(root, nodes[-1], approach, points, turn, metres, share)
+            one = _WayThrough(root, nodes[-1], approach, points, turn, metres, share)
             found.setdefault(name, []).append(one)
     return found
 
 
-class _Onwards:
+class _InsideJunctions:
     """Where nodes lead, inside junctions."""
 
     def __init__(self, lanes: LaneGraph, on_road: BoolArray) -> None:
@@ -145,7 +145,7 @@ class _Onwards:
 
 
 def _standings(
-    movements: Sequence[_Movement], lanes: LaneGraph, limit: FloatArray
+    movements: Sequence[_WayThrough], lanes: LaneGraph, limit: FloatArray
 ) -> dict[_Approach, _Standing]:
     roots: dict[_Approach, set[int]] = {}
     for one in movements:
@@ -173,7 +173,7 @@ def _first_road(standings: dict[_Approach, _Standing]) -> frozenset[_Approach]:
 
 
 def _describe(
-    movements: Sequence[_Movement],
+    movements: Sequence[_WayThrough],
     standings: dict[_Approach, _Standing],
     found: list[FloatArray],
 ) -> None:
@@ -207,7 +207,7 @@ def _describe(
             column[node] = value
 
 
-def _meeting(movements: Sequence[_Movement]) -> FloatArray:
+def _meeting(movements: Sequence[_WayThrough]) -> FloatArray:
     """Whether the ways of two movements of different approaches cross or merge, ``(M, M)``."""
     from scipy.spatial.distance import cdist
 
