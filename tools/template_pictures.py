@@ -20,7 +20,7 @@ from odscen.app.maps import load_map
 from odscen.app.template_scenarios import template_scenario
 from odscen.base.markup import element
 from odscen.drawing.svg_layers import LayerOptions, map_layers
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.results.report.report_map import scale_bar, view_box
 from odscen.sumo.folder.recorded import read_trajectories
 from odscen.sumo.realize.run_settings import RunSettings

@@ -11,7 +11,7 @@ from odscen.app.runs import run
 from odscen.app.scenarios import read_scenario
 from odscen.app.watched_runs import watch
 from odscen.base.errors import ConflictError, ScenarioError
-from odscen.results.records.run_records import events_from_json
+from odscen.results.records.run_events import events_from_json
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.realize.run_settings import RunSettings

@@ -17,7 +17,8 @@ import polars as pl
 
 from odscen.app.maps import load_map
 from odscen.lanegraph.query import node_id, walk_node_id
-from odscen.results.records.run_records import Plan, events_from_json
+from odscen.results.records.run_events import events_from_json
+from odscen.results.records.run_plan import Plan
 from odscen.scenario import edits
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps, loads
@@ -29,7 +30,7 @@ from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
-    from odscen.results.records.run_records import Event
+    from odscen.results.records.run_events import Event
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.runner.run_jobs import PreparedRun
 

@@ -22,7 +22,7 @@ from odscen.base.errors import SimulationError
 from odscen.base.frames import SumoPose, sumo_to_xodr
 from odscen.carla.server.client import Address
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder.run_sums import seal_again
 from odscen.web import active_runs
 from odscen.workspace.store import Workspace

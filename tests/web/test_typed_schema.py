@@ -17,7 +17,7 @@ from odscen.app.scenarios import SUFFIX
 from odscen.base.checksums import SUMS_FILE
 from odscen.lanegraph.map_statistics import MapStatistics
 from odscen.results.measures.registry import COUNTS
-from odscen.results.records.run_records import Event, EventKind, event_row
+from odscen.results.records.run_events import Event, EventKind, event_row
 from odscen.sumo.folder import layout
 from odscen.web.application import create_app
 from odscen.web.wire.live_messages import LiveMessage

@@ -3999,7 +3999,7 @@ export interface components {
         };
         /**
          * IncidentInfo
-         * @description Something that happened to ``actor``; see :class:`~odscen.results.records.run_records.Event`.
+         * @description Something that happened to ``actor``; see :class:`~odscen.results.records.run_events.Event`.
          *
          *     What there is nothing to say of is left out.
          */

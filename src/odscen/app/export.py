@@ -205,7 +205,7 @@ def _exporter(to: str, options: Mapping[str, str] | None) -> Exporter:
 
 def _happened(folder: Path) -> WhatHappened:
     from odscen.interchange.exporter import WhatHappened
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.folder.layout import PLAN_FILE
     from odscen.sumo.folder.recorded import read_light_states

@@ -22,7 +22,9 @@ from odscen.results.measures.traffic_files import read_stations, read_tables
 from odscen.results.records.assignment_steps import Assignment
 from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.outcomes import RunStatus
-from odscen.results.records.run_records import Plan, events_from_json, rounded
+from odscen.results.records.row_text import rounded
+from odscen.results.records.run_events import events_from_json
+from odscen.results.records.run_plan import Plan
 from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.run_report import render_report
 from odscen.results.report.signals.report_signals import LightsOfRun

@@ -20,7 +20,7 @@ from odscen.base.errors import DamagedFile, InputError, OdscenError
 from odscen.base.folder_locks import is_locked
 from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.checkpoint import last_number, read_checkpoint
 from odscen.sumo.folder.ended import read_summary

@@ -36,7 +36,7 @@ from odscen.sumo.runner.run_jobs import run_prepared
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.worker.protocol import OnProgress, Progress
     from odscen.workspace.store import Workspace

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.opendrive.road_model import OpenDrive
-    from odscen.results.records.run_records import PlannedActor
+    from odscen.results.records.run_plan import PlannedActor
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.workspace.asset_catalogue import Assets

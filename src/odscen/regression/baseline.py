@@ -28,7 +28,7 @@ from odscen.regression.scatter import (
     hardly_varying,
     seeds_needed,
 )
-from odscen.results.records.run_records import json_with_rows
+from odscen.results.records.row_text import json_with_rows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

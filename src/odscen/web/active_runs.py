@@ -19,7 +19,7 @@ from odscen.app.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import SUFFIX, read_scenario
 from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
 from odscen.carla.served.served_run import ServedJob, run_served
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.scenario.document.json_form import dumps
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.run_status import read_status

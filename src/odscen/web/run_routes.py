@@ -17,7 +17,8 @@ from odscen.base.stored_files import tables
 from odscen.results.measures.curves import SpeedShares, run_curves
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.replay import replay_columns
-from odscen.results.records.run_records import EventKind, Plan, event_row, events_from_json
+from odscen.results.records.run_events import EventKind, event_row, events_from_json
+from odscen.results.records.run_plan import Plan
 from odscen.results.records.traces import ActorCounts, SpeedCurve
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_trajectories

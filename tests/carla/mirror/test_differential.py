@@ -142,7 +142,7 @@ def shown(
 ) -> list[Command]:
     """Commands by which the mirror shows road users at places: x, y, z, hdg, pitch, speed."""
     from odscen.carla.mirror.actor_mirror import Mirror
-    from odscen.results.records.run_records import Plan, PlannedActor
+    from odscen.results.records.run_plan import Plan, PlannedActor
     from odscen.sumo.runner.in_step import Step
 
     count = len(places)

@@ -14,7 +14,7 @@ from odscen.carla.server.blueprints import Shape, choose_blueprints
 from odscen.carla.server.environment import vehicle_lights
 from odscen.convert.lane_table.light_heads import Heads
 from odscen.convert.lane_table.table import SumoLight
-from odscen.results.records.run_records import Plan, PlannedActor
+from odscen.results.records.run_plan import Plan, PlannedActor
 from odscen.sumo.runner.in_step import Step
 from odscen.workspace.asset_catalogue import shipped_assets
 

@@ -14,7 +14,7 @@ from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.mirror.wheels import NEAR, RADIUS, WHEELBASE_SHARE, Wheels
 from odscen.carla.server.batch import WHEEL_CALLS
 from odscen.carla.server.client import Address
-from odscen.results.records.run_records import Plan, PlannedActor
+from odscen.results.records.run_plan import Plan, PlannedActor
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
 from odscen.workspace.store import Workspace

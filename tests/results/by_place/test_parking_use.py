@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from odscen.results.by_place.parking_use import ParkingUse
-from odscen.results.records.run_records import Plan, PlannedActor, PlannedParking
+from odscen.results.records.run_plan import Plan, PlannedActor, PlannedParking
 
 ROWS = [
     ("out", "P1", True, 0.0, 100.0),

@@ -15,7 +15,8 @@ from odscen.results.judging.expectations import (
 )
 from odscen.results.measures.conflicts import conflict_table
 from odscen.results.measures.summary import Trip, actor_outcomes
-from odscen.results.records.run_records import Event, EventKind, Plan, PlannedActor
+from odscen.results.records.run_events import Event, EventKind
+from odscen.results.records.run_plan import Plan, PlannedActor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

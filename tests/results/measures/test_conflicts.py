@@ -7,7 +7,7 @@ from odscen.results.measures.conflicts import (
     conflicts_of_slices,
     walking_conflicts,
 )
-from odscen.results.records.run_records import PlannedActor
+from odscen.results.records.run_plan import PlannedActor
 from odscen.results.report.report_conflicts import conflict_section
 
 STEP = 0.1

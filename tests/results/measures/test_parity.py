@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 from odscen.results.measures.parity import error_curve, errors_by_place, parity_figures, with_errors
-from odscen.results.records.run_records import Plan, PlannedActor
+from odscen.results.records.run_plan import Plan, PlannedActor
 from odscen.results.report.parity_report import render_parity
 
 NOWHERE = (math.nan,) * 4

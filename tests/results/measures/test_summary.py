@@ -13,14 +13,8 @@ from odscen.results.measures.summary import (
     actors_to_json,
     outcome_row,
 )
-from odscen.results.records.run_records import (
-    Event,
-    EventKind,
-    Plan,
-    PlannedActor,
-    events_from_json,
-    events_to_json,
-)
+from odscen.results.records.run_events import Event, EventKind, events_from_json, events_to_json
+from odscen.results.records.run_plan import Plan, PlannedActor
 
 
 def planned(name: str, **changes: object) -> PlannedActor:

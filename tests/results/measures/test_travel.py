@@ -8,7 +8,7 @@ import pytest
 from odscen.results.measures.figure import RunData, SummaryPart
 from odscen.results.measures.registry import figure_values
 from odscen.results.measures.summary import Trip, actor_outcomes
-from odscen.results.records.run_records import Event, EventKind
+from odscen.results.records.run_events import Event, EventKind
 from tests.results.measures.test_summary import EVENTS, plan, planned
 
 

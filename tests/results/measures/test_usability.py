@@ -18,7 +18,8 @@ from odscen.results.measures.usability import (
     run_usability,
 )
 from odscen.results.records.outcomes import IncidentKind, StopReason
-from odscen.results.records.run_records import Event, EventKind, Plan, PlannedActor
+from odscen.results.records.run_events import Event, EventKind
+from odscen.results.records.run_plan import Plan, PlannedActor
 
 END = 1000.0
 

@@ -14,7 +14,7 @@ from odscen.results.records.outcomes import (
     reason_label,
     stop_reason,
 )
-from odscen.results.records.run_records import Event, EventKind
+from odscen.results.records.run_events import Event, EventKind
 from tests.results.measures.test_summary import plan, planned
 
 

@@ -9,7 +9,8 @@ import pytest
 
 from odscen.drawing.map_drawing import Area, Lines, MapDrawing
 from odscen.results.measures.summary import actor_outcomes
-from odscen.results.records.run_records import Event, EventKind, Plan, PlannedActor
+from odscen.results.records.run_events import Event, EventKind
+from odscen.results.records.run_plan import Plan, PlannedActor
 from odscen.results.report.run_report import duration, render_report
 
 EVIL = '<img src=x onerror="alert(1)">'

@@ -6,7 +6,7 @@ import pytest
 
 from odscen.base.errors import InputError
 from odscen.results.measures.conflicts import conflict_table
-from odscen.results.records.run_records import Event, EventKind
+from odscen.results.records.run_events import Event, EventKind
 from odscen.results.sweeps.sweep_rows import OUTCOME, limit_from_text, outcome_of
 
 NONE = {"ttc": None, "drac": None, "pet": None, "kind": "following", "x": 0.0, "y": 0.0}

@@ -12,7 +12,7 @@ import pytest
 
 from odscen.base.categories import Category
 from odscen.base.errors import ToolError
-from odscen.results.records.run_records import PlannedActor
+from odscen.results.records.run_plan import PlannedActor
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds

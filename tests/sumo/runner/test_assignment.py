@@ -13,7 +13,7 @@ from odscen.app.maps import LoadedMap, load_map
 from odscen.app.reports import write_report
 from odscen.app.runs import check_run, prepare_run
 from odscen.results.records.assignment_steps import Assignment, AssignmentStep
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.sumo.folder.layout import ASSIGNMENT_FILE, ROUTES_FILE
 from odscen.sumo.realize.realization import realize

@@ -14,7 +14,7 @@ from odscen.app.runs import check_file, prepare_run
 from odscen.base.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
 from odscen.results.judging.expectations import parse_expectation
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_records import EventKind, events_from_json
+from odscen.results.records.run_events import EventKind, events_from_json
 from odscen.sumo.folder import checkpoint, layout, run_status
 from odscen.sumo.folder.layout import RECORDED
 from odscen.sumo.folder.parts import check_room

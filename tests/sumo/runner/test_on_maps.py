@@ -20,7 +20,7 @@ from odscen.lanegraph.query import node_id
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.scenario.document.sampling_config import SamplingConfig, overridden
 from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
 from odscen.scenario.document.signals_document import Signals

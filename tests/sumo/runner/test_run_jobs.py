@@ -12,7 +12,7 @@ import pytest
 from odscen.base.errors import InputError, WorkspaceError
 from odscen.results.judging.expectations import parse_expectation
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_records import EventKind, events_from_json
+from odscen.results.records.run_events import EventKind, events_from_json
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_jobs import PreparedRun, RunJob, run_many, run_prepared
 from tests.sumo.conftest import BIN, Prepare

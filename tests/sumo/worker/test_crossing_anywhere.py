@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner import worker_process

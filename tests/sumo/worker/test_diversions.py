@@ -11,7 +11,7 @@ from bench.measures import accident, counted, motorway, queue
 from odscen.app.maps import LoadedMap, load_map
 from odscen.app.runs import check_file, prepare_run
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_records import EventKind, events_from_json
+from odscen.results.records.run_events import EventKind, events_from_json
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.sumo.folder.recorded import read_trajectories
@@ -25,7 +25,7 @@ from tests.sumo.runner.test_long_runs import TOWN, killed, results
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.results.records.run_records import Event
+    from odscen.results.records.run_events import Event
     from odscen.sumo.runner.run_jobs import PreparedRun
 
 

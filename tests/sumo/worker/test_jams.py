@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from odscen.results.records.outcomes import StopReason
-from odscen.results.records.run_records import EventKind, events_from_json
+from odscen.results.records.run_events import EventKind, events_from_json
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.worker import jams

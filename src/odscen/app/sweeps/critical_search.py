@@ -24,7 +24,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.learning.search.critical_archive import distinct, pair_coverage
 from odscen.learning.search.proposals import proposer_of
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.results.sweeps.closeness import Closeness, closeness_of, criticality
 from odscen.scenario.sweeps.sweep_plan import MOST_CASES, SweepPlan
 from odscen.sumo.folder import layout

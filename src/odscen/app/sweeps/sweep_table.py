@@ -15,7 +15,7 @@ from odscen.base.errors import InputError
 from odscen.base.text_files import write_text
 from odscen.results.measures.registry import run_figure
 from odscen.results.records.outcomes import RunStatus
-from odscen.results.records.run_records import events_from_json
+from odscen.results.records.run_events import events_from_json
 from odscen.results.sweeps.safe_boundary import safe_boundary
 from odscen.results.sweeps.sweep_page import SweepShown, sweep_page
 from odscen.results.sweeps.sweep_rows import OUTCOME, limit_from_text, outcome_of

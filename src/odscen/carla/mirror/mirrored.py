@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.server.blueprints import Shape
     from odscen.carla.server.carla_server import Server
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
 
 
 WAKE = 0.9

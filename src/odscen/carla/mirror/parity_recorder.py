@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.drawing.map_drawing import MapDrawing
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.runner.in_step import Step
 
 _STATES = ("time", "row", "x", "y", "z", "hdg", "carla_x", "carla_y", "carla_z", "carla_hdg")

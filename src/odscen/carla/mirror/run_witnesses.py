@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from odscen.carla.sensors.camera import Camera
     from odscen.carla.server.batch import ActorPlace
     from odscen.carla.server.carla_server import Server
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.runner.in_step import Step
 
 

@@ -27,7 +27,7 @@ from odscen.carla.server.client import Address
 from odscen.carla.server.environment import weather_parameters
 from odscen.carla.server.interruption import interrupts
 from odscen.results.measures.summary import actor_outcomes, actors_to_json
-from odscen.results.records.run_records import Event, EventKind, events_to_json
+from odscen.results.records.run_events import Event, EventKind, events_to_json
 from odscen.sumo.folder import layout
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.runner.worker_process import Ended
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from odscen.app.runs import CheckedRun
     from odscen.carla.native.native_worker import Told
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run

@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from odscen.carla.native.native_plan import NativeActor
     from odscen.carla.sensors.camera import Camera
     from odscen.carla.server.client import Address
-    from odscen.results.records.run_records import Event, Plan
+    from odscen.results.records.run_events import Event
+    from odscen.results.records.run_plan import Plan
     from odscen.workspace.asset_catalogue import Assets
 
 NO_NAVIGATION = (

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from odscen.carla.sensors.pictures import Wish
     from odscen.carla.server.carla_server import Server
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
 
 BLUEPRINT = "sensor.camera.rgb"
 FIELD_OF_VIEW = 60.0

@@ -12,7 +12,7 @@ from odscen.base.errors import CarlaError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.results.records.run_records import PlannedActor
+    from odscen.results.records.run_plan import PlannedActor
     from odscen.workspace.asset_catalogue import Assets, Blueprint
 
 ALIKE = 0.25

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from odscen.interchange.exporter import ExportSource, WhatHappened
     from odscen.interchange.openscenario.dialect import Dialect
     from odscen.interchange.openscenario.xosc_triggers import Triggers
-    from odscen.results.records.run_records import PlannedActor
+    from odscen.results.records.run_plan import PlannedActor
 
 MOST_POINTS: Final = 200_000
 """Points of all lines together."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import BoolArray, FloatArray
     from odscen.interchange.exporter import ExportSource, WhatHappened
-    from odscen.results.records.run_records import PlannedActor
+    from odscen.results.records.run_plan import PlannedActor
 
 MOST_STATES = 20_000_000
 """Road users times instants; a state takes about 50 bytes of memory."""

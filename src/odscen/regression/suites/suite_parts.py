@@ -17,7 +17,7 @@ from odscen.regression.case_results import SeedResult
 from odscen.regression.causes import causes_between
 from odscen.regression.detection import Sizing
 from odscen.regression.measure import FigureKey
-from odscen.results.records.run_records import json_with_rows
+from odscen.results.records.row_text import json_with_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

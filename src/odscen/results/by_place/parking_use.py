@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.base.arrays import FloatArray, IntArray
-    from odscen.results.records.run_records import Plan, PlannedParking
+    from odscen.results.records.run_plan import Plan, PlannedParking
 
 
 class AreaUse(NamedTuple):

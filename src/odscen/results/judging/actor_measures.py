@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from odscen.results.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC
 from odscen.results.measures.figure import Basis, Better, Figure
 from odscen.results.records.outcomes import ActorStatus
-from odscen.results.records.run_records import EventKind
+from odscen.results.records.run_events import EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.results.measures.summary import ActorOutcome
-    from odscen.results.records.run_records import Event
+    from odscen.results.records.run_events import Event
 
 
 class Measured(NamedTuple):

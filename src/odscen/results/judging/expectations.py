@@ -34,7 +34,7 @@ from odscen.results.judging.actor_measures import (
 from odscen.results.measures.figure import Basis, RunFigure
 from odscen.results.measures.registry import names_of, run_figure
 from odscen.results.measures.usability import UsabilityLevel, usability_score
-from odscen.results.records.run_records import EventKind
+from odscen.results.records.run_events import EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.results.records.run_records import PlannedActor
+    from odscen.results.records.run_plan import PlannedActor
 
 
 SEEN_TTC, SEEN_DRAC, SEEN_PET = 3.0, 3.0, 3.0

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import FloatArray
     from odscen.results.measures.summary import ActorOutcome
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
 
 SPEED_BIN = 5 / 3.6
 """Width of the bins of :class:`SpeedShares`: 5 km/h in m/s."""

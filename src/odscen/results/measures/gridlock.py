@@ -10,13 +10,15 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.results.records.outcomes import ActorStatus, IncidentKind, StopReason, stop_reason
-from odscen.results.records.run_records import EventKind, rounded
+from odscen.results.records.row_text import rounded
+from odscen.results.records.run_events import EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.results.measures.summary import ActorOutcome
-    from odscen.results.records.run_records import Event, Plan, PlannedActor
+    from odscen.results.records.run_events import Event
+    from odscen.results.records.run_plan import Plan, PlannedActor
 
 LISTED = 200
 """Rows in ``summary.json`` at most; the counts are of all."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.base.arrays import FloatArray
-    from odscen.results.records.run_records import Plan, PlannedActor
+    from odscen.results.records.run_plan import Plan, PlannedActor
 
 FORMAT = "odscen-parity"
 VERSION = 1

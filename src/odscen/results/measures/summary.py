@@ -15,20 +15,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from odscen.base.json_text import indented
 from odscen.base.stored_files import typed_rows
 from odscen.results.records.outcomes import ActorStatus
-from odscen.results.records.run_records import (
-    ACTORS_FORMAT,
-    VERSION,
-    Event,
-    EventKind,
-    Plan,
-    PlannedActor,
-    row_text,
-    rows_from_json,
-    text_with_rows,
-)
+from odscen.results.records.row_text import VERSION, row_text, rows_from_json, text_with_rows
+from odscen.results.records.run_events import Event, EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
+
+    from odscen.results.records.run_plan import Plan, PlannedActor
+
+ACTORS_FORMAT = "odscen-actors"
 
 
 class Trip(NamedTuple):

@@ -12,7 +12,7 @@ from odscen.results.by_place.traffic import TABLES, TrafficFigures
 from odscen.results.measures.figure import Basis
 from odscen.results.measures.registry import COLUMN_UNITS, RUN_FIGURES, figure_values
 from odscen.results.measures.table_columns import COLUMNS
-from odscen.results.records.run_records import rounded
+from odscen.results.records.row_text import rounded
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.results.measures.figure import mean
 from odscen.results.measures.latent_delay import due, latent_delay, served
 from odscen.results.records.outcomes import ActorStatus, IncidentKind, StopReason, reason_label
-from odscen.results.records.run_records import rounded
+from odscen.results.records.row_text import rounded
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from odscen.base.stored_files import stored_document, typed_rows
-from odscen.results.records.run_records import json_with_rows
+from odscen.results.records.row_text import json_with_rows
 
 ASSIGNMENT_FORMAT = "odscen-assignment"
 VERSION = 1

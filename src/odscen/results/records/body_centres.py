@@ -15,7 +15,7 @@ from odscen.base.frames import SumoPose, sumo_to_xodr
 if TYPE_CHECKING:
     import polars as pl
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
 
 _OPTIONAL = {"z": "z", "lane": "lane", "pos": "pos", "slope": "slope_deg"}
 

@@ -11,7 +11,7 @@ from odscen.results.records.body_centres import body_centres
 if TYPE_CHECKING:
     import polars as pl
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
 
 
 def replay_columns(trajectories: pl.DataFrame, plan: Plan, *, every: int = 1) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from odscen.base.markup import Markup, element, number, path_data
 from odscen.drawing.map_sheet import length_text, round_length
 from odscen.drawing.svg_layers import LayerOptions, map_layers
-from odscen.results.records.run_records import EventKind
+from odscen.results.records.run_events import EventKind
 from odscen.results.records.traces import speed_by_place, thinned_paths
 from odscen.results.report.report_incidents import incident_rings
 from odscen.results.report.report_measures import measure_layer
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.results.measures.gridlock import Incident
     from odscen.results.measures.summary import ActorOutcome
-    from odscen.results.records.run_records import Event, Plan
+    from odscen.results.records.run_events import Event
+    from odscen.results.records.run_plan import Plan
     from odscen.results.records.traces import Paths, SpeedCells
 
 

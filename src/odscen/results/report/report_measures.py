@@ -13,7 +13,7 @@ from odscen.results.report.report_words import duration
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.results.records.run_records import PlannedMeasure
+    from odscen.results.records.run_plan import PlannedMeasure
 
 LABELS = {
     "closure": "Closure",

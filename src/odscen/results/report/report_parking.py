@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.results.by_place.parking_use import AreaUse, ParkingUse
-    from odscen.results.records.run_records import PlannedParking
+    from odscen.results.records.run_plan import PlannedParking
 
 _HEADS = (
     "Area", "Segment", "Places", "Trips begun", "Trips ended", "Diverted", "Most taken",

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, number
 from odscen.results.records.outcomes import reason_label, stop_reason
-from odscen.results.records.run_records import EventKind
+from odscen.results.records.run_events import EventKind
 from odscen.results.report.page_templates import html_table, report_section
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.results.measures.summary import ActorOutcome
-    from odscen.results.records.run_records import Event
+    from odscen.results.records.run_events import Event
     from odscen.results.records.traces import ActorTravel
 
 ACTOR_LIMIT = 3000

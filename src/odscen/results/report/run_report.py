@@ -56,7 +56,8 @@ if TYPE_CHECKING:
     from odscen.results.measures.summary import ActorOutcome
     from odscen.results.measures.usability import Usability
     from odscen.results.records.assignment_steps import Assignment
-    from odscen.results.records.run_records import Event, Plan
+    from odscen.results.records.run_events import Event
+    from odscen.results.records.run_plan import Plan
     from odscen.results.report.place_shapes import PlaceShapes
     from odscen.results.report.report_corridor import CorridorTraces
     from odscen.results.report.signals.report_signals import LightsOfRun

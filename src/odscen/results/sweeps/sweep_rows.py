@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.results.records.run_records import Event
+    from odscen.results.records.run_events import Event
 
 OUTCOME: Final = ("collision", "impact_speed", "min_ttc", "min_pet", "max_drac")
 """Columns of a row about how it went: whether, m/s, s, s, m/s^2; of those who are watched."""

@@ -17,7 +17,7 @@ from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.registry import figure_values
 from odscen.results.measures.summary import actors_from_json, summary_to_json
-from odscen.results.records.run_records import rounded
+from odscen.results.records.row_text import rounded
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.ended import RECORDS_ONLY, read_summary
 from odscen.sumo.folder.found_files import found_files

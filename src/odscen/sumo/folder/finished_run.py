@@ -14,7 +14,8 @@ from odscen.results.measures.summary import ActorOutcome, actors_from_json
 from odscen.results.measures.traffic_files import places_from_json, read_stations, read_tables
 from odscen.results.records.body_centres import body_centres
 from odscen.results.records.outcomes import RunStatus
-from odscen.results.records.run_records import Event, Plan, events_from_json
+from odscen.results.records.run_events import Event, events_from_json
+from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.deferred_figures import figure_of_actors, measured_summary
 from odscen.sumo.folder.ended import RECORDS_ONLY, read_summary

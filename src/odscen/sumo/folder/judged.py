@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from odscen.results.judging.actor_measures import RunRecords
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_records import events_from_json
+from odscen.results.records.run_events import events_from_json
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_conflicts, trajectory_files
 

@@ -27,7 +27,8 @@ from odscen.results.measures.signal_use import signal_use, write_signal_use
 from odscen.results.measures.traffic_files import figures_json, write_stations, write_tables
 from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.planned_stations import PlannedStation
-from odscen.results.records.run_records import PLAN_FORMAT, VERSION, Plan
+from odscen.results.records.row_text import VERSION
+from odscen.results.records.run_plan import PLAN_FORMAT, Plan
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.net_facts import read_net_facts
 from odscen.sumo.folder.recorded import (

@@ -18,7 +18,7 @@ from odscen.sumo.folder import layout
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.folder.checkpoint import Checkpoint
 
 FORMAT = "odscen-status"

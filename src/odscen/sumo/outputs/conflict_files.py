@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
 
 _NAMES = {
     "timestep_time": "time",

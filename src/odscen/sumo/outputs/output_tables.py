@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import SimulationError
 from odscen.results.measures.summary import Trip, actors_text
-from odscen.results.records.run_records import events_text
+from odscen.results.records.run_events import events_text
 from odscen.sumo.folder.layout import (
     ACTORS_FILE,
     EMISSIONS_FILE,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
 
 
 _SMALL = 32 << 20

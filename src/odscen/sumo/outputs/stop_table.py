@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.records.run_records import begin_area
+from odscen.results.records.run_plan import begin_area
 from odscen.sumo.folder.xml_rows import elements
 
 if TYPE_CHECKING:

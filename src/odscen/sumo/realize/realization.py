@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.document.parking_document import TripParking
 from odscen.scenario.document.problems import refuse_errors

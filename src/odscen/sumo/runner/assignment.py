@@ -24,7 +24,7 @@ import numpy as np
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import SimulationError
 from odscen.results.records.assignment_steps import Assignment, AssignmentStep
-from odscen.results.records.run_records import EventKind, events_from_json
+from odscen.results.records.run_events import EventKind, events_from_json
 from odscen.scenario.placing.region import Region
 from odscen.sumo.folder.layout import EVENTS_FILE
 from odscen.sumo.folder.recorded import read_lanes, read_trips

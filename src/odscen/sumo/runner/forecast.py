@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
 
 CONGESTION = 2.0
 """Time under way, as a multiple of that without anybody else."""

@@ -19,7 +19,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.base.to_disk import write_whole
 from odscen.results.judging.expectations import parse_expectation
 from odscen.results.measures.summary import summary_to_json
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.checkpoint import (
     clear_parts,

@@ -23,7 +23,7 @@ from odscen.results.measures.summary import actors_from_json
 from odscen.results.measures.usability import failed_run, run_usability
 from odscen.results.records.light_programs import programs_to_json
 from odscen.results.records.outcomes import RunStatus
-from odscen.results.records.run_records import events_from_json
+from odscen.results.records.run_events import events_from_json
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.deferred_figures import compute_figures
 from odscen.sumo.folder.ended import RECORDS_ONLY
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from odscen.results.by_place.lane_places import LanePlaces
     from odscen.results.records.light_programs import LightProgram
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.forecast import Forecast
     from odscen.sumo.runner.worker_process import Ended

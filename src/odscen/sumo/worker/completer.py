@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import OdscenError
 from odscen.results.measures.summary import Outcomes
-from odscen.results.records.run_records import Event, Plan, event_from_line, event_line
+from odscen.results.records.run_events import Event, event_from_line, event_line
+from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.checkpoint import (
     EVENTS_LINES,

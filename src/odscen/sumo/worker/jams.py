@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.results.records.outcomes import StopReason, stop_reason
-from odscen.results.records.run_records import Event, EventKind
+from odscen.results.records.run_events import Event, EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

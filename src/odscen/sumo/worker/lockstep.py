@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.results.records.run_records import EventKind, event_row
+from odscen.results.records.run_events import EventKind, event_row
 from odscen.sumo.worker.protocol import Command, EgoPose, MoreRules, Outside, State, decode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.worker.protocol import Lockstep, Message
     from odscen.sumo.worker.recorder import Recorder
     from odscen.sumo.worker.simulation.observed import Poses

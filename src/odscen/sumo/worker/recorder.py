@@ -11,12 +11,13 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.frames import body_centre
-from odscen.results.records.run_records import Event, EventKind, Plan
+from odscen.results.records.run_events import Event, EventKind
 from odscen.sumo.worker.jams import JamWatch
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.worker.simulation.observed import Collision, Front, StepLists
     from odscen.sumo.worker.simulation.session import Session
 

@@ -28,7 +28,8 @@ from odscen.base.errors import OdscenError
 from odscen.base.system_errors import NO_MEMORY, system_words
 from odscen.results.measures.summary import Outcomes
 from odscen.results.records.light_programs import programs_from_json
-from odscen.results.records.run_records import Plan, event_line
+from odscen.results.records.run_events import event_line
+from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder.layout import (
     BEHAVIOUR_FILE,
     CONFIG_FILE,

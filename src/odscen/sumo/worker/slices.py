@@ -38,7 +38,7 @@ from odscen.sumo.worker.simulation.session import open_session
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.worker.simulation.session import Session
     from odscen.sumo.worker.stepping import Stepper
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from odscen.results.records.run_records import EventKind, event_row
+from odscen.results.records.run_events import EventKind, event_row
 from odscen.sumo.worker.protocol import Detectors, FrameMessage, Incidents, Lights
 from odscen.sumo.worker.snapshots import Snapshots
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.recorder import Recorder
     from odscen.sumo.worker.simulation.session import Session

@@ -9,7 +9,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from odscen.base.categories import Category
 from odscen.results.records.outcomes import ActorStatus
-from odscen.results.records.run_records import EventKind
+from odscen.results.records.run_events import EventKind
 from odscen.web.messages import Answer, Name, RequestBody
 from odscen.web.wire.summary_messages import RunSummary
 
@@ -209,7 +209,7 @@ _IfKnown = Annotated[_One | SkipJsonSchema[None], Field(exclude_if=lambda value:
 
 
 class IncidentInfo(Answer):
-    """Something that happened to ``actor``; see :class:`~odscen.results.records.run_records.Event`.
+    """Something that happened to ``actor``; see :class:`~odscen.results.records.run_events.Event`.
 
     What there is nothing to say of is left out.
     """

@@ -10,7 +10,7 @@ import pytest
 
 from odscen.base.frames import body_centre
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_records import Plan
+from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder.layout import PARKING_FILE
 from odscen.sumo.folder.measured import read_parking
 from odscen.sumo.folder.recorded import read_stays, read_trips

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.lanegraph.query import node_id, walk_node_id
-from odscen.results.records.run_records import PlannedActor
+from odscen.results.records.run_plan import PlannedActor
 from odscen.scenario.placing.region import turns_round
 from odscen.sumo.realize.driving import KINDS
 from odscen.sumo.realize.road_users.free_flow import FreeFlow

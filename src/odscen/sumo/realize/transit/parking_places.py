@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.categories import DEFAULT_BODY, Category
-from odscen.results.records.run_records import PlannedParking, begin_area
+from odscen.results.records.run_plan import PlannedParking, begin_area
 from odscen.sumo.realize.route_planner import NoRouteError
 from odscen.sumo.realize.transit.stop_places import CLEAR, LEAST_LENGTH
 

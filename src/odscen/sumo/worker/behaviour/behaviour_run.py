@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import FloatArray, Int32Array, IntArray
     from odscen.learning.behaviour.behaviour_model import BehaviourModel
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.sumo.worker.behaviour.lazy_observation import LazyObservation
     from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
     from odscen.sumo.worker.simulation.session import Session

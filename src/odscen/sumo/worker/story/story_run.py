@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import angle_deg_from_hdg
-from odscen.results.records.run_records import Event, EventKind
+from odscen.results.records.run_events import Event, EventKind
 from odscen.scenario.document.rules_document import actors_of, rule_parts
 from odscen.scenario.story.channels import Pose, WantedMove
 from odscen.scenario.story.story_engine import StoryEngine
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from odscen.results.records.run_records import Plan
+    from odscen.results.records.run_plan import Plan
     from odscen.scenario.story.story_engine import StoryEvent
     from odscen.sumo.worker.recorder import Recorder
     from odscen.sumo.worker.simulation.moved_actors import MovedActors
