@@ -44,6 +44,8 @@ MAP = Path(__file__).parents[1] / "maps" / "t_junction_signs.xodr"
 JOBS = 2
 MARK = "ODSCEN_BENCH_STUDY"
 """Variable by which processes of this bench are found, whoever their parent is now."""
+TRACKER = "multiprocessing.resource_tracker"
+"""Python's own process beside that of this bench, which ends with it."""
 HOW = ("SIGKILL", "SIGKILL to all")
 
 
@@ -148,7 +150,8 @@ class Trial:
         found = []
         for process in psutil.process_iter():
             with suppress(psutil.Error):
-                if process.pid != os.getpid() and process.environ().get(MARK) == self.folder.name:
+                own = process.pid == os.getpid() or TRACKER in " ".join(process.cmdline())
+                if not own and process.environ().get(MARK) == self.folder.name:
                     found.append(process)
         return found
 
