@@ -90,7 +90,7 @@ const PLAIN: Look = {
   matrix: IDENTITY,
 };
 
-/** Stands in for the context of a canvas, and writes what is drawn as SVG. */
+/** Takes the place of the context of a canvas, and writes what is drawn as SVG. */
 class SvgContext implements Omit<Look, "dash" | "matrix"> {
   fillStyle = PLAIN.fillStyle;
   strokeStyle = PLAIN.strokeStyle;

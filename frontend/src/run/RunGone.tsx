@@ -24,7 +24,7 @@ export function RunGone({
       </Title>
       <Alert color="red">
         {watched
-          ? t`It was removed, or the server was ended by force while it went on, and nothing of it is kept. The scenario is as it was; run again, it gives the same results.`
+          ? t`It was removed, or the server was ended by force while it was running, and nothing of it is kept. The scenario is as it was; run again, it gives the same results.`
           : reason}
       </Alert>
       <Group mt="md" gap="xs">

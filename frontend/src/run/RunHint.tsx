@@ -25,7 +25,7 @@ export function RunHint({
       <div className="map-hint" role="status">
         <span className="waiting">
           <Loader size={16} aria-hidden="true" />
-          {t`The server does not answer. What is shown goes on as soon as it is back …`}
+          {t`The server does not answer. What is shown resumes as soon as it is back …`}
         </span>
       </div>
     );

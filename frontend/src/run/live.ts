@@ -24,9 +24,9 @@ export class Live {
   crowd = new Crowd();
   private socket: WebSocket;
   private over = false;
-  /** Incidents that were passed on, and that this connection has told: each tells all of them. */
+  /** Incidents that were passed on, and that this connection has reported: each reports all of them. */
   private passed = 0;
-  private told = 0;
+  private reported = 0;
   private retry = 0;
   private waiting: ArrayBuffer | null = null;
   private pending = 0;
@@ -57,7 +57,7 @@ export class Live {
       this.retry = window.setTimeout(() => {
         // All road users are introduced anew.
         this.crowd = new Crowd();
-        this.told = 0;
+        this.reported = 0;
         this.socket = this.connect();
       }, AGAIN);
     };
@@ -85,9 +85,9 @@ export class Live {
     }
   }
 
-  private incidents(told: Incident[]): void {
-    const fresh = told.slice(Math.max(0, this.passed - this.told));
-    this.told += told.length;
+  private incidents(reported: Incident[]): void {
+    const fresh = reported.slice(Math.max(0, this.passed - this.reported));
+    this.reported += reported.length;
     this.passed += fresh.length;
     if (fresh.length > 0) this.events.onIncidents(fresh);
   }

@@ -49,7 +49,7 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
   }, [run, recorded]);
   const learn = useCallback((lights: Record<string, string>, time: number) => {
     for (const [light, state] of Object.entries(lights)) {
-      // A connection that is made again tells all of them.
+      // A connection that is made again reports all of them.
       if (live.current.get(light)?.state === state) continue;
       live.current.set(light, changed(live.current.get(light), state, time));
       const of = seen.current.get(light) ?? { times: [], states: [] };
