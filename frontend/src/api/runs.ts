@@ -21,6 +21,8 @@ export type Verdict = Schemas["UsabilityInfo"];
 export type Incident = Schemas["IncidentInfo"];
 /** Who was where: rows `first[i]` to `first[i + 1]` belong to `times[i]`. */
 export type ReplayColumns = Schemas["ReplayColumns"];
+/** What vehicles did on each lane in each interval. */
+export type RunLanes = Schemas["RunLanes"];
 /** What became of a vehicle under test. */
 export type EgoOutcome = Schemas["EgoOutcome"];
 /** Texts of the live view. */
@@ -49,6 +51,7 @@ export const runs = {
   events: (run: string) => call("get", "/api/runs/{run}/events", { path: { run } }),
   egos: (run: string) => call("get", "/api/runs/{run}/egos", { path: { run } }),
   curves: (run: string) => call("get", "/api/runs/{run}/curves", { path: { run } }),
+  lanes: (run: string) => call("get", "/api/runs/{run}/lanes", { path: { run } }),
   content: (run: string) => call("get", "/api/runs/{run}/content", { path: { run } }),
   replay: (run: string) =>
     call("get", "/api/runs/{run}/trajectories", { path: { run }, query: { most: MOST_ROWS } }),

@@ -1348,6 +1348,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/runs/{run}/lanes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Lanes
+         * @description What vehicles did on each lane in each interval of a finished run, as columns.
+         */
+        get: operations["lanes_api_runs__run__lanes_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/figures/actors": {
         parameters: {
             query?: never;
@@ -5840,6 +5860,38 @@ export interface components {
             slices: components["schemas"]["RunSlices"] | null;
             /** Preparing */
             preparing: string | null;
+        };
+        /**
+         * RunLanes
+         * @description What vehicles did on each lane in each interval of a run.
+         *
+         *     Interval ``i`` is from ``times[i]`` to ``times[i + 1]``, seconds; rows ``first[i]`` up to
+         *     ``first[i + 1]`` belong to it: which ``lane`` (a row of ``lengths``, metres), and the
+         *     ``distance`` (m), ``seconds`` and ``time_loss`` (vehicle-seconds) of all vehicles on it. Lanes
+         *     without vehicles have no row. Nodes ``node_first[k]`` up to ``node_end[k]`` of the map's graph
+         *     lie on lane ``node_lane[k]``.
+         */
+        RunLanes: {
+            /** Times */
+            times: number[];
+            /** First */
+            first: number[];
+            /** Lane */
+            lane: number[];
+            /** Distance */
+            distance: number[];
+            /** Seconds */
+            seconds: number[];
+            /** Time Loss */
+            time_loss: number[];
+            /** Lengths */
+            lengths: number[];
+            /** Node First */
+            node_first: number[];
+            /** Node End */
+            node_end: number[];
+            /** Node Lane */
+            node_lane: number[];
         };
         /**
          * RunProgress
@@ -19472,6 +19524,125 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["RunFit"];
                 };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    lanes_api_runs__run__lanes_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RunLanes"];
+                };
+            };
+            /** @description What the client has is right. */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The request cannot be read. */
             400: {

@@ -55,6 +55,10 @@ export function roughLength(metres: number): string {
   return miles >= 0.5 ? `${short(miles, 1)} mi` : lengthText(metres);
 }
 
+/** Kilometres or miles, of a metre: what the length of roads is counted in. */
+export const roadUnit = (): Unit =>
+  unitFor("length").sign === "ft" ? { sign: "mi", scale: 1 / MILE } : { sign: "km", scale: 1 / 1000 };
+
 /** The longest round length up to so many metres, for a bar that shows the scale of a map. */
 export function roundLength(most: number): { metres: number; text: string } {
   const feet = unitFor("length").sign === "ft";

@@ -1,5 +1,8 @@
 import { nth } from "../lists";
 import { type Graph, ringOf } from "./graph";
+import type { LaneColors } from "./scene";
+import type { PathMaker } from "./svg";
+import type { View } from "./view";
 
 /** Kind of the edges from a node to the next along a lane. */
 const SUCCESSOR = 0;
@@ -50,4 +53,42 @@ function spread(
   // A set that grows while it is gone through is gone through to its end.
   for (const i of found) for (const b of next.get(i) ?? []) found.add(b);
   return found;
+}
+
+export function addRing(path: Path2D, ring: Float64Array): void {
+  path.moveTo(nth(ring, 0), nth(ring, 1));
+  for (let i = 2; i < ring.length; i += 2) path.lineTo(nth(ring, i), nth(ring, i + 1));
+  path.closePath();
+}
+
+/** Of a lane that is thinner on the screen, pixels. */
+const THINNEST = 2;
+/** Of a lane; the edge of a thinner one is drawn wider. */
+const USUAL_WIDTH = 3;
+
+/** Draws lanes in colours; their paths are kept as long as the colours are. */
+export class ColoredLanes {
+  private of: LaneColors | null = null;
+  private paths: readonly Path2D[] = [];
+
+  constructor(private readonly newPath: PathMaker) {}
+
+  draw(context: CanvasRenderingContext2D, { scale }: View, shown: LaneColors | null): void {
+    if (!shown) return;
+    if (shown !== this.of) {
+      this.of = shown;
+      this.paths = shown.rings.map((rings) => {
+        const path = this.newPath();
+        for (const ring of rings) addRing(path, ring);
+        return path;
+      });
+    }
+    // A hair of stroke closes the seams between rings that touch.
+    context.lineWidth = Math.max(0.5 / scale, THINNEST / scale - USUAL_WIDTH);
+    this.paths.forEach((path, n) => {
+      context.fillStyle = context.strokeStyle = nth(shown.colors, n);
+      context.fill(path);
+      context.stroke(path);
+    });
+  }
 }

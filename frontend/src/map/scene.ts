@@ -60,11 +60,18 @@ export interface SceneDetector {
   occupied: boolean;
 }
 
+/** Lanes in colours that say how they were used: rings of each colour, x and y in turn. */
+export interface LaneColors {
+  colors: readonly string[];
+  rings: readonly (readonly Float64Array[])[];
+}
+
 /** Everything of a scenario that is drawn on the map, ready to draw. */
 export interface Scene {
   segments: ReadonlyMap<number, SegmentStyle>;
   /** Lanes that measures act on, as rings: x and y in turn. */
   lanes: readonly Float64Array[];
+  laneColors?: LaneColors | null;
   pins: readonly ScenePin[];
   lines: readonly SceneLine[];
   detectors: readonly SceneDetector[];

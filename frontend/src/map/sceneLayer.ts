@@ -16,6 +16,7 @@ import { detectorNames, drawDetectors } from "./detectorMarks";
 import { nth } from "../lists";
 import { GLYPHS } from "./glyphs";
 import { type Graph, type Place, segmentBounds, strips } from "./graph";
+import { addRing, ColoredLanes } from "./laneShapes";
 import {
   badge,
   body,
@@ -70,6 +71,7 @@ export class SceneLayer {
   private readonly segments: Path2D[] = [];
   private readonly bounds: Bounds[] = [];
   private readonly glyphs: Record<Category, Path2D>;
+  private readonly colored: ColoredLanes;
 
   constructor(
     private readonly graph: Graph | null,
@@ -79,6 +81,7 @@ export class SceneLayer {
     this.glyphs = Object.fromEntries(
       Object.entries(GLYPHS).map(([name, path]) => [name, newPath(path)]),
     ) as Record<Category, Path2D>;
+    this.colored = new ColoredLanes(newPath);
     if (!graph) return;
     this.bounds = segmentBounds(graph.columns);
     this.segments = graph.columns.segments.map(() => newPath());
@@ -96,6 +99,7 @@ export class SceneLayer {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, context.canvas.width, context.canvas.height);
     worldTransform(context, view, size, ratio);
+    this.colored.draw(context, view, scene.laneColors ?? null);
     this.drawSegments(context, view, size, scene);
     if (this.graph && this.picker && view.scale >= NODES_FROM) {
       this.drawGraph(context, view, size, scene, palette);
@@ -311,10 +315,4 @@ export class SceneLayer {
     if (actor.ego) tag(context, "EGO", x, top);
     else if (actor.selected && named) tag(context, actor.id, x, top);
   }
-}
-
-function addRing(path: Path2D, ring: Float64Array): void {
-  path.moveTo(nth(ring, 0), nth(ring, 1));
-  for (let i = 2; i < ring.length; i += 2) path.lineTo(nth(ring, i), nth(ring, i + 1));
-  path.closePath();
 }

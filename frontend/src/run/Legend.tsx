@@ -1,13 +1,15 @@
+import { useComputedColorScheme } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
 import { CATEGORIES, type Category } from "../api/types";
-import { CATEGORY_COLOR, EGO, MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
+import { CATEGORY_COLOR, DARK, EGO, LIGHT, MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
 import type { MarkKind } from "../map/scene";
 import { CategoryGlyph } from "../ui/icons";
 import { CATEGORY_WORD } from "../ui/words";
 import { MARK_WORD } from "./incidents";
 import { type ColourBy, SCALES } from "./tint";
+import type { LaneLegend } from "./useLaneUse";
 
 /** What the picture's colours and signs mean; only what can be in it. */
 export function Legend({
@@ -17,6 +19,7 @@ export function Legend({
   lamps,
   marks,
   by = "kind",
+  lanes = null,
 }: {
   categories: ReadonlySet<Category>;
   ego: boolean;
@@ -27,10 +30,14 @@ export function Legend({
   marks: ReadonlySet<MarkKind>;
   /** What the colours of road users say. */
   by?: ColourBy;
+  /** What the colours of lanes mean, where they say something. */
+  lanes?: (LaneLegend & { word: string }) | null;
 }) {
-  if (categories.size === 0) return null;
+  const dark = useComputedColorScheme("light") === "dark";
+  if (categories.size === 0 && !lanes) return null;
   return (
     <ul className="map-legend" aria-label={t`What is shown`} style={{ listStyle: "none", margin: 0 }}>
+      {lanes && <LaneRows {...lanes} unused={(dark ? DARK : LIGHT).areas.road ?? ""} />}
       {by !== "kind" &&
         SCALES()[by].legend.map((words, n) => (
           <li key={words}>
@@ -98,6 +105,38 @@ export function Legend({
         </li>
       ))}
     </ul>
+  );
+}
+
+/** What the colours of lanes mean, and that of lanes on which nobody was. */
+function LaneRows({ word, colors, words, unused }: LaneLegend & { word: string; unused: string }) {
+  return (
+    <>
+      <li>
+        <span>
+          <Trans>
+            <i style={{ background: "transparent" }} />
+            Lanes: {word}
+          </Trans>
+        </span>
+      </li>
+      {words.map((text, n) => (
+        <li key={text}>
+          <span>
+            <i style={{ background: colors[n] }} />
+            {text}
+          </span>
+        </li>
+      ))}
+      <li>
+        <span>
+          <Trans>
+            <i style={{ background: unused }} />
+            No vehicle
+          </Trans>
+        </span>
+      </li>
+    </>
   );
 }
 

@@ -27,6 +27,8 @@ import { hasEnded } from "./figures";
 import { countMarks } from "./fit";
 import type { Crowd } from "./frames";
 import { IncidentLog } from "./IncidentLog";
+import { LaneTools } from "./LaneTools";
+import { QUANTITIES } from "./laneUse";
 import { markKind, marksAt } from "./incidents";
 import { Legend } from "./Legend";
 import { Live } from "./live";
@@ -42,6 +44,7 @@ import { SpeedChart } from "./SpeedChart";
 import { LiveStrip, ReplayStrip } from "./Strip";
 import { useCounts } from "./useCounts";
 import { useIncidents } from "./useIncidents";
+import { useLaneUse } from "./useLaneUse";
 import { usePicture } from "./usePicture";
 import { useReplay } from "./useReplay";
 import { useGround, useRun } from "./useRun";
@@ -78,6 +81,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const shownTab = tab ?? (ended ? "result" : "users");
 
   const { map, drawing, loaded } = ground;
+  const laneUse = useLaneUse(run, loaded);
   const lights = useRunLights(run, map, mode === "replay" && replayable);
   const { learn: learnLights, learnDetectors, drawn } = lights;
   const [junction, setJunction] = useState<string | null>(null);
@@ -149,11 +153,13 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const { occupied } = lights;
   const second = mode === "replay" ? Math.floor(time) : 0;
   const scene = useMemo(() => {
-    if (!program) return ground.scene;
+    const lanes = { ...ground.scene, laneColors: laneUse.colors };
+    if (!program) return lanes;
     const on = mode === "live" ? occupied : seenInLog(program.detectors, second)?.on;
-    return { ...ground.scene, detectors: sceneDetectors(program, on) };
-  }, [ground.scene, program, mode, occupied, second]);
+    return { ...lanes, detectors: sceneDetectors(program, on) };
+  }, [ground.scene, program, mode, occupied, second, laneUse.colors]);
   const pick = (at: Pointed): void => {
+    laneUse.point(at);
     const user = picture.near(at);
     const light = user === null ? lights.heads?.junctionAt(at) : null;
     if (light) {
@@ -193,6 +199,9 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               handle={handle}
               label={mode === "replay" ? t`Recording of the run` : t`Live view of the run`}
               onPick={pick}
+              onPoint={(at) => {
+                if (at && laneUse.by) laneUse.point(at);
+              }}
             >
               <RunHint
                 info={info}
@@ -208,6 +217,9 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                 lamps={mode === "live"}
                 marks={marks}
                 by={picture.by}
+                lanes={
+                  laneUse.by && laneUse.legend && { ...laneUse.legend, word: QUANTITIES()[laneUse.by].word }
+                }
               />
               <MapTools
                 by={picture.by}
@@ -222,6 +234,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                   />
                 }
               >
+                {mode === "replay" && replayable && <LaneTools shown={laneUse} />}
                 {followed && speeds.length > 1 && (
                   <SpeedChart
                     name={followed}
@@ -280,14 +293,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                 scenario={scenario}
                 onBack={back}
                 onResume={onResume}
-                onShow={
-                  mode === "replay"
-                    ? (at) => {
-                        player.pause();
-                        player.seek(at);
-                      }
-                    : null
-                }
+                onShow={mode === "replay" ? jump : null}
               />
             </Tabs.Panel>
             <Tabs.Panel value="charts" className="run-panel">
@@ -314,10 +320,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                 over={ended}
                 onShow={({ x, y, time: at }) => {
                   follow(null);
-                  if (mode === "replay") {
-                    player.pause();
-                    player.seek(at);
-                  }
+                  if (mode === "replay") jump(at);
                   if (x !== undefined && y !== undefined) handle.current?.centre(x, y);
                 }}
               />

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from pathlib import PurePosixPath
+from typing import Any
 
+import numpy as np
+import orjson
 from fastapi import APIRouter
+from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
 from odscen.app import demands
+from odscen.app.heat_maps import TrafficOnMap, traffic_on_map
 from odscen.app.scenarios import read_scenario
 from odscen.scenario.demand.count_stations import place_points
 from odscen.sumo.folder.layout import SCENARIO_FILE
+from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.services import Shared
 from odscen.web.wire.media_types import ANY_FILE
-from odscen.web.wire.run_messages import FitRow, RunFile, RunFit
+from odscen.web.wire.run_messages import FitRow, RunFile, RunFit, RunLanes
 
 router = APIRouter(prefix="/api/runs/{run}")
 
@@ -52,3 +58,27 @@ def fit(run: str, shared: Shared) -> RunFit:
         rmse=found.rmse,
         contradictions=list(found.contradictions),
     )
+
+
+@router.get("/lanes", response_model=RunLanes, responses=UNCHANGED)
+def lanes(run: str, request: Request, shared: Shared) -> Response:
+    """What vehicles did on each lane in each interval of a finished run, as columns."""
+    found = _lane_columns(traffic_on_map(shared.workspace, shared.runs.kept.whole(run)))
+    return answer(request, pack(orjson.dumps(found, option=orjson.OPT_SERIALIZE_NUMPY)))
+
+
+def _lane_columns(found: TrafficOnMap) -> dict[str, Any]:
+    """As :class:`RunLanes`: metres and seconds to three digits."""
+    traffic, stretches = found
+    sums = traffic.sums
+    intervals = np.arange(len(traffic.times))
+    return {
+        "times": traffic.times,
+        "first": np.searchsorted(sums["interval"].to_numpy(), intervals),
+        "lane": sums["lane"].to_numpy(),
+        **{name: sums[name].round(3).to_numpy() for name in ("distance", "seconds", "time_loss")},
+        "lengths": [round(length, 3) for length in traffic.lengths],
+        "node_first": stretches.first,
+        "node_end": stretches.end,
+        "node_lane": stretches.lane,
+    }

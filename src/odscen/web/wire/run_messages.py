@@ -286,3 +286,25 @@ class ReplayColumns(Answer):
     hdg: list[float]
     speed: list[float]
     actors: list[ReplayActor]
+
+
+class RunLanes(Answer):
+    """What vehicles did on each lane in each interval of a run.
+
+    Interval ``i`` is from ``times[i]`` to ``times[i + 1]``, seconds; rows ``first[i]`` up to
+    ``first[i + 1]`` belong to it: which ``lane`` (a row of ``lengths``, metres), and the
+    ``distance`` (m), ``seconds`` and ``time_loss`` (vehicle-seconds) of all vehicles on it. Lanes
+    without vehicles have no row. Nodes ``node_first[k]`` up to ``node_end[k]`` of the map's graph
+    lie on lane ``node_lane[k]``.
+    """
+
+    times: list[float]
+    first: list[int]
+    lane: list[int]
+    distance: list[float]
+    seconds: list[float]
+    time_loss: list[float]
+    lengths: list[float]
+    node_first: list[int]
+    node_end: list[int]
+    node_lane: list[int]
