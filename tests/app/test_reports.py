@@ -29,9 +29,9 @@ USED = {
     "plan.json": False,
     "actors.json": True,
     "events.json": False,
-    "signals.json": True,
-    "trajectories.parquet": True,
-    "signal_states.parquet": True,
+    "signals.json": False,
+    "trajectories.parquet": False,
+    "signal_states.parquet": False,
     "lane_places.json": True,
     "figures/segments.csv": True,
 }
