@@ -142,6 +142,7 @@ function NewLine({
         searchable
       />
       <Button
+        className="wrapping"
         disabled={served.length === 0}
         aria-pressed={active}
         onClick={() => (active ? pick.stop() : pick.start(NEW_LINE(), "node"))}

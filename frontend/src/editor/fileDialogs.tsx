@@ -77,6 +77,7 @@ export function OpenDialog({ current, onClose }: { current: string; onClose: () 
             key={one.name}
             variant="default"
             justify="space-between"
+            className="wrapping"
             onClick={() => go({ view: "editor", scenario: one.name })}
             rightSection={
               <Text size="xs" c="dimmed">

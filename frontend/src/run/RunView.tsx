@@ -327,9 +327,6 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
             </Tabs.Panel>
             {shownJunction && lights.heads && (
               <Tabs.Panel value="lights" className="run-panel">
-                <VisuallyHidden component="h2">
-                  <Trans>Traffic lights</Trans>
-                </VisuallyHidden>
                 <SignalPanel
                   junctions={lights.heads.junctions}
                   junction={shownJunction}

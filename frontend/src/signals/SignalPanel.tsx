@@ -4,7 +4,7 @@ import { Trans } from "@lingui/react/macro";
 import "../../../src/odscen/results/report/assets/signals.css";
 import "./signals.css";
 
-import { Alert, CloseButton, Loader, Select, Switch, Text } from "@mantine/core";
+import { Alert, CloseButton, Loader, Select, Switch, Text, VisuallyHidden } from "@mantine/core";
 import { type ReactNode, useCallback, useEffect, useRef, useState } from "react";
 
 import { dayTime, lengthText } from "../language/units";
@@ -74,6 +74,9 @@ export function SignalPanel(props: Props) {
         }
       }}
     >
+      <VisuallyHidden component="h2">
+        <Trans>Traffic lights</Trans>
+      </VisuallyHidden>
       <div className="signal-head">
         <Select
           label={t`Traffic light of junction`}

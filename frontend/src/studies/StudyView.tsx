@@ -203,7 +203,8 @@ function Figures({ results, onChoose }: { results: StudyResults; onChoose: (figu
 
 function GroupTable({ groups, label, judged }: { groups: FigureGroup[]; label: string; judged?: boolean }) {
   return (
-    <Table.ScrollContainer minWidth={520}>
+    // Nothing in it takes the focus, so that the keyboard scrolls it only when the container does.
+    <Table.ScrollContainer minWidth={520} scrollAreaProps={{ viewportProps: { tabIndex: 0 } }}>
       <Table verticalSpacing={4} fz={14} aria-label={label}>
         <Table.Thead>
           <Table.Tr>
