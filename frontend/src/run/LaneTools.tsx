@@ -50,7 +50,8 @@ export function LaneTools({ shown }: { shown: ShownUse }) {
               </Text>
               {last > 1 && (
                 <RangeSlider
-                  size="xs"
+                  size="sm"
+                  my={8}
                   min={0}
                   max={last}
                   step={1}

@@ -112,7 +112,7 @@ export function Legend({
 function LaneRows({ word, colors, words, unused }: LaneLegend & { word: string; unused: string }) {
   return (
     <>
-      <li>
+      <li className="lane-row">
         <span>
           <Trans>
             <i style={{ background: "transparent" }} />
@@ -121,14 +121,14 @@ function LaneRows({ word, colors, words, unused }: LaneLegend & { word: string; 
         </span>
       </li>
       {words.map((text, n) => (
-        <li key={text}>
+        <li key={text} className="lane-row">
           <span>
             <i style={{ background: colors[n] }} />
             {text}
           </span>
         </li>
       ))}
-      <li>
+      <li className="lane-row">
         <span>
           <Trans>
             <i style={{ background: unused }} />

@@ -10,8 +10,16 @@ import { ticks } from "./scale";
 /** What the colour of a lane says. */
 export type LanesBy = "speed" | "delay" | "density" | "flow";
 
-/** From dark to light, distinct for the colour-blind too (viridis of Matplotlib, at equal distances). */
-const VIRIDIS = ["#440154", "#414487", "#2a788e", "#22a884", "#7ad151", "#fde725"] as const;
+/**
+ * From dark to light, distinct for the colour-blind too: viridis of Matplotlib at equal distances, without
+ * its darkest ninth, which the dark map would swallow.
+ */
+const VIRIDIS = [
+  ...["#482878", "#3e4a89", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6dcd59", "#b4de2c"],
+  "#fde725",
+] as const;
+/** More would look alike. */
+const MOST_COLORS = 6;
 /** Share of lanes below the last bound: one that is far off must not make all others alike. */
 const USUAL = 0.95;
 
@@ -96,7 +104,7 @@ export class LaneUse {
 /** Round bounds between the colours, the same for every part of the run. */
 export function boundsOf(values: Float64Array): number[] {
   const known = values.filter(Number.isFinite).sort();
-  return ticks(known[Math.floor(USUAL * (known.length - 1))] ?? 0, VIRIDIS.length).slice(1, -1);
+  return ticks(known[Math.floor(USUAL * (known.length - 1))] ?? 0, MOST_COLORS).slice(1, -1);
 }
 
 /** Which colour a value has; null without a value. */

@@ -70,9 +70,9 @@ test("colours begin at round bounds, those of most lanes, and the legend names e
 });
 
 test("the scale is the one of Matplotlib, and grows lighter from colour to colour", () => {
-  expect(sequential(6)).toEqual(["#440154", "#414487", "#2a788e", "#22a884", "#7ad151", "#fde725"]);
-  expect(sequential(1)).toEqual(["#440154"]);
-  for (const count of [2, 3, 4, 5]) {
+  expect(sequential(5)).toEqual(["#482878", "#31688e", "#1f9e89", "#6dcd59", "#fde725"]);
+  expect(sequential(1)).toEqual(["#482878"]);
+  for (const count of [2, 3, 4, 6]) {
     const light = sequential(count).map((hex) => {
       const [r, g, b] = [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
       return 0.2126 * (r ?? 0) + 0.7152 * (g ?? 0) + 0.0722 * (b ?? 0);
