@@ -13,6 +13,7 @@ from lxml import etree
 from playwright.sync_api import expect
 
 from tests.browser.pages import OdscenPage
+from tests.browser.test_accessibility import Inspector
 from tests.browser.test_sharing import SVG, taken
 from tools.page import Served
 
@@ -89,6 +90,9 @@ def test_lanes_have_the_colours_of_their_delay_and_say_it(
     drawn = seen(user, place)
     assert "rgb({}, {}, {})".format(*drawn[:3]) in colours
     assert seen(user, node(columns, nobody))[3] == 0
+    inspector = Inspector(user, "light")
+    inspector.look("run-lanes")
+    assert not inspector.wrong.views, str(inspector.wrong)
     user.map.area.focus()
     user.map.steer(place)
     for _ in range(6):  # until a press of an arrow key is less than a lane
@@ -119,3 +123,6 @@ def test_a_part_of_the_run_is_chosen_by_keys_in_a_narrow_window(
     expect(end).to_have_attribute("aria-valuenow", str(len(times) - 2))
     expect(user.page.get_by_text("Whole run")).to_have_count(0)
     expect(user.page.get_by_role("list", name="What is shown")).to_contain_text("veh/h")
+    inspector = Inspector(user, "dark")
+    inspector.look("run-lanes")
+    assert not inspector.wrong.views, str(inspector.wrong)

@@ -9,24 +9,24 @@ import type { ShownUse } from "./useLaneUse";
 
 const BY: readonly LanesBy[] = ["speed", "delay", "density", "flow"];
 const NOTHING = "nothing";
+/** Room for the longest choice, and for each letter of the word before it and its edges, pixels. */
+const [VALUE, LETTER, EDGES] = [158, 6.5, 20];
 
 /** Chooses what the colours of lanes say, and of which part of the run. */
 export function LaneTools({ shown }: { shown: ShownUse }) {
   const { by, choose, times, span, setSpan, pointed, failure } = shown;
+  const word = t`Lanes`;
+  const named = Math.round(LETTER * word.length + EDGES);
   const last = times.length - 1;
   const whole = span[0] === 0 && span[1] === last;
   return (
     <>
       <Select
         size="xs"
-        w={176}
+        w={VALUE + named}
         aria-label={t`Colour the lanes by`}
-        leftSection={
-          <span aria-hidden="true">
-            <Trans>Lanes</Trans>
-          </span>
-        }
-        leftSectionWidth={54}
+        leftSection={<span aria-hidden="true">{word}</span>}
+        leftSectionWidth={named}
         allowDeselect={false}
         data={[
           { value: NOTHING, label: t({ message: "Plain", context: "lanes without colours" }) },

@@ -101,7 +101,9 @@ test("lanes have the colour of their value, and one that is pointed at says it",
   const { colors, legend } = result.current;
   expect(colors?.colors).toEqual(legend?.colors);
   // The first lane has the highest flow, the second none at all.
-  expect(colors?.rings.map((rings) => rings.length)).toEqual([1, ...legend!.colors.slice(2).map(() => 0), 1]);
+  const filled = colors?.rings.map((rings) => rings.length) ?? [];
+  expect([filled[0], filled.at(-1)]).toEqual([1, 1]);
+  expect(filled.slice(1, -1).every((count) => count === 0)).toBe(true);
   act(() => result.current.point(at(4)));
   expect(result.current.pointed).toEqual({ lane: "1.0.-1", value: "0 veh/h" });
   act(() => result.current.setSpan([0, 1]));
