@@ -50,7 +50,7 @@ export const QUANTITIES = localized((): Record<LanesBy, Quantity> => ({
   delay: {
     word: roadUnit().sign === "km" ? t`Delay per km` : t`Delay per mile`,
     sign: () => `s/${roadUnit().sign}`,
-    // Where all stood and none drove, no number is large enough.
+    // Where all vehicles were stopped, no number is large enough.
     of: ({ distance, lost }) => (distance > 0 ? lost / (distance * roadUnit().scale) : Infinity),
   },
   density: {
@@ -142,6 +142,6 @@ export function wordsOf(by: LanesBy, bounds: readonly number[]): string[] {
 /** A value in words. */
 export function valueText(by: LanesBy, value: number): string {
   if (Number.isNaN(value)) return t`no vehicle`;
-  if (value === Infinity) return t`vehicles stood all the time`;
+  if (value === Infinity) return t`vehicles were stopped all the time`;
   return `${short(value, value < 100 ? 1 : 0)} ${QUANTITIES()[by].sign()}`;
 }

@@ -84,7 +84,7 @@ test("the scale is the one of Matplotlib, and grows lighter from colour to colou
 
 test("a lane without vehicles, and one on which all stood, have words instead of a number", () => {
   expect(valueText("delay", NaN)).toBe("no vehicle");
-  expect(valueText("delay", Infinity)).toBe("vehicles stood all the time");
+  expect(valueText("delay", Infinity)).toBe("vehicles were stopped all the time");
   expect(valueText("flow", 123.4)).toBe("123 veh/h");
 });
 
