@@ -9,7 +9,7 @@ const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
   de: () => import("../locales/de.po"),
 };
 
-/** Compiled as they are first shown; the catalogue of English would be a seventh of the first load. */
+/** Compiled as they are first shown; the catalogue of English would be more than a tenth of the first load. */
 const compiled = new Map<string, ReturnType<typeof compileMessage>>();
 
 i18n.setMessagesCompiler((message) => {
