@@ -7,7 +7,10 @@ const server = process.env.ODSCEN_SERVER ?? "http://127.0.0.1:8765";
 
 export default defineConfig({
   base: "./",
-  plugins: [react({ babel: { plugins: ["@lingui/babel-plugin-lingui-macro"] } }), lingui()],
+  plugins: [
+    react({ babel: { plugins: [["@lingui/babel-plugin-lingui-macro", { descriptorFields: "message" }]] } }),
+    lingui(),
+  ],
   build: {
     outDir: "../src/odscen/web/static",
     emptyOutDir: true,

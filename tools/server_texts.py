@@ -1,4 +1,4 @@
-"""The texts of the server's closed lists, for the page's catalogue: figures and templates.
+"""The texts of the closed lists of the server, for the catalogue: figures, verdicts, templates.
 
 The page looks a text up as the server sends it; what is not here is shown in English.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from odscen.results.measures.usability import UsabilityLevel
 from odscen.scenario.templates.template_registry import TEMPLATES
 from odscen.web.figure_routes import actor_measures, figures
 
@@ -43,6 +44,7 @@ def _registered() -> Iterator[str]:
             yield figure.definition
     for measure in actor_measures():
         yield measure.label
+    yield from (str(level) for level in UsabilityLevel)
     for template in TEMPLATES.values():
         yield from (template.title, template.summary, template.needs)
         for number in template.parameters:

@@ -92,4 +92,4 @@ def test_the_first_load_is_below_250_kilobytes(
         ".filter((one) => !one.name.includes('/api/')).map((one) => [one.name, one.transferSize])"
     )
     assert any(".js" in name and size > 1000 for name, size in sizes)
-    assert sum(size for _, size in sizes) < 250_000
+    assert sum(size for _, size in sizes) < 250_000, sizes

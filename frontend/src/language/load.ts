@@ -1,12 +1,22 @@
 import { i18n, type Messages } from "@lingui/core";
+import { compileMessage } from "@lingui/message-utils/compileMessage";
 
 import { type Language, LANGUAGES, usePreferences } from "./preferences";
 
-/** The catalogues, each loaded when its language is first chosen. */
+/** The catalogues, each loaded when its language is first chosen; English texts come with the code. */
 const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
-  en: () => import("../locales/en.po"),
+  en: () => Promise.resolve({ messages: {} }),
   de: () => import("../locales/de.po"),
 };
+
+/** Compiled as they are first shown; the catalogue of English would be more than a tenth of the first load. */
+const compiled = new Map<string, ReturnType<typeof compileMessage>>();
+
+i18n.setMessagesCompiler((message) => {
+  let known = compiled.get(message);
+  if (!known) compiled.set(message, (known = compileMessage(message)));
+  return known;
+});
 
 /** Shows the page in a language; what is shown changes when its catalogue is there. */
 async function speak(language: Language): Promise<void> {

@@ -69,6 +69,7 @@ export const SERVER_TEXTS: Readonly<Record<string, MessageDescriptor>> = {
   "mean travel time": msg`mean travel time`,
   "median travel time": msg`median travel time`,
   "not inserted": msg`not inserted`,
+  "not usable": msg`not usable`,
   "of the bus": msg`of the bus`,
   "of the lead vehicle": msg`of the lead vehicle`,
   "of the overtaking car": msg`of the overtaking car`,
@@ -120,5 +121,7 @@ export const SERVER_TEXTS: Readonly<Record<string, MessageDescriptor>> = {
   "trips ended in a parking place": msg`trips ended in a parking place`,
   "two lanes of one direction": msg`two lanes of one direction`,
   "unused green": msg`unused green`,
+  "usable": msg`usable`,
+  "usable with reservations": msg`usable with reservations`,
   "vehicle-kilometres travelled": msg`vehicle-kilometres travelled`,
 };

@@ -42,7 +42,7 @@ export function CountsFit({
   const shown = worstFirst(all ? rows : rows.filter((row) => !row.met));
   return (
     <>
-      <Title order={3} size="h5">
+      <Title order={2} size="h5">
         <Trans>
           {met.toLocaleString(i18n.locale)} of <Plural value={rows.length} one="# count" other="# counts" />{" "}
           met ({Math.round((100 * met) / rows.length)} %)
@@ -66,7 +66,7 @@ export function CountsFit({
           </List>
         </Alert>
       )}
-      <Title order={3} size="h5">
+      <Title order={2} size="h5">
         {all ? t`All counts` : t`Not met`}
       </Title>
       {rows.length > met && (

@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { served } from "../language/served";
 import { localized } from "../language/localized";
 import { carla } from "../api/carla";
 import { allFigures } from "../api/figures";
@@ -58,7 +59,7 @@ export function Result({
     <section aria-label={t`Result of the run`}>
       <Title order={2} size="h3">
         {TITLE()[info.state] ?? t`The run is finished`}
-        {verdict && `: ${verdict.level}`}
+        {verdict && `: ${served(verdict.level)}`}
       </Title>
       {verdict && <Reservations verdict={verdict} />}
       {failed && <Failure info={info} />}
