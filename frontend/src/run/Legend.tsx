@@ -108,7 +108,7 @@ export function Legend({
   );
 }
 
-/** What the colours of lanes mean, and that of lanes on which nobody was. */
+/** What the colours of lanes mean, and that of lanes without vehicles. */
 function LaneRows({ word, colors, words, unused }: LaneLegend & { word: string; unused: string }) {
   return (
     <>
