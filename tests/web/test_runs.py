@@ -18,12 +18,15 @@ from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 from websockets.sync.client import connect
 
+from odscen.app.runs import run as run_scenario
+from odscen.app.scenarios import SUFFIX
 from odscen.base.errors import SimulationError
 from odscen.base.frames import SumoPose, sumo_to_xodr
 from odscen.carla.server.client import Address
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder.run_sums import seal_again
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.web import active_runs
 from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, finished, wait_for
@@ -307,6 +310,17 @@ def test_runs_of_one_scenario_are_found_after_a_restart_too(
         again.close()
     listed = client.get("/api/runs", params={"scenario": sampled}).json()
     assert [row["run"] for row in listed] == [first, second]
+
+
+def test_runs_from_the_command_line_are_among_those_of_their_scenario(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    document = workspace.scenarios / f"{sampled}{SUFFIX}"
+    made = run_scenario(workspace, document, settings=RunSettings(until=2.0)).folder.name
+    numbered = start(client, sampled)
+    finished(client, numbered)
+    listed = client.get("/api/runs", params={"scenario": sampled}).json()
+    assert [row["run"] for row in listed] == [made, numbered] == [sampled, f"{sampled}-1"]
 
 
 def test_runs_of_a_changed_scenario_can_be_told_apart(client: TestClient, sampled: str) -> None:

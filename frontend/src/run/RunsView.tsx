@@ -7,6 +7,7 @@ import { hashOf } from "../ui/address";
 import { useLearnedTitle, useTitle } from "../ui/titles";
 import { useLoaded } from "../ui/useLoaded";
 import { EarlierRuns } from "./EarlierRuns";
+import "./run.css";
 
 /** The runs of one scenario by themselves. */
 export function RunsView({ scenario }: { scenario: string }) {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 import shutil
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -28,7 +27,7 @@ from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.worker.protocol import Command, Failed, Pace
 from odscen.sumo.worker.snapshots import origin
-from odscen.web.kept_runs import KeptRuns
+from odscen.web.kept_runs import KeptRuns, names_of_runs, numbered_stem
 from odscen.web.large.large_runs import LargeRun
 from odscen.web.live_view import Active
 from odscen.web.wire.run_messages import RunForecast, RunInfo, RunProgress, RunState
@@ -227,7 +226,11 @@ class Runs:
 
         ``scenario`` is the name of a scenario file, if only its runs are wanted.
         """
-        wanted = (lambda _run: True) if scenario is None else _names_of(scenario).fullmatch
+        wanted = (
+            (lambda _run: True)
+            if scenario is None
+            else names_of_runs(scenario, self._workspace.scenarios).fullmatch
+        )
         with self._lock:
             names = dict.fromkeys(filter(wanted, self._active))
         done = [name for name in self.kept.by_age() if wanted(name) and name not in names]
@@ -367,7 +370,7 @@ class Runs:
 
     def _free_id(self, name: str) -> str:
         for number in itertools.count(1):
-            free = f"{_stem(name)}-{number}"
+            free = f"{numbered_stem(name)}-{number}"
             if free not in self._active and not (self._workspace.runs / free).exists():
                 return free
         raise AssertionError
@@ -389,13 +392,3 @@ def _end_of(result: Run, active: Active) -> tuple[RunState, str | None]:
     if read_status(result.folder) is None:
         return "failed", str(result.summary["error"])
     return "interrupted", None if active.interrupted else str(result.summary["error"])
-
-
-def _stem(scenario: str) -> str:
-    """Beginning of the ids of a scenario's runs; a number follows."""
-    return scenario[:56]
-
-
-def _names_of(scenario: str) -> re.Pattern[str]:
-    """Ids of a scenario's runs that a server has started."""
-    return re.compile(rf"{re.escape(_stem(scenario))}-[1-9]\d*")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from odscen.app.scenarios import SUFFIX
 from odscen.base.checksums import read_checked, read_sums
 from odscen.base.durations import clock
 from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".html", ".json", ".csv", ".parquet", ".log")
 """Of files that can be downloaded."""
+_NUMBER = r"-[1-9]\d*"
 _INNER = {layout.SETTINGS_FILE, layout.STATUS_FILE}
 _INNER_FOLDERS = {layout.SUMO_FOLDER, layout.SLICES_FOLDER}
 
@@ -258,3 +261,21 @@ def _unfinished(folder: Path, summary: RunSummary | None) -> RunInfo:
         error=message if state == "interrupted" else None,
         slices=KeptRuns(folder.parent).slices(folder.name),
     )
+
+
+def numbered_stem(scenario: str) -> str:
+    """Beginning of the ids of a scenario's runs that a server has started; a number follows."""
+    return scenario[:56]
+
+
+def names_of_runs(scenario: str, scenarios: Path) -> re.Pattern[str]:
+    """Ids of a scenario's runs: numbered ones of a server, and the one that ``odscen run`` makes.
+
+    That has the name of the scenario; where it is a numbered one of another scenario in the folder
+    ``scenarios``, it counts as that.
+    """
+    numbered = rf"{re.escape(numbered_stem(scenario))}{_NUMBER}"
+    other = re.sub(rf"{_NUMBER}$", "", scenario)
+    if other != scenario and (scenarios / f"{other}{SUFFIX}").is_file():
+        return re.compile(numbered)
+    return re.compile(rf"{re.escape(scenario)}|{numbered}")
