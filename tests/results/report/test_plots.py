@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.results.report.plots import Series, TimeUnit, line_chart, nice_ticks
+from odscen.results.report.plots import Series, TimeUnit, clock_axis, line_chart, nice_ticks
 
 
 @given(st.floats(1e-3, 1e6))
@@ -52,3 +52,11 @@ def test_higher_values_are_drawn_higher_up():
     heights = [float(point.split(",")[1]) for point in line.split()]
     assert heights == sorted(heights, reverse=True)
     assert heights[0] == 230.0
+
+
+def test_the_axis_of_a_short_run_counts_minutes_and_that_of_a_long_one_hours():
+    short, long = clock_axis(0.0, 90.0), clock_axis(0.0, 7200.0)
+    assert short.ticks == [(0.0, "0"), (60.0, "1")]
+    assert short.name == "time since the start, min"
+    assert long.name == "time since the start, h:min"
+    assert long.ticks[1] == (900.0, "0:15")

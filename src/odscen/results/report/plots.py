@@ -114,7 +114,7 @@ def clock_axis(begin: float, end: float) -> Axis:
     """
     steps = (1, 2, 5, 10, 15, 30, 60, 120, 180, 360)
     step = next((60.0 * one for one in steps if end - begin <= one * 540.0), 43_200.0)
-    first = np.ceil(begin / step - 1e-9) * step
+    first = np.ceil(begin / step - 1e-9) * step + 0.0  # not -0
     values = np.arange(first, end + 1e-6, step).tolist()
     if not has_clock() and end <= 3600.0:
         minutes = [(value, f"{value / 60.0:.0f}") for value in values]
