@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
 
+import { prefer } from "../src/language/preferences";
 import { hasEnded, keyFigures } from "../src/run/figures";
 import { FIGURES } from "./figures";
 import { Crowd, decodeFrame } from "../src/run/frames";
@@ -50,6 +51,18 @@ test("key figures that a run has not are left out", () => {
     ["Mean speed", "36.0 km/h"],
   ]);
   expect(keyFigures(summary(), FIGURES)).toEqual([]);
+});
+
+test("key figures are in the units of the reader", () => {
+  const some = summary({ figures: { mean_speed: 10, mean_delay: null } }, {});
+  const speed = (): string | undefined =>
+    keyFigures(some, FIGURES).find(({ name }) => name === "mean_speed")?.value;
+  prefer({ speed: "mph" });
+  expect(speed()).toBe("22.4 mph");
+  prefer({ speed: "m/s" });
+  expect(speed()).toBe("10.0 m/s");
+  prefer({ speed: "km/h" });
+  expect(speed()).toBe("36.0 km/h");
 });
 
 test("only final states end a run", () => {

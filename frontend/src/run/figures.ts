@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { preferences } from "../language/preferences";
 import { localized } from "../language/localized";
 import { served } from "../language/served";
+import { shownAs } from "../language/units";
 import { longClock, sentence } from "../ui/words";
 import type { FigureInfo } from "../api/figures";
 import type { RunState, Summary } from "../api/runs";
@@ -31,11 +32,12 @@ function get(summary: Summary, { name, part }: FigureInfo): number | null {
 }
 
 function plain(n: number, { unit, factor, digits }: FigureInfo["display"]): string {
-  const text = (n * factor).toLocaleString(i18n.locale, {
+  const { suffix, scale } = shownAs(unit ? ` ${unit}` : "");
+  const text = (n * factor * scale).toLocaleString(i18n.locale, {
     minimumFractionDigits: digits,
     maximumFractionDigits: digits,
   });
-  return unit ? `${text} ${unit}` : text;
+  return text + suffix;
 }
 
 const say = (n: number, { display }: FigureInfo): string =>
