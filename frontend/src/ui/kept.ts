@@ -59,6 +59,7 @@ export function keep(part: Kept): void {
     kept: { ...same?.kept, ...part },
     timer: same?.timer ?? window.setTimeout(write, LAG),
   };
+  if (part.step) write(); // a form is begun at once, and the back button is near
 }
 
 /** The address with all that is to be kept, now. */

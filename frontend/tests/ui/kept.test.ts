@@ -37,11 +37,11 @@ test("what is no view, scale or time is left out, and so is a list that is too l
   expect(withKept("#/edit/s?step=run", { chosen: many })).toBe("#/edit/s");
 });
 
-test("the address follows a little later, in one go and without another entry of the history", () => {
+test("the address has the step at once, and all else a little later, without another entry of the history", () => {
   const entries = history.length;
   keep({ step: "rules" });
   keep({ chosen: ["car-1"] });
-  expect(location.hash).toBe("#/edit/a%3Fb");
+  expect(location.hash).toBe("#/edit/a%3Fb?step=rules");
   vi.runAllTimers();
   expect(location.hash).toBe("#/edit/a%3Fb?step=rules&chosen=car-1");
   keep({ chosen: [] });
