@@ -44,7 +44,7 @@ def test_a_number_becomes_a_slider_is_swept_and_a_case_opened_by_a_click(
     page.get_by_role("textbox", name="Number that becomes a parameter").click()
     page.get_by_role("option", name=f"{first}: depart, now 0").click()
     page.get_by_label("Name of the parameter").fill("later")
-    page.get_by_label("Unit").fill("s")
+    page.get_by_label("Unit", exact=True).fill("s")
     with user.changing():
         page.get_by_role("button", name="Add the parameter").click()
     document = user.document()

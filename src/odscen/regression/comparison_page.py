@@ -148,7 +148,7 @@ def _interval_chart(rows: Sequence[Row]) -> Markup:
     svg = element("svg", *parts, viewBox=f"0 0 {number(_WIDTH)} {number(height)}", role="img",
                   class_="chart tall")  # fmt: skip
     keys = legend([("c-clear", "clear"), ("c-unclear", "may be random, or too few runs")])
-    return element("div", svg, keys, class_="chart-box")
+    return element("div", svg, keys, class_="chart-box", tabindex="0")
 
 
 def _reach(largest: float) -> float:

@@ -256,7 +256,7 @@ def chart(
     drawn.append(x_name)
     view = f"0 0 {number(_WIDTH)} {number(frame.height)}"
     svg = element("svg", *drawn, viewBox=view, role="img", class_="chart")
-    return element("div", svg, keys, class_="chart-box")
+    return element("div", svg, keys, class_="chart-box", tabindex="0")
 
 
 def legend(entries: Sequence[tuple[str, str]]) -> Markup:

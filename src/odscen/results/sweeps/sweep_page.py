@@ -223,7 +223,7 @@ def _lines(sweep: SweepShown) -> Markup:
     )
     if len(chosen) < len(styles):
         explained += f" {len(chosen):,} of {len(styles):,} cases are drawn."
-    box = element("div", svg, _keys(styles), class_="chart-box")
+    box = element("div", svg, _keys(styles), class_="chart-box", tabindex="0")
     return report_section("All cases", box, explained=explained, ident="cases")
 
 

@@ -119,7 +119,7 @@ def _plan(
 ) -> Markup:
     words = f"cycle {number(plan.cycle)} s, offset {number(plan.offset)} s"
     head = element("p", element("b", f"Plan {plan.id}: "), words) if named else None
-    chart = element("div", plan_chart(light, plan), class_="chart-box")
+    chart = element("div", plan_chart(light, plan), class_="chart-box", tabindex="0")
     parts = (head, stage_diagram(light, plan, pictures), chart, split_table(light, plan))
     return join([part for part in parts if part])
 
@@ -145,7 +145,7 @@ def _as_shown(light: LightProgram, states: pl.DataFrame) -> Markup:
         marks=[start for start in starts if begin < start < end],
     )
     head = element("p", element("b", "As shown in the run"))
-    return join([head, element("div", chart, class_="chart-box")])
+    return join([head, element("div", chart, class_="chart-box", tabindex="0")])
 
 
 def _first_stage(light: LightProgram) -> str:
