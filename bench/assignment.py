@@ -21,9 +21,9 @@ import numpy as np
 import polars as pl
 
 from bench.common import shared_maps
-from odscen.app.demand_correction import correct_matrix
+from odscen.app.demand.demand_correction import correct_matrix
 from odscen.app.maps import LoadedMap, load_map
-from odscen.app.runs import carry_out, check_run, prepare_run
+from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.base.categories import Category
 from odscen.results.records.assignment_steps import Assignment, AssignmentStep
 from odscen.results.report.report_demand import ShownCount, convergence_chart, scatter_chart

@@ -18,7 +18,7 @@ from pathlib import Path
 from bench.in_turns import seconds_of
 from bench.rules import MAP, traffic
 from odscen.app.maps import load_map
-from odscen.app.runs import check_run, prepare_run
+from odscen.app.running.runs import check_run, prepare_run
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.workspace.store import Workspace

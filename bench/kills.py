@@ -24,7 +24,7 @@ from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
-from odscen.app import demands
+from odscen.app.demand import demands
 from odscen.app.scenarios import SUFFIX, generate, read_scenario, write_scenario
 from odscen.base.atomic_folders import clear_leftovers
 from odscen.scenario.demand.day_profiles import DAY, curve

@@ -28,9 +28,9 @@ from typing import NamedTuple
 import polars as pl
 
 from bench.common import shared_maps, without_output
-from odscen.app import demands
+from odscen.app.demand import demands
 from odscen.app.maps import load_map
-from odscen.app.reports import write_report
+from odscen.app.running.reports import write_report
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.checkpoint import last_number, read_checkpoint
 from odscen.sumo.folder.recorded import trajectory_files

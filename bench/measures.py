@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import polars as pl
 
 from odscen.app.maps import load_map
-from odscen.app.runs import check_file, prepare_run
+from odscen.app.running.runs import check_file, prepare_run
 from odscen.base.categories import Category
 from odscen.results.measures.comparison import compare_figure
 from odscen.scenario.document.json_form import dumps

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from starlette.testclient import TestClient
 
 from bench.common import shared_maps
-from odscen.app import runs
+from odscen.app.running import batches
 from odscen.app.scenarios import SUFFIX, generate
 from odscen.base.errors import OdscenError
 from odscen.cli.map_commands import names_for
@@ -78,7 +78,7 @@ def _counts(workspace: Workspace, client: TestClient, source: Path, name: str) -
     except OdscenError as error:
         print(f"{name}: no scenario: {error}")
         return found
-    for run in runs.run_many(workspace, paths):
+    for run in batches.run_many(workspace, paths):
         found.update(_outcome(run))
         lights = client.get(f"/api/maps/{name}").json()["lights"]
         found.update(_answers(client, run_paths(run.folder.name, lights)))

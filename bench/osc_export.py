@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from lxml import etree
 
 from odscen.app.export import export, export_run
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenarios import generate
 from odscen.app.template_scenarios import write_template
 from odscen.interchange.openscenario.dialect import VERSIONS

@@ -19,7 +19,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenario_imports import import_scenario
 from odscen.base.errors import NoMapError, OdscenError
 from odscen.base.xml_reading import read_xml

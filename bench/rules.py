@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.in_turns import shares_of
 from odscen.app.maps import load_map
-from odscen.app.runs import check_run, prepare_run
+from odscen.app.running.runs import check_run, prepare_run
 from odscen.lanegraph.query import node_id
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.scenario_document import (

@@ -14,7 +14,7 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 from bench.common import shared_maps
-from odscen.app import runs
+from odscen.app.running import batches
 from odscen.app.scenarios import generate
 from odscen.cli.map_commands import names_for
 from odscen.results.measures.summary import ActorOutcome, actors_from_json
@@ -54,7 +54,7 @@ def main() -> None:
                     map_name=entry.name, count=count, seed=1000 * index, config=config
                 ),
             )
-            results = runs.run_many(workspace, paths, processes=os.cpu_count() or 1)
+            results = batches.run_many(workspace, paths, processes=os.cpu_count() or 1)
             scenarios[entry.name] += len(paths)
             for result in results:
                 if result.status == "failed":

@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import polars as pl
 
-from odscen.app.demands import add_background
+from odscen.app.demand.demands import add_background
 from odscen.app.maps import load_map
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.signals.green_waves import coordinate_signals
 from odscen.app.signals.signal_optimisation import time_signals
 from odscen.base.categories import Category

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import pytest
 from typer.main import get_command
 
-from odscen.app import runs
+from odscen.app.running import batches
 from odscen.cli.commands import command_line
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page
@@ -163,7 +163,7 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Workspace, list[
     folders = []
     for seed in (1, 2):
         settings = RunSettings(seed=seed, recording=Recording(criticality=True))
-        runs.run_many(store, [SCENARIO], out=root / str(seed), settings=settings)
+        batches.run_many(store, [SCENARIO], out=root / str(seed), settings=settings)
         folders.append(root / str(seed) / "signal_crossing")
     return store, folders
 

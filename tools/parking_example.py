@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from odscen.app.maps import LoadedMap, load_map
-from odscen.app.runs import carry_out, check_run, prepare_run
+from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.base.markup import element, path_data
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.results.report.report_map import fitted_view, scale_bar, view_box

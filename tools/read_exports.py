@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from odscen.app.export import export, export_run
-from odscen.app.runs import run_many
+from odscen.app.running.batches import run_many
 from odscen.app.scenarios import generate, read_scenario
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.sampling.generation_settings import GenerationSettings

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from odscen.results.measures.usability import UsabilityLevel
 from odscen.scenario.templates.template_registry import TEMPLATES
-from odscen.web.figure_routes import actor_measures, figures
+from odscen.web.routes.figure_routes import actor_measures, figures
 
 TARGET = Path(__file__).parents[1] / "frontend/src/language/serverTexts.ts"
 

@@ -21,12 +21,13 @@ from odscen.base.version import __version__ as __version__
 if TYPE_CHECKING:
     from odscen.app.export import export
     from odscen.app.learner_arrays import scenario_arrays, scenario_from_arrays
-    from odscen.app.reports import renew_report
-    from odscen.app.resumed_runs import resume
-    from odscen.app.runs import run, run_many
+    from odscen.app.running.batches import run_many
+    from odscen.app.running.reports import renew_report
+    from odscen.app.running.resumed_runs import resume
+    from odscen.app.running.runs import run
+    from odscen.app.running.watched_runs import WatchedRun, watch
     from odscen.app.scenarios import check_scenario as check
     from odscen.app.scenarios import generate, read_scenario, write_scenario
-    from odscen.app.watched_runs import WatchedRun, watch
     from odscen.base.errors import (
         ConflictError,
         InputError,
@@ -78,14 +79,14 @@ _HOMES = {
     "RunSettings": "odscen.sumo.realize.run_settings",
     "Recording": "odscen.sumo.realize.recording",
     "parse_expectation": "odscen.results.judging.expectations",
-    "run": "odscen.app.runs",
-    "run_many": "odscen.app.runs",
-    "resume": "odscen.app.resumed_runs",
-    "watch": "odscen.app.watched_runs",
-    "WatchedRun": "odscen.app.watched_runs",
+    "run": "odscen.app.running.runs",
+    "run_many": "odscen.app.running.batches",
+    "resume": "odscen.app.running.resumed_runs",
+    "watch": "odscen.app.running.watched_runs",
+    "WatchedRun": "odscen.app.running.watched_runs",
     "Step": "odscen.sumo.runner.in_step",
     "Run": "odscen.sumo.folder.finished_run",
-    "renew_report": "odscen.app.reports",
+    "renew_report": "odscen.app.running.reports",
     "compare": "odscen.regression.compare",
     "RunComparison": "odscen.regression.compare",
     "OdscenError": "odscen.base.errors",

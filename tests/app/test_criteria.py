@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenarios import check_scenario, read_scenario, write_scenario
 from odscen.base.errors import ScenarioError
 from odscen.results.judging.expectations import parse_expectation

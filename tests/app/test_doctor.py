@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from odscen.app.doctor import examine
-from odscen.app.reports import renew_report
-from odscen.app.resumed_runs import resume
-from odscen.app.runs import carry_out, check_file, prepare_run
+from odscen.app.running.reports import renew_report
+from odscen.app.running.resumed_runs import resume
+from odscen.app.running.runs import carry_out, check_file, prepare_run
 from odscen.base.errors import DamagedError, InputError
 from odscen.regression.compare import compare
 from odscen.sumo.folder.run_sums import damaged_in
@@ -108,7 +108,7 @@ def test_a_byte_that_has_changed_anywhere_is_named_by_report_and_compare(
     def computing(*_arguments: object, **_options: object) -> None:
         raise ComputingError
 
-    monkeypatch.setattr("odscen.app.reports.load_map", computing)
+    monkeypatch.setattr("odscen.app.running.reports.load_map", computing)
     names = files_of(pair.finished)
     assert len(names) > 25
     for name in names:

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from odscen.app.generators import GeneratorDoor
-from odscen.app.runs import run_many
+from odscen.app.running.batches import run_many
 from odscen.app.scenarios import generate, read_scenario
 from odscen.learning.fill_check import CheckedFill
 from odscen.scenario.sampling.generation_settings import GenerationSettings

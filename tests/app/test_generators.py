@@ -14,7 +14,7 @@ import pytest
 
 from odscen.app.generators import GeneratorDoor, Placer, installed_generators, open_generator
 from odscen.app.maps import load_map
-from odscen.app.runs import carry_out, check_run, prepare_run
+from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import generate, read_scenario
 from odscen.base.errors import InputError
 from odscen.learning.fill import Fill, FillRequest, fill_from_bytes

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from odscen.app.networks import bring_in
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenarios import check_scenario
 from odscen.base.errors import InputError
 from odscen.convert.imported.net_import import read_network

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenario_imports import ImportedScenario, import_scenario
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace

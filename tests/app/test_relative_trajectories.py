@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from odscen.app.export import export
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenario_imports import import_scenario
 from odscen.changes.acting_differences import acting_differences
 from odscen.sumo.realize.run_settings import RunSettings

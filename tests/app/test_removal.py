@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from odscen.app.removal import RemovalFacts, removal_facts, remove, removed_map
-from odscen.app.runs import carry_out, check_file, prepare_run, run
+from odscen.app.running.runs import carry_out, check_file, prepare_run, run
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import ConflictError, NotFoundError
 from odscen.base.folder_locks import locked

@@ -18,7 +18,7 @@ import pytest
 from lxml import etree
 
 from odscen.app.export import EXPORTERS, export, export_run, export_runs
-from odscen.app.runs import run_many
+from odscen.app.running.batches import run_many
 from odscen.base.errors import InputError
 from odscen.interchange.exporter import WhatHappened
 from odscen.interchange.recordings.tfrecord import read_tfrecord

@@ -22,7 +22,7 @@ def test_text_and_attributes_are_those_of_the_standard_library(text: str) -> Non
 
 def test_the_command_line_starts_without_tables_and_without_a_client_for_the_network() -> None:
     code = (
-        "import sys, odscen.cli, odscen.app.runs;"
+        "import sys, odscen.cli, odscen.app.running.runs;"
         "names = 'polars', 'shapely', 'urllib.request', 'ssl';"
         "print([name for name in names if name in sys.modules])"
     )

@@ -14,7 +14,7 @@ import psutil
 import pytest
 from playwright.sync_api import Page, expect
 
-from odscen.app import runs
+from odscen.app.running import batches
 from odscen.app.scenarios import SUFFIX, generate
 from odscen.app.studies.executors import LocalExecutor
 from odscen.app.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
@@ -397,7 +397,7 @@ def written(one_map: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str
             settings=GenerationSettings(map_name=CROSSING, seed=5, fill=fill),
         )
         for seed in (1, 2):
-            runs.run_many(
+            batches.run_many(
                 workspace, made, out=root / side / str(seed), settings=RunSettings(seed=seed)
             )
             run = next((root / side / str(seed)).iterdir())

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 from playwright.sync_api import expect
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.app.sweeps.sweep_runs import WATCHES_CLOSENESS
 from odscen.app.template_scenarios import template_scenario

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from odscen.app import runs
+from odscen.app.running import runs
 from odscen.base.errors import InputError
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page

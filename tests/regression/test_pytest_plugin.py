@@ -168,5 +168,5 @@ def test_failures_show_the_line_of_the_test_and_nothing_of_ours(project, workspa
     assert "<Run of t_junction_signs, seed 16: completed>" in done.stdout
     assert "no figure named 'mean_dealy'; did you mean mean_delay" in done.stdout
     assert "Failed: no.scenario.json: No such file or directory" in done.stdout
-    for internal in ("pytest_plugin.py", "finished_run.py", "app/runs.py"):
+    for internal in ("pytest_plugin.py", "finished_run.py", "app/running/runs.py"):
         assert internal not in done.stdout

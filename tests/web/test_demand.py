@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from odscen.app import demands
+from odscen.app.demand import demands
 from odscen.app.maps import load_map
 from odscen.scenario.demand.count_stations import place_points
 from odscen.scenario.document.json_form import loads

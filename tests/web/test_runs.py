@@ -18,7 +18,7 @@ from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 from websockets.sync.client import connect
 
-from odscen.app.runs import run as run_scenario
+from odscen.app.running.runs import run as run_scenario
 from odscen.app.scenarios import SUFFIX
 from odscen.base.errors import SimulationError
 from odscen.base.frames import SumoPose, sumo_to_xodr

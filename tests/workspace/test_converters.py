@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenarios import check_scenario, generate
 from odscen.base.checksums import sums_of, write_sums
 from odscen.base.errors import InputError, ToolError

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.app.map_repairs import see_to_assets, see_to_map
-from odscen.app.run_repairs import see_to_run
+from odscen.app.running.run_repairs import see_to_run
 from odscen.base.system_errors import disk_errors
 
 if TYPE_CHECKING:

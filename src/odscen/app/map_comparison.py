@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from odscen.app.maps import load_map
-from odscen.app.runs import check_run, run_all
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
 from odscen.base.errors import InputError, ToolError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.lanegraph.query import largest_part, node_id

@@ -33,12 +33,12 @@ def fit(
 
     Of a scenario, traffic as planned, without congestion; of a run, as simulated.
     """
-    from odscen.app import demands
+    from odscen.app.demand import demands
     from odscen.workspace.store import Workspace
 
     found = demands.fit(Workspace.open(workspace), what)
     if page is not None:
-        from odscen.app.demand_correction import write_fit_page
+        from odscen.app.demand.demand_correction import write_fit_page
 
         log(f"Wrote {write_fit_page([('Counts and traffic', found)], page, title=what.stem)}")
     if as_json:
@@ -74,7 +74,8 @@ def routes(
     as_json: JsonOption = False,
 ) -> None:
     """Say how trips of the demand choose their routes; what is not given stays as it is."""
-    from odscen.app import demands, scenarios
+    from odscen.app import scenarios
+    from odscen.app.demand import demands
     from odscen.workspace.store import Workspace
 
     given = {
@@ -111,7 +112,8 @@ def parking(
     as_json: JsonOption = False,
 ) -> None:
     """Say which trips of the demand park; what is not given stays as it is."""
-    from odscen.app import demands, scenarios
+    from odscen.app import scenarios
+    from odscen.app.demand import demands
     from odscen.workspace.store import Workspace
 
     given = {"begin": begin, "end": end, "stay": stay, "within": within}
@@ -146,7 +148,8 @@ def correct(
 
     Each matrix becomes one for each slice; the counts are kept to compare with.
     """
-    from odscen.app import demand_correction, scenarios
+    from odscen.app import scenarios
+    from odscen.app.demand import demand_correction
     from odscen.workspace.store import Workspace
 
     document = scenarios.read_scenario(scenario)

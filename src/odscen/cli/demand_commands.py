@@ -80,7 +80,8 @@ def import_(
     The scenario holds the values; the tables are not needed any more. What has the same name is
     replaced.
     """
-    from odscen.app import demands, scenarios
+    from odscen.app import scenarios
+    from odscen.app.demand import demands
     from odscen.workspace.store import Workspace
 
     store = Workspace.open(workspace)
@@ -132,7 +133,8 @@ def add(
     road at a time. With --sized, that is how many at most, and without one of them what the
     capacities of the junctions propose.
     """
-    from odscen.app import demands, scenarios, sized_demand
+    from odscen.app import scenarios
+    from odscen.app.demand import demands, sized_demand
     from odscen.workspace.store import Workspace
 
     amounts = {"fill": fill, "per_km": per_km, "trips": trips}
@@ -183,7 +185,8 @@ def inflow(
 
     Where they can: odscen demand entries.
     """
-    from odscen.app import demands, scenarios
+    from odscen.app import scenarios
+    from odscen.app.demand import demands
     from odscen.workspace.store import Workspace
 
     fields: dict[str, Any] = {"segment": segment, "per_hour": per_hour, "direction": direction}
@@ -207,7 +210,8 @@ def list_entries(
     scenario: ScenarioArgument, workspace: WorkspaceOption = None, as_json: JsonOption = False
 ) -> None:
     """List where vehicles can drive into the region of a scenario: segment, direction, lanes."""
-    from odscen.app import demands, maps, scenarios
+    from odscen.app import maps, scenarios
+    from odscen.app.demand import demands
     from odscen.workspace.store import Workspace
 
     document = scenarios.read_scenario(scenario)
@@ -243,7 +247,8 @@ def weekday(
     based on is printed. If the junctions do not carry as many as asked for, there are fewer. Then
     the busiest hour is run, and there are as many trips as it carries.
     """
-    from odscen.app import demands, scenarios, sized_demand
+    from odscen.app import scenarios
+    from odscen.app.demand import demands, sized_demand
     from odscen.workspace.store import Workspace
 
     store = Workspace.open(workspace)
@@ -283,7 +288,8 @@ def size(
     The busiest hour is run with a tenth more than what is written; the largest amount is taken with
     which the verdict is usable. What fits stays as it is.
     """
-    from odscen.app import scenarios, sized_demand
+    from odscen.app import scenarios
+    from odscen.app.demand import sized_demand
     from odscen.workspace.store import Workspace
 
     document = scenarios.read_scenario(scenario)

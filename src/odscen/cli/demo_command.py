@@ -19,7 +19,8 @@ def demo(
     as_json: JsonOption = False,
 ) -> None:
     """Build the maps that ship, sample a scenario, run it, and name the report to open."""
-    from odscen.app import runs, scenarios
+    from odscen.app import scenarios
+    from odscen.app.running import runs
     from odscen.scenario.sampling.generation_settings import GenerationSettings
     from odscen.workspace.shipped import shipped_maps
     from odscen.workspace.store import Workspace

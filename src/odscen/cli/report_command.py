@@ -45,7 +45,7 @@ def report(
 
     --json prints the figures too, and those of each interval and place.
     """
-    from odscen.app.reports import interval_rows, renew_report
+    from odscen.app.running.reports import interval_rows, renew_report
     from odscen.workspace.store import Workspace
 
     if (first is None) != (last is None):

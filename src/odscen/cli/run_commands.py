@@ -181,7 +181,7 @@ def run(
 
     get_ready()  # its imports take as long as ours, and are done meanwhile
     gc.disable()  # what is imported stays, and need not be gone through again and again
-    from odscen.app import runs
+    from odscen.app.running import batches
     from odscen.app.scenarios import scenario_files
     from odscen.results.judging.expectations import parse_expectation
     from odscen.sumo.realize.recording import Recording, parse_recording
@@ -225,7 +225,7 @@ def run(
         )  # fmt: skip
         return
     with _hint(out or store.runs), progress("running") as step:
-        results = runs.run_many(
+        results = batches.run_many(
             store,
             paths,
             settings=settings,
@@ -258,7 +258,7 @@ def _run_until_confident(
     as_json: bool,
 ) -> None:
     """Run each scenario with as many seeds as its interval needs, and print all of it."""
-    from odscen.app.confident_runs import FEWEST, parse_share, run_until_confident
+    from odscen.app.running.confident_runs import FEWEST, parse_share, run_until_confident
 
     wanted = parse_share(share)
     results: list[Run] = []
@@ -313,7 +313,7 @@ def resume(
 
     Exit codes as of ``run``.
     """
-    from odscen.app import resumed_runs
+    from odscen.app.running import resumed_runs
     from odscen.workspace.store import Workspace
 
     with progress("resuming") as step:

@@ -241,8 +241,8 @@ def replay(
 
     The recording becomes part of the scenario, as a rule of it.
     """
+    from odscen.app.running.trajectories import attach_trajectory
     from odscen.app.scenarios import read_scenario, write_scenario
-    from odscen.app.trajectories import attach_trajectory
 
     document = attach_trajectory(
         read_scenario(scenario), trajectory, actor=actor, of=of, begin=begin

@@ -46,7 +46,8 @@ def import_(
 
     The map needs a georeference. Times of day count from the scenario's clock.
     """
-    from odscen.app import scenarios, transit_feeds
+    from odscen.app import scenarios
+    from odscen.app.demand import transit_feeds
     from odscen.workspace.store import Workspace
 
     document, placed = transit_feeds.import_feed(

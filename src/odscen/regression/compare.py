@@ -7,8 +7,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from odscen.app.confident_runs import FIGURE, confidence_of
 from odscen.app.maps import load_map
+from odscen.app.running.confident_runs import FIGURE, confidence_of
 from odscen.base.errors import InputError, in_file
 from odscen.regression.measure import FigureKey, measure
 from odscen.regression.variant_words import made_by_edits

@@ -159,7 +159,7 @@ def _run(
 ) -> Run:
     from pathlib import Path
 
-    from odscen.app import runs
+    from odscen.app.running import runs
     from odscen.workspace.store import Workspace
 
     named = workspace or config.getoption(_WORKSPACE)

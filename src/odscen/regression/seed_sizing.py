@@ -21,7 +21,7 @@ from odscen.sumo.realize.driving import normal_headway
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.regression.detection import Detection
     from odscen.regression.suites.suite import Case
     from odscen.regression.suites.suite_loading import LoadedCase

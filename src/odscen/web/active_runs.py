@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from odscen.app.removal import KnownRun, known_runs, remove
-from odscen.app.resumed_runs import resume
-from odscen.app.runs import carry_out, check_run, prepare_run
+from odscen.app.running.resumed_runs import resume
+from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import SUFFIX, read_scenario
 from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
 from odscen.carla.served.served_run import ServedJob, run_served
@@ -35,7 +35,7 @@ from odscen.web.wire.run_messages import RunForecast, RunInfo, RunProgress, RunS
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.carla.server.client import Address
     from odscen.results.records.assignment_steps import AssignmentStep
     from odscen.scenario.document.scenario_document import Scenario

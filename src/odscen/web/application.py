@@ -17,7 +17,11 @@ from starlette.staticfiles import StaticFiles
 from odscen.base.version import __version__
 from odscen.carla.server.client import Address
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.web import (
+from odscen.web.error_answers import RESPONSES, add_error_handlers, error_response
+from odscen.web.exchange import exchange_routes
+from odscen.web.large.large_documents import LARGE
+from odscen.web.messages import Health
+from odscen.web.routes import (
     carla_routes,
     demand_routes,
     figure_routes,
@@ -28,10 +32,6 @@ from odscen.web import (
     scenario_routes,
     signal_routes,
 )
-from odscen.web.error_answers import RESPONSES, add_error_handlers, error_response
-from odscen.web.exchange import exchange_routes
-from odscen.web.large.large_documents import LARGE
-from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
 from odscen.web.services import Services, Shared
 from odscen.web.studies import study_routes

@@ -11,7 +11,7 @@ import pytest
 
 from odscen.app.export import export
 from odscen.app.networks import bring_in
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.app.signals.signal_plans import export_signals, import_signals, lights_of
 from odscen.base.errors import InputError, NotFoundError, ScenarioError

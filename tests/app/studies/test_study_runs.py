@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 import pytest
 
-from odscen.app.runs import check_file, run_all
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_file
 from odscen.app.studies import study_folder, study_work
 from odscen.app.studies.executors import LocalExecutor
 from odscen.app.studies.study_folder import TABLE_FILE, read_study

@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 
 from odscen.app.export import export
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.sweeps.sweep_folder import SweepSettings, read_sweep
 from odscen.app.sweeps.sweep_runs import sweep
 from odscen.base.errors import ConflictError, InputError

@@ -11,7 +11,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.carla.mirror.cosim import cosim
 from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.server.client import Address

@@ -6,7 +6,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.base.errors import InputError, NotFoundError
 from odscen.results.judging.expectations import parse_expectation
 from odscen.sumo.folder.finished_run import Run

@@ -10,8 +10,8 @@ import pytest
 from lxml import etree
 
 from odscen.app.maps import LoadedMap, load_map
-from odscen.app.reports import write_report
-from odscen.app.runs import check_run, prepare_run
+from odscen.app.running.reports import write_report
+from odscen.app.running.runs import check_run, prepare_run
 from odscen.results.records.assignment_steps import Assignment, AssignmentStep
 from odscen.results.records.run_plan import Plan
 from odscen.scenario.document.scenario_document import MapReference, Scenario

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from bench.kills import traffic
-from odscen.app.runs import check_file, prepare_run
+from odscen.app.running.runs import check_file, prepare_run
 from odscen.base.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
 from odscen.results.judging.expectations import parse_expectation
 from odscen.results.measures.summary import actors_from_json

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from odscen.app.reports import write_report
+from odscen.app.running.reports import write_report
 from odscen.base.categories import Category
 from odscen.convert.building.network import build_network
 from odscen.lanegraph.build_graphs import build_map_graph

@@ -9,7 +9,7 @@ import pytest
 
 from bench.measures import accident, counted, motorway, queue
 from odscen.app.maps import LoadedMap, load_map
-from odscen.app.runs import check_file, prepare_run
+from odscen.app.running.runs import check_file, prepare_run
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_events import EventKind, events_from_json
 from odscen.scenario.document.json_form import dumps

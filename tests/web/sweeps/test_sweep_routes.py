@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 from starlette.testclient import TestClient
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
 from odscen.app.scenarios import SUFFIX
 from odscen.app.sweeps.sweep_estimate import estimate
 from odscen.app.sweeps.sweep_folder import SweepSettings, begin_sweep

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from odscen.app.runs import carry_out, check_given, prepare_run
+from odscen.app.running.runs import carry_out, check_given, prepare_run
 from odscen.base.errors import SimulationError
 from odscen.learning.behaviour.behaviour_messages import (
     HEAD,

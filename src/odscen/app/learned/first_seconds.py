@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.app.learned.snapshot_data import BRAKING_SECONDS, braking_of
-from odscen.app.runs import check_run, run_all
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.sumo.realize.recording import Recording

@@ -10,7 +10,8 @@ import numpy as np
 
 from odscen.app.learned.snapshot_data import town_of, traffic_scenario
 from odscen.app.maps import load_map
-from odscen.app.runs import check_run, run_all
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
 from odscen.base.errors import InputError, SimulationError
 from odscen.base.text_files import write_file
 from odscen.base.version import __version__

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from odscen.app.maps import load_map
-from odscen.app.runs import check_run, run_all
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.base.text_files import write_file, write_text

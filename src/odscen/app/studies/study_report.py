@@ -1,9 +1,9 @@
 """A study as a page: means with confidence intervals, differences of variants, and failures.
 
 Of the ``n`` values of a figure with mean ``m`` and standard deviation ``s`` the interval is
-``m +- t(0.975, n - 1) s / sqrt(n)``, as of :mod:`odscen.app.confident_runs`. Differences of a
-variant are taken between runs of the same scenario, case and seed, so that what they share does
-not count.
+``m +- t(0.975, n - 1) s / sqrt(n)``, as of :mod:`odscen.app.running.confident_runs`. Differences
+of a variant are taken between runs of the same scenario, case and seed, so that what they share
+does not count.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from odscen.app.confident_runs import confidence_of
+from odscen.app.running.confident_runs import confidence_of
 from odscen.app.studies.study_rows import FIGURE_COLUMNS
 from odscen.app.studies.study_runs import study_results
 from odscen.base.errors import InputError
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.app.confident_runs import Confidence
+    from odscen.app.running.confident_runs import Confidence
     from odscen.app.studies.study_runs import StudyState
 
 SHOWN_FIGURES: Final = ("mean_speed", "mean_delay", "arrived", "collided")

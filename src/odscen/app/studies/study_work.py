@@ -20,7 +20,8 @@ from tempfile import TemporaryDirectory, gettempdir
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.app.maps import load_map
-from odscen.app.runs import check_run, run_all
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
 from odscen.app.studies.study_rows import REFUSED, outcome_row, row_of
 from odscen.app.variants import edited
 from odscen.base.atomic_folders import clear_leftovers, passing_folder
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from odscen.app.maps import LoadedMap
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.app.studies.study_grid import ScenarioSource, StudyRun
     from odscen.app.studies.study_plan import Keep, StudyRuns
     from odscen.scenario.document.scenario_document import Scenario

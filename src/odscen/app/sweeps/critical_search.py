@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from odscen.app.runs import run_all
+from odscen.app.running.batches import run_all
 from odscen.app.sweeps.sweep_folder import SweepSettings, begin_folder
 from odscen.app.sweeps.sweep_runs import checked_cases, has_completed, refuse_unknown
 from odscen.app.sweeps.sweep_table import limits_of, rows_of, watched_actors, write_cases

@@ -8,7 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Final
 
-from odscen.app.runs import check_run, run_all
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
 from odscen.app.sweeps.sweep_runs import WATCHES_CLOSENESS, refuse_unknown
 from odscen.app.sweeps.sweep_table import limits_of, named_cases
 from odscen.base.errors import InputError, ScenarioError
@@ -17,7 +18,7 @@ from odscen.scenario.sweeps.sweep_plan import concrete
 from odscen.sumo.realize.run_settings import RunSettings
 
 if TYPE_CHECKING:
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.app.sweeps.sweep_folder import SweepSettings
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan

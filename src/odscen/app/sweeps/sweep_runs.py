@@ -6,7 +6,8 @@ import time
 from typing import TYPE_CHECKING
 
 from odscen.app.export import export
-from odscen.app.runs import check_run, run_all
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
 from odscen.app.scenarios import SUFFIX
 from odscen.app.sweeps.sweep_folder import SweepSettings, begin_sweep
 from odscen.app.sweeps.sweep_table import limits_of, named_cases, rows_of, write_table
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.app.sweeps.sweep_table import Sweep
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from odscen.app.runs import carry_out, check_file, prepare_run
+from odscen.app.running.runs import carry_out, check_file, prepare_run
 from odscen.carla.mirror.cosim_report import CosimReport
 from odscen.carla.mirror.mirrored import MirroredPlan
 from odscen.carla.mirror.run_witnesses import RunWitnesses
@@ -43,8 +43,8 @@ def cosim(
 ) -> tuple[Run, CosimReport]:
     """Run a scenario in SUMO and show it on a CARLA server.
 
-    The run folder is that of :func:`odscen.app.runs.run`, whatever happens to the server: if that
-    fails, SUMO stops and what it did so far is kept.
+    The run folder is that of :func:`odscen.app.running.runs.run`, whatever happens to the server:
+    if that fails, SUMO stops and what it did so far is kept.
 
     Parameters
     ----------

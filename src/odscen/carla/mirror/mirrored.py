@@ -22,7 +22,7 @@ from odscen.carla.server.environment import vehicle_lights, weather_parameters
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.server.blueprints import Shape
     from odscen.carla.server.carla_server import Server

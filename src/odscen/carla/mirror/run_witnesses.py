@@ -17,7 +17,7 @@ from odscen.sumo.folder import layout
 if TYPE_CHECKING:
     from contextlib import ExitStack
 
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.mirror.cosim_report import CosimReport
     from odscen.carla.mirror.mirrored import MirroredPlan

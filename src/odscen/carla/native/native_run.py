@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.app.runs import carry_out, check_file, prepare_run
+from odscen.app.running.runs import carry_out, check_file, prepare_run
 from odscen.base.errors import CarlaError, InputError
 from odscen.base.frames import XodrPose, xodr_to_sumo
 from odscen.carla.native.native_plan import native_actors
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from pathlib import Path
 
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.carla.native.native_worker import Told
     from odscen.results.records.run_plan import Plan
     from odscen.scenario.document.rules_document import StoryRule

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from odscen.app.runs import check_run
+from odscen.app.running.runs import check_run
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ToolError, in_file
 from odscen.convert.model.conversion_settings import ConversionSettings
@@ -22,7 +22,7 @@ from odscen.workspace.asset_catalogue import shipped_assets
 from odscen.workspace.store import name_from_file
 
 if TYPE_CHECKING:
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.regression.baseline import Baseline, Fingerprint
     from odscen.regression.case_results import SeedResult
     from odscen.regression.detection import Sizing

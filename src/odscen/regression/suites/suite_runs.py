@@ -7,7 +7,7 @@ import threading
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.app.runs import run_all
+from odscen.app.running.batches import run_all
 from odscen.base.errors import in_file
 from odscen.regression.case_results import SeedResult
 from odscen.regression.measure import measure

@@ -17,7 +17,7 @@ from io import FileIO
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from odscen.app.runs import carry_out, check_run, prepare_run
+from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import read_scenario
 from odscen.base.error_data import error_to_data
 from odscen.base.errors import OdscenError

@@ -6,8 +6,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from odscen.app import demands
-from odscen.app.sized_demand import sized
+from odscen.app.demand import demands
+from odscen.app.demand.sized_demand import sized
 from odscen.base.text_files import write_text
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.web.jobs import JobResult

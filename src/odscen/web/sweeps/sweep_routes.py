@@ -12,7 +12,7 @@ from odscen.base.errors import ConflictError, InputError
 from odscen.results.sweeps.sweep_rows import UNITS
 from odscen.scenario.document.json_form import dumps
 from odscen.web.messages import ScenarioState
-from odscen.web.scenario_routes import state_of
+from odscen.web.routes.scenario_routes import state_of
 from odscen.web.services import Services, Shared
 from odscen.web.sweeps.sweep_messages import (
     CaseName,

@@ -7,7 +7,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from odscen.app.reports import interval_rows, write_report
+from odscen.app.running.reports import interval_rows, write_report
 from odscen.base.errors import InputError
 from odscen.scenario.document.study_document import Cordon, Detector, Study, TravelTimeSection
 from odscen.scenario.edits.demand_edits import set_input

@@ -10,8 +10,8 @@ from pathlib import Path
 import pyproj
 import pytest
 
+from odscen.app.demand.transit_feeds import import_feed
 from odscen.app.maps import load_map
-from odscen.app.transit_feeds import import_feed
 from odscen.base.errors import InputError
 from odscen.base.ids import LaneKey, RoadId
 from odscen.lanegraph.query import node_id

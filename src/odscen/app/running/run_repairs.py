@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from odscen.app.map_repairs import NO_SUMS, RepairStep, listed, set_aside
 from odscen.app.maps import load_map
-from odscen.app.reports import write_report
+from odscen.app.running.reports import write_report
 from odscen.base.checksums import SUMS_FILE, file_digest, read_sums, write_sums
 from odscen.base.errors import DamagedFile, InputError, OdscenError
 from odscen.base.folder_locks import is_locked

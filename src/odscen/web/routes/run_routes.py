@@ -120,7 +120,7 @@ def report(run: str, shared: Shared) -> Response:
         info.state in ("completed", "stopped")
         and not (kept.whole(run) / layout.REPORT_FILE).exists()
     ):
-        from odscen.app.reports import renew_report
+        from odscen.app.running.reports import renew_report
 
         renew_report(shared.workspace, kept.folder(run))
     return page_of_run(shared, run, layout.REPORT_FILE)

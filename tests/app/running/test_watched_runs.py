@@ -7,9 +7,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
+from odscen.app.running.watched_runs import watch
 from odscen.app.scenarios import read_scenario
-from odscen.app.watched_runs import watch
 from odscen.base.errors import ConflictError, ScenarioError
 from odscen.results.records.run_events import events_from_json
 from odscen.scenario.document.scenario_document import Scenario

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from odscen.app.runs import run
+from odscen.app.running.runs import run
+from odscen.app.running.trajectories import attach_trajectory
 from odscen.app.scenarios import read_scenario, write_scenario
-from odscen.app.trajectories import attach_trajectory
 from odscen.base.errors import InputError, ScenarioError
 from odscen.cli.commands import command_line
 from odscen.sumo.realize.run_settings import RunSettings

@@ -11,8 +11,8 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
-from odscen.app import demands
-from odscen.app.demands import TrafficOnMap, traffic_on_map
+from odscen.app.demand import demands
+from odscen.app.running.run_lanes import TrafficOnMap, traffic_on_map
 from odscen.app.scenarios import read_scenario
 from odscen.scenario.demand.count_stations import place_points
 from odscen.sumo.folder.layout import SCENARIO_FILE

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.app.maps import map_of
-from odscen.app.runs import check_run, prepare_run
+from odscen.app.running.runs import check_run, prepare_run
 from odscen.base.errors import InputError, NotFoundError
 from odscen.results.measures.usability import UsabilityLevel
 from odscen.scenario.demand.scaled_demand import (

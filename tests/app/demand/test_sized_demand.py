@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import pytest
 
+from odscen.app.demand.sized_demand import MARGIN, SEEDS, largest_share, proposed_background, sized
 from odscen.app.maps import load_map
-from odscen.app.runs import run
-from odscen.app.sized_demand import MARGIN, SEEDS, largest_share, proposed_background, sized
+from odscen.app.running.runs import run
 from odscen.base.errors import InputError, NotFoundError
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Scenario

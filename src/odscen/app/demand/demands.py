@@ -5,17 +5,14 @@ from __future__ import annotations
 import re
 from contextlib import contextmanager
 from itertools import count
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import polars as pl
 
 from odscen.app.maps import load_map, map_of
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ScenarioError, in_file
 from odscen.base.given_files import read_given_text
-from odscen.results.by_place.lane_places import LanePlaces
-from odscen.results.by_place.lane_traffic import LaneTraffic, lane_traffic
 from odscen.scenario import edits
 from odscen.scenario.checks.parking_checks import parking_problems
 from odscen.scenario.demand.day_profiles import DAY
@@ -32,22 +29,19 @@ from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import TOWN_MIX, town_day
-from odscen.sumo.folder.ended import read_summary
-from odscen.sumo.folder.layout import LANE_PLACES_FILE, SCENARIO_FILE
-from odscen.sumo.folder.recorded import read_lanes, trajectory_files
+from odscen.sumo.folder.layout import SCENARIO_FILE
+from odscen.sumo.folder.recorded import trajectory_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from odscen.app.maps import LoadedMap
-    from odscen.base.arrays import Int32Array
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.demand.entries import Entry
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.count_fit import CountFits
     from odscen.sumo.calibrate.town_day import Load
-    from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.workspace.store import Workspace
 
 MOST_TRIPS = 1e7
@@ -312,51 +306,3 @@ def _by_line(scenario: Scenario, kind: str, name: str, lines: Sequence[int]) -> 
             raise ScenarioError(found[0]) from error
         msg = f"{len(found)} problems"
         raise ScenarioError(msg, problems=found) from error
-
-
-class NodeStretches(NamedTuple):
-    """Nodes ``first`` up to ``end`` of the lane graph lie on ``lane``, a row of the lanes asked."""
-
-    first: Int32Array
-    end: Int32Array
-    lane: Int32Array
-
-
-class TrafficOnMap(NamedTuple):
-    """What was measured on lanes, and where these are on the map."""
-
-    traffic: LaneTraffic
-    stretches: NodeStretches
-
-
-def traffic_on_map(workspace: Workspace, run: Path) -> TrafficOnMap:
-    """Read what the vehicles of a finished run did on each lane.
-
-    Raises
-    ------
-    InputError
-        If nothing was measured on lanes, or the map is not that of the run any more.
-    """
-    lanes, file = read_lanes(run), run / LANE_PLACES_FILE
-    if lanes is None or not file.is_file():
-        msg = "the run has no lane data: nothing was measured, or no vehicle departed"
-        raise InputError(msg, file=str(run))
-    places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
-    end = float(read_summary(run)["sim_seconds"])
-    found = lane_traffic(lanes, places, end=end)
-    scenario = read_scenario(run / SCENARIO_FILE)
-    return TrafficOnMap(found, _stretches(map_of(workspace, scenario).sumo, found.names))
-
-
-def _stretches(sumo: SumoMap, names: list[str]) -> NodeStretches:
-    """Stretches of lanes of the map whose nodes lie on one of these SUMO lanes."""
-    rows = {name: row for row, name in enumerate(names)}
-    places = sumo.lane_places
-    # The last entry is of nodes that lie on no SUMO lane, whose row is -1.
-    of_lane = np.array([*(rows.get(name, -1) for name in places.lanes), -1], dtype=np.int32)
-    wanted, own = of_lane[places.lane], sumo.graph.lanes.lane
-    changes = (np.diff(wanted) != 0) | (np.diff(own) != 0)
-    first = np.concatenate([[0], np.flatnonzero(changes) + 1]).astype(np.int32)
-    end = np.append(first[1:], len(wanted)).astype(np.int32)
-    there = wanted[first] >= 0
-    return NodeStretches(first[there], end[there], wanted[first][there])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
 from odscen.app.removal import removed_map
-from odscen.app.reports import write_report
+from odscen.app.running.reports import write_report
 from odscen.base.errors import InputError
 from odscen.sumo.runner import long_runs
 

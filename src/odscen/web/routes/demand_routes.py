@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from fastapi import APIRouter, File, Form, UploadFile
 
-from odscen.app import demands
+from odscen.app.demand import demands
 from odscen.base.errors import InputError
 from odscen.scenario.document.document_parts import Identifier
 from odscen.scenario.document.scenario_document import Scenario
@@ -14,7 +14,7 @@ from odscen.web.jobs import JobResult
 from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.large.whole_days import make_day
 from odscen.web.messages import EntryPlace, JobStarted, ScenarioState, Version, WholeDay
-from odscen.web.scenario_routes import state_of
+from odscen.web.routes.scenario_routes import state_of
 from odscen.web.services import Shared
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ import statistics
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from odscen.app.runs import run_many
+from odscen.app.running.batches import run_many
 from odscen.app.scenarios import scenario_name
 from odscen.base.errors import InputError, NotFoundError
 from odscen.results.measures.registry import names_of, run_figure

@@ -34,7 +34,7 @@ from odscen.sumo.folder.recorded import read_calls, read_light_states
 from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import OfVersion, ScenarioState, Version
 from odscen.web.packed import UNCHANGED, answer, pack
-from odscen.web.scenario_routes import state_of
+from odscen.web.routes.scenario_routes import state_of
 from odscen.web.services import Services, Shared
 from odscen.web.wire.media_types import Responses
 from odscen.web.wire.signal_messages import (

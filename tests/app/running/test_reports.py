@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from odscen.app.reports import interval_rows, renew_report
-from odscen.app.runs import run
+from odscen.app.running.reports import interval_rows, renew_report
+from odscen.app.running.runs import run
 from odscen.app.scenarios import read_scenario
 from odscen.base.checksums import SUMS_FILE
 from odscen.base.errors import DamagedError, InputError

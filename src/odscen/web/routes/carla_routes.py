@@ -13,7 +13,7 @@ from odscen.base.errors import NotFoundError
 from odscen.sumo.folder import layout
 from odscen.web.live_view import Active
 from odscen.web.messages import CarlaInfo
-from odscen.web.run_routes import page_of_run
+from odscen.web.routes.run_routes import page_of_run
 from odscen.web.services import Shared
 from odscen.web.wire.media_types import HTML, PICTURES
 

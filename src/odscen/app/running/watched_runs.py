@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from odscen.app.runs import carry_out, check_given, prepare_run
+from odscen.app.running.runs import carry_out, check_given, prepare_run
 from odscen.base.errors import ConflictError
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.document.problems import refuse_errors
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from odscen.app.runs import CheckedRun
+    from odscen.app.running.runs import CheckedRun
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
@@ -45,7 +45,7 @@ class WatchedRun:
     Parameters
     ----------
     checked
-        The run, from :func:`odscen.app.runs.check_run`; it starts at once and waits.
+        The run, from :func:`odscen.app.running.runs.check_run`; it starts at once and waits.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class WatchedRun:
 
     @property
     def run(self) -> Run:
-        """The finished run, as :func:`odscen.app.runs.run` gives it.
+        """The finished run, as :func:`odscen.app.running.runs.run` gives it.
 
         Raises
         ------

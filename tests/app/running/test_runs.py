@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from odscen.app.runs import carry_out, check_file, check_run, prepare_run, run_all, run_many
+from odscen.app.running.batches import run_all, run_many
+from odscen.app.running.runs import carry_out, check_file, check_run, prepare_run
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.base.errors import ScenarioError
 from odscen.results.judging.expectations import parse_expectation

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from scipy.stats import t
 
-from odscen.app.confident_runs import confidence_of, parse_share, run_until_confident
+from odscen.app.running.confident_runs import confidence_of, parse_share, run_until_confident
 from odscen.base.errors import InputError, NotFoundError
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace

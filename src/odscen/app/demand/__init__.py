@@ -1,0 +1,1 @@
+"""Demand of scenarios: matrices, counts, flows, whole days, timetables."""

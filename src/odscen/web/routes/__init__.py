@@ -1,0 +1,1 @@
+"""Routes of the page that have no room of their own."""
