@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from odscen.base.errors import InputError
-from odscen.lanegraph import shortest_paths
 from odscen.lanegraph.graph_files import to_networkx
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import induced, node_id, node_ids, node_index, walk_node_id
@@ -68,19 +67,6 @@ def test_a_spawn_outside_the_region_is_refused_by_name() -> None:
 def test_a_path_outside_the_region_is_empty() -> None:
     mask = induced(FORK, ["r1", "j9"]).nodes
     assert len(shortest_path(FORK, 0, node_index(FORK, "2.0.-1.0"), mask)) == 0
-
-
-def test_trees_are_kept_as_far_as_there_is_room_and_say_the_same(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(shortest_paths, "_NODES_KEPT", 3 * len(FORK.lanes.x))
-    router = Router(FORK)
-    before = [router.distances(source).tolist() for source in range(5)]
-    assert list(router._trees) == [2, 3, 4]
-    assert [router.distances(source).tolist() for source in range(5)] == before
-    large = Router(FORK)
-    monkeypatch.setattr(shortest_paths, "_NODES_KEPT", 0)
-    assert (large._kept, Router(FORK)._kept) == (3, 2)
 
 
 def test_the_path_back_is_no_path() -> None:

@@ -20,6 +20,7 @@ from scipy import sparse  # noqa: E402 - which names these
 from scipy.sparse import csgraph  # noqa: E402
 
 from odscen.base.errors import InputError  # noqa: E402
+from odscen.lanegraph.kept_trees import KEPT_TREES, ROUTERS, Tree  # noqa: E402
 from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo  # noqa: E402
 from odscen.lanegraph.query import node_id, walk_node_id  # noqa: E402
 
@@ -31,10 +32,6 @@ MIN_EDGE_LENGTH = 1e-6
 """Metres; scipy's sparse graphs drop edges of weight zero."""
 
 
-_KEPT = 2
-"""Trees of shortest paths that are kept, at least."""
-_NODES_KEPT = 1 << 20
-"""Nodes that they have together, where they are more: 12 bytes each."""
 _FEW = 64
 """Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
 
@@ -71,18 +68,17 @@ class _PathFinder:
         self.out_degree = np.bincount(rows, minlength=len(self.nodes))
         if not directed:
             self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
-        self._trees: dict[int, tuple[FloatArray, Int32Array]] = {}
-        self._kept = max(_KEPT, _NODES_KEPT // max(1, len(self.nodes)))
+        self._number = next(ROUTERS)
 
     def distances(self, source: int) -> FloatArray:
         """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
         result = np.full(len(self.mask), np.inf)
-        result[self.nodes] = self._from(source)[0]
+        result[self.nodes] = self._from(source).distances
         return result
 
     def distance(self, source: int, target: int) -> float:
         """Metres from one node to another one; inf if it cannot be reached."""
-        distances = self._from(source)[0]
+        distances = self._from(source).distances
         return float(distances[self._local[target]]) if self.mask[target] else math.inf
 
     def reachable(self, source: int) -> BoolArray:
@@ -191,7 +187,7 @@ class _PathFinder:
         InputError
             If ``spawn`` is outside the region.
         """
-        distances = self._from(spawn)[0]
+        distances = self._from(spawn).distances
         if not self.has_goals(spawn):
             return np.empty(0, dtype=np.int32)
         if not self._reaches_end(spawn):
@@ -259,11 +255,11 @@ class _PathFinder:
         row = self._local[spawn]
         return bool(self._ends_ahead[row] > int(self._is_end[row]))
 
-    def _from(self, source: int) -> tuple[FloatArray, Int32Array]:
+    def _from(self, source: int) -> Tree:
         if not 0 <= source < len(self.mask) or not self.mask[source]:
             msg = f"{self._name(source)} is outside the region of interest"
             raise InputError(msg)
-        tree = self._trees.get(source)
+        tree = KEPT_TREES.get(self._number, source)
         if tree is None:
             distances, predecessors = csgraph.dijkstra(
                 self._matrix,
@@ -271,10 +267,8 @@ class _PathFinder:
                 indices=np.asarray(self._local[source]),
                 return_predecessors=True,
             )
-            tree = distances, predecessors
-            if len(self._trees) >= self._kept:
-                self._trees.pop(next(iter(list(self._trees)), -1), None)  # threads may be here
-            self._trees[source] = tree
+            tree = Tree(distances, predecessors)
+            KEPT_TREES.add(self._number, source, tree)
         return tree
 
     def _name(self, node: int) -> str:
