@@ -1,18 +1,35 @@
 import { lingui } from "@lingui/vite-plugin";
 import react from "@vitejs/plugin-react";
+import { readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { brotliCompressSync } from "node:zlib";
 import { defineConfig } from "vitest/config";
 
 // The built page is part of the Python package; `odscen serve` answers /api, in development too.
 const server = process.env.ODSCEN_SERVER ?? "http://127.0.0.1:8765";
+
+const built = "../src/odscen/web/static";
+
+/** Packed once, by the best means, for browsers that take it; the server packs for the others. */
+const packed = {
+  name: "packed",
+  closeBundle(): void {
+    for (const name of readdirSync(join(built, "assets"))) {
+      const file = join(built, "assets", name);
+      if (/\.(js|css|svg)$/.test(name)) writeFileSync(`${file}.br`, brotliCompressSync(readFileSync(file)));
+    }
+  },
+};
 
 export default defineConfig({
   base: "./",
   plugins: [
     react({ babel: { plugins: [["@lingui/babel-plugin-lingui-macro", { descriptorFields: "message" }]] } }),
     lingui(),
+    { ...packed, apply: "build" },
   ],
   build: {
-    outDir: "../src/odscen/web/static",
+    outDir: built,
     emptyOutDir: true,
     target: "es2022",
     chunkSizeWarningLimit: 900,

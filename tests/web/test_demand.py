@@ -86,6 +86,7 @@ def test_a_wrong_table_is_refused_by_line_and_column_and_changes_nothing(
     assert client.get("/api/scenarios/mine").json() == state
 
 
+@pytest.mark.slow
 def test_a_whole_day_keeps_who_is_there_and_is_one_step_for_undo(
     client: TestClient, state: dict[str, Any], workspace: Workspace
 ) -> None:

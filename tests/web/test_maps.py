@@ -49,6 +49,22 @@ def test_a_built_page_is_served_for_its_own_addresses_and_not_for_missing_files(
         assert client.get("/..%2f..%2fmap.json").status_code == 404
 
 
+def test_what_the_build_has_packed_goes_to_browsers_that_take_it(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    for name, content in {"index.html": "<title>", "a.js": "1", "a.js.br": "packed"}.items():
+        (tmp_path / name).write_text(content)
+
+    with TestClient(create_app(workspace, static=tmp_path), base_url="http://localhost") as client:
+        packed = client.head("/a.js", headers={"accept-encoding": "gzip, br;q=0.9"}).headers
+        assert packed["content-encoding"] == "br"
+        assert packed["content-type"].startswith("text/javascript")
+        assert packed["content-length"] == str(len("packed"))
+        assert "Accept-Encoding" in packed["vary"]
+        assert client.get("/a.js", headers={"accept-encoding": "gzip"}).text == "1"
+        assert client.get("/", headers={"accept-encoding": "br"}).text == "<title>"
+
+
 def test_maps_are_listed_with_what_the_catalogue_knows(
     client: TestClient, workspace: Workspace
 ) -> None:

@@ -22,16 +22,22 @@ export const ALLOWED: { readonly [K in keyof Preferences]: readonly Preferences[
 };
 const KEY = "odscen.preferences";
 
-/** What this browser remembers; what is not known any more is as at first. */
-export function read(kept: string | null): Preferences {
+/** The first of a reader's languages that the page has. */
+const spoken = (wanted: readonly string[]): Language =>
+  wanted.map((tag) => ALLOWED.language.find((language) => tag.split("-")[0] === language)).find(Boolean) ??
+  DEFAULT.language;
+
+/** What this browser remembers; what is not known any more is as at first, in the first of its languages. */
+export function read(kept: string | null, languages: readonly string[] = []): Preferences {
   let found: Partial<Record<keyof Preferences, unknown>>;
   try {
     found = (JSON.parse(kept ?? "{}") ?? {}) as typeof found;
   } catch {
     found = {};
   }
+  const first: Preferences = { ...DEFAULT, language: spoken(languages) };
   const one = <K extends keyof Preferences>(key: K): Preferences[K] =>
-    ALLOWED[key].find((value) => value === found[key]) ?? DEFAULT[key];
+    ALLOWED[key].find((value) => value === found[key]) ?? first[key];
   return { language: one("language"), speed: one("speed"), length: one("length"), hours: one("hours") };
 }
 
@@ -43,7 +49,7 @@ function remembered(): string | null {
   }
 }
 
-export const usePreferences = create<Preferences>(() => read(remembered()));
+export const usePreferences = create<Preferences>(() => read(remembered(), navigator.languages));
 
 /** The preferences now, for what is no component. */
 export const preferences = (): Preferences => usePreferences.getState();

@@ -93,5 +93,8 @@ test("what is remembered and no longer known is as at first", () => {
   const first = { language: "en", speed: "km/h", length: "m", hours: 24 };
   expect(read(null)).toEqual(first);
   expect(read("{")).toEqual(first);
+  expect(read(null, ["fr-FR", "de-AT", "en"])).toEqual({ ...first, language: "de" });
+  expect(read(null, ["fr", "xx"])).toEqual(first);
+  expect(read('{"language":"en"}', ["de"])).toEqual(first);
   expect(read('{"language":"xx","speed":"mph","hours":"12"}')).toEqual({ ...first, speed: "mph" });
 });

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mimetypes
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fastapi import FastAPI
 from pydantic import TypeAdapter
 from pydantic.json_schema import JsonSchemaMode
+from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 from starlette.responses import HTMLResponse, Response
@@ -186,11 +188,24 @@ class _BuiltPage(StaticFiles):
     async def get_response(self, path: str, scope: Scope) -> Response:
         """Answer with a file, else with the page."""
         try:
-            response = await super().get_response(path, scope)
+            response = await self._packed(path, scope) or await super().get_response(path, scope)
         except HTTPException as error:
             if error.status_code != 404 or "." in Path(path).name:
                 raise
             response = await super().get_response("index.html", scope)
         if response.media_type == "text/html":  # names the files that belong to it
             response.headers["Cache-Control"] = "no-cache"
+        return response
+
+    async def _packed(self, path: str, scope: Scope) -> Response | None:
+        """Answer with what the build has packed, if it has and the browser takes it."""
+        taken = Headers(scope=scope).get("accept-encoding", "")
+        if "br" not in [one.partition(";")[0].strip() for one in taken.split(",")]:
+            return None
+        if not self.lookup_path(f"{path}.br")[1]:
+            return None
+        response = await super().get_response(f"{path}.br", scope)
+        response.headers["Content-Type"] = mimetypes.guess_type(path)[0] or "text/plain"
+        response.headers["Content-Encoding"] = "br"
+        response.headers.add_vary_header("Accept-Encoding")
         return response

@@ -312,6 +312,7 @@ def test_a_scene_of_esmini_is_imported_with_its_map(client: TestClient) -> None:
     assert len(report["taken"]) > 80
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_downloaded_as_it_happened(client: TestClient, sampled: str) -> None:
     answer = client.post("/api/runs", json={"scenario": sampled, "until": 3})
     run = str(answer.json()["run"])
