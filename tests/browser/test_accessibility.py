@@ -276,6 +276,7 @@ def test_an_open_form_of_a_rule(
     inspector.look("editor-rules")
 
 
+@pytest.mark.slow
 def test_traffic_and_counts(
     visit: Callable[..., Any], served: tool.Served, sampled: str, tmp_path: Path
 ) -> None:

@@ -164,6 +164,7 @@ def run_until_fired(user: OdscenPage, hand: Hand, actor: str) -> None:
 HANDS = pytest.mark.parametrize("hand_of", [Mouse, Keyboard], ids=["mouse", "keyboard"])
 
 
+@pytest.mark.slow
 @HANDS
 def test_a_cut_in_is_built_and_fires(
     user: OdscenPage, crossing: str, hand_of: Callable[[OdscenPage], Hand]
@@ -190,6 +191,7 @@ def test_a_cut_in_is_built_and_fires(
         assert user.actions()["pointer"] == 0
 
 
+@pytest.mark.slow
 @HANDS
 def test_a_mid_block_walker_is_built_and_fires(
     user: OdscenPage, crossing: str, hand_of: Callable[[OdscenPage], Hand]

@@ -136,6 +136,7 @@ def test_a_table_with_a_mistake_names_line_and_column_and_corrected_it_is_import
     assert user.document() == before
 
 
+@pytest.mark.slow
 def test_a_day_on_the_whole_map_is_generated_and_its_load_on_the_junctions_reported(
     user: OdscenPage, crossing: str
 ) -> None:

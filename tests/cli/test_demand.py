@@ -223,6 +223,7 @@ def test_parking_is_refused_where_the_map_has_none(workspace, scenario):
     assert Path(scenario).read_text(encoding="utf-8") == before
 
 
+@pytest.mark.slow
 def test_which_trips_park_is_set_and_kept(tmp_path, workspace):
     town = tmp_path / "parking_town.xodr"
     town.write_text(with_rows(TOWN.read_text(encoding="utf-8")), encoding="utf-8")

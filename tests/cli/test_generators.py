@@ -10,6 +10,7 @@ from tests import own_generator
 from tests.cli.conftest import odscen
 
 
+@pytest.mark.slow
 def test_options_of_a_generator_are_given_and_refused_by_name(
     workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from odscen.base.given_arrays import npz_bytes
 from odscen.learning.hetero_data import read_arrays
 from tests.app.test_imported_sweeps import between, of, varied
@@ -37,6 +39,7 @@ def test_a_file_without_a_map_has_its_report_as_data_and_ends_with_2(tmp_path: P
     assert "its map is missing: no place can be found" in reasons
 
 
+@pytest.mark.slow
 def test_arrays_are_exported_changed_and_imported(workspace: Path, tmp_path: Path) -> None:
     place = ("--workspace", workspace)
     (row,) = odscen("generate", "--map", "signal_crossing", "--fill", "0.2", *place, "--json").json[

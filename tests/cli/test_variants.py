@@ -31,6 +31,7 @@ def shut(folder: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_a_variant_is_its_parent_with_the_edits_and_knows_both(
     workspace: Path, tmp_path: Path
 ) -> None:

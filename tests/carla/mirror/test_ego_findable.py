@@ -88,6 +88,7 @@ def test_the_hook_gets_world_and_actors_after_each_tick_and_the_ego_is_the_hero(
     assert 0.8 < moved.max() < 1.5, "by 9 m/s at the end, not by SUMO's steps"
 
 
+@pytest.mark.slow
 def test_cars_have_different_colours_and_each_its_own_in_every_run(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -148,6 +149,7 @@ def test_a_sensor_on_the_ego_is_recorded_into_the_runs_folder(
     assert [path.name for path in (tmp_path / "runs").iterdir() if "sensors" in path.name] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensed_speed", [False, True])
 def test_lidar_and_radar_on_the_ego_are_recorded_and_radar_sees_speeds_with_physics_only(
     workspace: Workspace, tmp_path: Path, sensed_speed: bool

@@ -199,6 +199,7 @@ def test_a_server_that_freezes_for_ever_is_left_with_a_word(start: Start) -> Non
         assert recorded(run)
 
 
+@pytest.mark.slow
 def test_refused_spawns_are_tried_again_and_nobody_is_missing(start: Start) -> None:
     with StandIn(CROSSING, refuse_spawn_every=3) as server:
         code, told, _ = start(server).wait()

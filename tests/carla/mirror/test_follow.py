@@ -28,6 +28,7 @@ ACTOR = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_run_goes_by_the_clock_of_the_client_that_ticks(
     workspace: Workspace, tmp_path: Path
 ) -> None:

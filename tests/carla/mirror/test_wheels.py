@@ -93,6 +93,7 @@ def test_a_jump_and_a_stop_leave_wheels_as_they_were() -> None:
     assert wheels.turned(step_of([(90.0, 0.0, 0.02)]), {0: 7}) == rolled
 
 
+@pytest.mark.slow
 def test_on_a_server_wheels_have_rolled_as_far_as_their_vehicles_have_gone(
     workspace: Workspace, tmp_path: Path
 ) -> None:

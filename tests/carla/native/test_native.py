@@ -241,6 +241,7 @@ def test_a_server_that_stands_still_too_long_ends_the_run_and_is_given_back(
     assert not [note for note in told["carla"]["notes"] if "taken back" in note]
 
 
+@pytest.mark.slow
 def test_a_spawn_that_is_refused_comes_later(options: Any, sample: Sample) -> None:
     path = sample(CROSSING, seed=5)
     with StandIn(CROSSING, refuse_spawn_every=3) as server:

@@ -93,6 +93,7 @@ def sleep_beyond(stand_in: StandIn, metres: float, *, tiles: float = 3000.0) -> 
     world.apply_settings(settings)
 
 
+@pytest.mark.slow
 def test_the_egos_role_loads_the_tiles_on_whose_ground_pedestrians_walk(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -129,6 +130,7 @@ def test_the_egos_role_loads_the_tiles_on_whose_ground_pedestrians_walk(
     assert max(abs(z - kerb - ground) for z in feet[3:]) < 0.03
 
 
+@pytest.mark.slow
 def test_a_large_map_without_a_hero_survives_pedestrians_far_from_its_spectator(
     workspace: Workspace, sample: Sample, tmp_path: Path
 ) -> None:

@@ -61,6 +61,7 @@ def test_the_same_random_numbers_give_the_same_fill() -> None:
     np.testing.assert_array_equal(one.initial_speed, two.initial_speed)
 
 
+@pytest.mark.slow
 def test_more_are_stopped_before_a_red_light_of_a_junction_than_before_a_green_one() -> None:
     graph = fork()
     region = Region.of(graph, graph.segments.ids)

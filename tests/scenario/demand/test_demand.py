@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
@@ -39,6 +39,7 @@ def counts(*rows: tuple[str, float, float, float]) -> Counts:
     st.floats(0, DAY - 1),
     st.floats(0, 1),
 )
+@example(shares=[2e-311, 1.0], clock=1.0, quantile=0.0)
 def test_times_drawn_from_a_profile_have_the_share_that_it_gives_them(
     shares: list[float], clock: float, quantile: float
 ) -> None:

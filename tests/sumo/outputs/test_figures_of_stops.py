@@ -74,6 +74,7 @@ def test_figures_of_lines_are_those_of_the_stop_output(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.slow
 def test_figures_of_parking_are_those_of_the_stop_output(tmp_path: Path) -> None:
     parking: dict[str, object] = {
         "begin": 0.3, "end": 0.6, "stay": {"kind": "uniform", "low": 100, "high": 300},

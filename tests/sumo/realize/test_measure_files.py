@@ -205,6 +205,7 @@ def test_a_run_without_anybody_has_neither_lanes_nor_trips(
     assert read_trips(result.folder) is None
 
 
+@pytest.mark.slow
 def test_queues_of_the_mesoscopic_model_are_measured_across_slices_too(
     long: PreparedRun, tmp_path: Path
 ) -> None:

@@ -178,6 +178,7 @@ def surveyed(name: str, *, trips: float) -> tuple[Scenario, list[tuple[str, floa
     return known, [row for row in rows if row[3] > 0]
 
 
+@pytest.mark.slow
 def test_traffic_made_from_the_counts_of_a_known_demand_reproduces_them() -> None:
     graph = built(CROSSING).sumo.graph
     _, rows = surveyed(CROSSING, trips=1200)

@@ -29,6 +29,10 @@ BUILT_IN: dict[str, tuple[float, ...]] = {
 }
 
 
+_LEAST_SHARE = 1e-15
+"""Of the day: a slice with less has nothing."""
+
+
 class Curve:
     """Demand over time as the integral of a factor whose mean over a day is 1.
 
@@ -42,7 +46,9 @@ class Curve:
 
     def __init__(self, shares: tuple[float, ...] = (1.0,), *, clock: float = 0.0) -> None:
         self._times = np.linspace(0.0, DAY, len(shares) + 1)
-        self._sums = np.concatenate([[0.0], np.cumsum(shares)]) * (DAY / sum(shares))
+        # A share that a day's sum cannot hold would make the inverse infinitely steep.
+        held = [share if share > sum(shares) * _LEAST_SHARE else 0.0 for share in shares]
+        self._sums = np.concatenate([[0.0], np.cumsum(held)]) * (DAY / sum(held))
         self._clock = clock
         self._before = float(self._integral(np.array(clock)))
 

@@ -168,6 +168,7 @@ def test_the_class_and_the_program_of_the_documents_drive(tmp_path: Path) -> Non
     assert track(other, "ahead")["speed"][-1] < 12.0
 
 
+@pytest.mark.slow
 def test_a_long_run_that_was_killed_ends_with_the_same_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
