@@ -170,7 +170,7 @@ export function ActorStep(props: Props) {
         aria-expanded={filling}
         onClick={() => setFilling(!filling)}
       >
-        {filling ? t`Hide random fill` : t`Fill the region at random`}
+        {filling ? t`Hide the filling` : t`Fill the whole region`}
       </Button>
       <Collapse in={filling}>
         {filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}
