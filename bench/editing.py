@@ -166,8 +166,9 @@ def _changes(user: OdscenPage) -> None:
     page = user.page
 
     def take_back() -> None:
+        # In a field the keys would undo what was typed.
         with user.changing():
-            page.keyboard.press("Control+z")
+            user.undo.click()
 
     keys = itertools.cycle(("Control+z", "Control+y"))
     _timed(user, "removal undone, redone", lambda: page.keyboard.press(next(keys)))
@@ -194,10 +195,9 @@ def _changes_of_steps(user: OdscenPage, take_back: Callable[[], object]) -> None
         page.wait_for_timeout(1500)
 
     opened("Region")
-    candidate = user.get(f"/scenarios/{user.scenario}/roi")["candidates"][0]
     user.map.area.focus()
     page.keyboard.press("0")
-    spot = user.map.at(*user.graph.middle(candidate))
+    spot = user.map.at(*user.graph.middle(_spare(user)))
     _timed(user, "segment of the region", lambda: page.mouse.click(*spot), take_back)
 
     opened("Measures")
@@ -262,6 +262,23 @@ def _filled(user: OdscenPage) -> None:
             f" (aim 3000 for {ACTORS}), {word}"
         )
         page.wait_for_timeout(3000)
+
+
+def _spare(user: OdscenPage) -> str:
+    """A segment that can be taken out of the region: nobody starts, passes or ends there."""
+    columns = user.graph.columns
+    rows = {lane: row for row, lane in enumerate(columns["lane_keys"])}
+    document = user.document()
+    used = set()
+    for actor in document["actors"]:
+        for node in (actor["spawn"], actor["goal"], *actor["via"]):
+            if node is not None and not node.startswith("ped."):
+                lane, _, number = node.rpartition(".")
+                used.add(columns["segment"][columns["first_node"][rows[lane]] + int(number)])
+    removable = user.get(f"/scenarios/{user.scenario}/roi")["removable"]
+    segments = [one["id"] for one in columns["segments"]]
+    free = [one for one in removable if segments.index(one) not in used]
+    return max(free, key=lambda one: columns["segment"].count(segments.index(one)))
 
 
 def _free(user: OdscenPage) -> tuple[float, float]:
