@@ -1,7 +1,9 @@
 """The editor in headless Chromium, drawn in software, with 2,000 road users on a town.
 
-Aims: 50 frames a second while the map is panned, zoomed or a road user is dragged; a change shown
-100 ms after the key that asks for it. When it is saved, and the part of the server, is told apart.
+Aims: 50 frames a second while the map is panned, zoomed or a road user is dragged; a change of road
+users, region, measures, rules, signals or criteria shown 100 ms after the key or the click that asks
+for it; a region filled with 2,000 in 3 s, with a word on its progress. When a change is saved, and
+the part of the server, is told apart.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from tools import page as tool
 
 ACTORS = 2000
 CHANGES = 10
+FILLS = 3
 STEPS = 90
 
 _PROBE = """
@@ -35,20 +38,24 @@ window.odscenFrames = [];
 const tick = now => { window.odscenFrames.push(now); requestAnimationFrame(tick); };
 requestAnimationFrame(tick);
 window.odscenChange = {};
+window.odscenShown = 'table[aria-rowcount]';
 const watch = () => {
   const begun = performance.now();
   const rows = () => {
-    const table = document.querySelector('table[aria-rowcount]');
-    return table && table.getAttribute('aria-rowcount') + table.textContent;
+    const shown = document.querySelector(window.odscenShown);
+    return shown && shown.getAttribute('aria-rowcount') + shown.textContent;
   };
   const before = rows();
   const change = window.odscenChange = {};
   let asked = false;
   const note = what => requestAnimationFrame(() => { change[what] = performance.now() - begun; });
   const look = () => {
+    if (window.odscenChange !== change) return;
     const saved = document.getElementById('head-slot').innerText.includes('All changes saved');
     if (!saved) asked = true;
     if (!change.sawRows && rows() !== before) { change.sawRows = true; note('shown'); }
+    const said = document.querySelector('.map-hint')?.textContent.includes('Applying the change');
+    if (said && !change.sawWord) { change.sawWord = true; note('said'); }
     if (asked && saved) note('saved');
     else requestAnimationFrame(look);
   };
@@ -57,7 +64,8 @@ const watch = () => {
 addEventListener('keydown', watch, true);
 addEventListener('pointerdown', watch, true);
 """
-"""Notes each frame, and how long after a key or a click its change is shown, and is saved."""
+"""Notes each frame, and how long after a key or a click its change is seen in what is watched for it
+(``odscenShown``), is saved, and whether it is said meanwhile that it is being made."""
 
 
 def main() -> None:
@@ -156,6 +164,12 @@ def _frames(user: OdscenPage, what: str, move: Callable[[], None]) -> None:
 def _changes(user: OdscenPage) -> None:
     """Milliseconds from a key or a click that asks for a change to its picture, by what it does."""
     page = user.page
+
+    def take_back() -> None:
+        # In a field the keys would undo what was typed.
+        with user.changing():
+            user.undo.click()
+
     keys = itertools.cycle(("Control+z", "Control+y"))
     _timed(user, "removal undone, redone", lambda: page.keyboard.press(next(keys)))
     user.names.nth(5).click()
@@ -165,12 +179,106 @@ def _changes(user: OdscenPage) -> None:
     page.keyboard.press("Escape")
     page.keyboard.press("1")
     point = user.map.at(*_free(user))
-
-    def take_back() -> None:
-        with user.changing():
-            page.keyboard.press("Control+z")
-
     _timed(user, "placed by a click", lambda: page.mouse.click(*point), take_back)
+    page.keyboard.press("Escape")
+    _changes_of_steps(user, take_back)
+    _filled(user)
+
+
+def _changes_of_steps(user: OdscenPage, take_back: Callable[[], object]) -> None:
+    """The same of what the steps hold; what is open of a step, or its heading, tells of the change."""
+    page = user.page
+
+    def opened(step: str, shown: str = ".step-head[aria-expanded=true]") -> None:
+        page.evaluate("shown => { window.odscenShown = shown; }", shown)
+        user.step(step).click()
+        page.wait_for_timeout(1500)
+
+    opened("Region")
+    user.map.area.focus()
+    page.keyboard.press("0")
+    spot = user.map.at(*user.graph.middle(_spare(user)))
+    _timed(user, "segment of the region", lambda: page.mouse.click(*spot), take_back)
+
+    opened("Measures")
+    place = page.get_by_role("textbox", name="or type its name")
+    roads = [one for one in user.document()["roi"] if one.startswith("r")]
+
+    def close_road() -> None:
+        place.fill(roads[0])
+        place.press("Enter")
+
+    _timed(user, "measure added", close_road, take_back)
+    with user.changing():
+        place.fill(roads[0])
+        place.press("Enter")
+    page.evaluate("window.odscenShown = '.step-body'")
+    ends = page.get_by_label("Until")
+    lengths = itertools.count(60)
+
+    def end_later() -> None:
+        ends.fill(str(next(lengths)))
+        ends.press("Enter")
+
+    _timed(user, "measure changed", end_later)
+
+    opened("Rules")
+
+    def add_rule() -> None:
+        page.get_by_role("button", name="Add a rule").click()
+        page.get_by_role("button", name="Add the rule").click()
+
+    _timed(user, "rule added", add_rule, take_back)
+
+    opened("Criteria")
+    add = page.get_by_role("button", name="Add the criterion")
+    _timed(user, "criterion added", add.click, take_back)
+
+    opened("Run", ".step-body")
+    controls = itertools.cycle(("Actuated", "Fixed-time"))
+    group = page.get_by_role("radiogroup", name="Signal control")
+    _timed(user, "control of signals", lambda: group.get_by_text(next(controls), exact=True).click())
+
+
+def _filled(user: OdscenPage) -> None:
+    """Seconds from the click that fills the region until all are shown, and what is said meanwhile."""
+    page = user.page
+    user.step("Road users").click()
+    page.get_by_role("button", name="Fill the whole region").click()
+    density = page.get_by_role("slider", name="Density, percent of the maximum")
+    density.press("End")
+    page.evaluate("window.odscenShown = 'table[aria-rowcount]'")
+    button = page.get_by_role("button", name="Fill the region", exact=True)
+    for seed in range(FILLS):
+        page.get_by_label("Random seed").fill(str(seed))
+        page.evaluate("window.odscenChange = {}")
+        button.click()
+        page.wait_for_function("odscenChange.shown && odscenChange.saved")
+        change = page.evaluate("odscenChange")
+        said = change.get("said")
+        word = "no word on it" if said is None else f"said after {said:.0f} ms"
+        print(
+            f"  {len(user.document()['actors'])} filled in, shown after {change['shown']:.0f} ms"
+            f" (aim 3000 for {ACTORS}), {word}"
+        )
+        page.wait_for_timeout(3000)
+
+
+def _spare(user: OdscenPage) -> str:
+    """A segment that can be taken out of the region: nobody starts, passes or ends there."""
+    columns = user.graph.columns
+    rows = {lane: row for row, lane in enumerate(columns["lane_keys"])}
+    document = user.document()
+    used = set()
+    for actor in document["actors"]:
+        for node in (actor["spawn"], actor["goal"], *actor["via"]):
+            if node is not None and not node.startswith("ped."):
+                lane, _, number = node.rpartition(".")
+                used.add(columns["segment"][columns["first_node"][rows[lane]] + int(number)])
+    removable = user.get(f"/scenarios/{user.scenario}/roi")["removable"]
+    segments = [one["id"] for one in columns["segments"]]
+    free = [one for one in removable if segments.index(one) not in used]
+    return max(free, key=lambda one: columns["segment"].count(segments.index(one)))
 
 
 def _free(user: OdscenPage) -> tuple[float, float]:

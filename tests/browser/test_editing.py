@@ -251,7 +251,7 @@ def test_a_flow_is_placed_and_undone(region: OdscenPage) -> None:
 
 def test_a_random_crowd_fills_the_region_in_one_step(region: OdscenPage) -> None:
     region.step("Road users").click()
-    region.page.get_by_role("button", name="Fill the region at random").click()
+    region.page.get_by_role("button", name="Fill the whole region").click()
     settle(region.page)
     button = region.page.get_by_role("button", name="Fill the region", exact=True)
     with region.changing():

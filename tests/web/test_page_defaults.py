@@ -1,4 +1,4 @@
-"""What the page takes for granted of a new road user or flow, before the server has answered."""
+"""What the page takes for granted of a new road user, flow or timing of a light, before the server has answered."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 
 from odscen.base.categories import Category
 from odscen.scenario.document.scenario_document import Actor, Flow
+from odscen.scenario.document.signals_document import JunctionTiming
 
 PARTS = Path(__file__).parents[2] / "frontend/src/editor/newParts.json"
 
@@ -18,10 +19,11 @@ PARTS = Path(__file__).parents[2] / "frontend/src/editor/newParts.json"
     [
         ("actor", Actor(id="a", category=Category.CAR, spawn="n"), {"id", "category", "spawn"}),
         ("flow", Flow(id="f", spawn="n", per_hour=60), {"id", "spawn", "per_hour"}),
+        ("timing", JunctionTiming(junction="1"), {"junction"}),
     ],
 )
 def test_the_page_fills_new_parts_with_the_defaults_of_the_document(
-    part: str, made: Actor | Flow, given: set[str]
+    part: str, made: Actor | Flow | JunctionTiming, given: set[str]
 ) -> None:
     assert json.loads(PARTS.read_text(encoding="utf-8"))[part] == made.model_dump(
         mode="json", exclude=given

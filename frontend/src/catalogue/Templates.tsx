@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
+import { shownUnit } from "../language/units";
 import { served } from "../language/served";
 import { type Template, templates } from "../api/templates";
 import type { MapInfo } from "../api/types";
@@ -107,19 +108,23 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
         onChange={setMap}
       />
       <div style={{ display: "grid", gap: 12, gridTemplateColumns: "1fr 1fr", alignItems: "end" }}>
-        {template.numbers.map((one) => (
-          <NumberInput
-            key={one.name}
-            label={`${one.name.replace(/_/g, " ")} (${one.unit})`}
-            description={served(one.meaning)}
-            placeholder={t`by the others`}
-            min={one.low}
-            max={one.high}
-            decimalScale={3}
-            defaultValue={one.usual ?? ""}
-            onChange={(value) => change(one.name, value)}
-          />
-        ))}
+        {template.numbers.map((one) => {
+          const { sign, shown, told } = shownUnit(one.unit);
+          const bound = (end: number | null): number | undefined => (end === null ? undefined : shown(end));
+          return (
+            <NumberInput
+              key={one.name}
+              label={`${one.name.replace(/_/g, " ")} (${sign})`}
+              description={served(one.meaning)}
+              placeholder={t`by the others`}
+              min={bound(one.low)}
+              max={bound(one.high)}
+              decimalScale={3}
+              defaultValue={bound(one.usual) ?? ""}
+              onChange={(value) => change(one.name, typeof value === "number" ? told(value) : value)}
+            />
+          );
+        })}
       </div>
       {refused && (
         <Alert color="red" title={t`It cannot be placed`}>

@@ -1,7 +1,7 @@
 import { Button, Collapse, Group, Stack, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { type ReactNode, useState } from "react";
+import { type ReactNode, useDeferredValue, useState } from "react";
 
 import type { Filler } from "../api/generators";
 import { type Actor, type Assets, CATEGORIES, type Edit, type Flow } from "../api/types";
@@ -51,6 +51,9 @@ export function ActorStep(props: Props) {
   const { assets, graph, starts, selected, tool, goals, onTool, onEdit } = props;
   const [filling, setFilling] = useState(false);
   const one = selected.length === 1 ? selected[0] : null;
+  // A form takes longer to make than all else: it follows what map and table show already.
+  const before = useDeferredValue(one);
+  const formed = before?.id === one?.id ? one : before;
   const actors = selected.filter((each): each is Actor => !isFlow(each));
   return (
     <>
@@ -129,12 +132,13 @@ export function ActorStep(props: Props) {
             />
           )}
           {one &&
-            (isFlow(one) ? (
-              <FlowForm key={one.id} flow={one} profiles={props.profiles} onEdit={onEdit} />
+            formed &&
+            (isFlow(formed) ? (
+              <FlowForm key={formed.id} flow={formed} profiles={props.profiles} onEdit={onEdit} />
             ) : (
               <ActorForm
-                key={one.id}
-                actor={one}
+                key={formed.id}
+                actor={formed}
                 driverSets={props.driverSets}
                 assets={assets}
                 onEdit={onEdit}
@@ -170,7 +174,7 @@ export function ActorStep(props: Props) {
         aria-expanded={filling}
         onClick={() => setFilling(!filling)}
       >
-        {filling ? t`Hide random fill` : t`Fill the region at random`}
+        {filling ? t`Hide the filling` : t`Fill the whole region`}
       </Button>
       <Collapse in={filling}>
         {filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}

@@ -5,6 +5,7 @@ import { useCallback, useState } from "react";
 
 import { api } from "../api/client";
 import { go } from "../ui/address";
+import { shownUnit } from "../language/units";
 import { useLoaded } from "../ui/useLoaded";
 import { mapFacts } from "../ui/words";
 import type { Region } from "./asked";
@@ -54,7 +55,9 @@ export function RegionStep({
   onBegin: () => void;
   onShow: () => void;
 }) {
-  const [metres, setMetres] = useState<number | string>(NEAR);
+  const { sign, shown, told } = shownUnit("m");
+  // In the reader's unit, in which 300 m are a round number, too.
+  const [distance, setDistance] = useState<number | string>(Number(shown(NEAR).toPrecision(1)));
   const many = (
     <>
       <Button size="compact-sm" variant="default" onClick={onWhole}>
@@ -67,8 +70,8 @@ export function RegionStep({
         <Button
           size="compact-sm"
           variant="default"
-          disabled={typeof metres !== "number"}
-          onClick={() => onWithin(Number(metres))}
+          disabled={typeof distance !== "number"}
+          onClick={() => onWithin(told(Number(distance)))}
         >
           <Trans>Take all within</Trans>
         </Button>
@@ -76,13 +79,13 @@ export function RegionStep({
           size="xs"
           w={92}
           aria-label={t`Distance from the middle of what is in sight`}
-          suffix={" m"}
-          min={10}
-          max={20_000}
+          suffix={` ${sign}`}
+          min={Math.ceil(shown(10))}
+          max={Math.floor(shown(20_000))}
           step={50}
           allowDecimal={false}
-          value={metres}
-          onChange={setMetres}
+          value={distance}
+          onChange={setDistance}
         />
         <Text size="sm">
           <Trans>of the middle</Trans>

@@ -1,4 +1,4 @@
-import { ActionIcon, Button, TextInput, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, TextInput } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { type KeyboardEvent, memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
@@ -193,6 +193,7 @@ interface RowActions {
   remove: (id: string) => void;
 }
 
+/** One row; only its number changes when a row before it comes or goes, and its cells stay. */
 const Row = memo(function Row({
   one,
   n,
@@ -214,6 +215,24 @@ const Row = memo(function Row({
       style={{ height: ROW }}
       onClick={(event) => actions.select(one.id, event.shiftKey || event.ctrlKey)}
     >
+      <Cells one={one} graph={graph} chosen={chosen} actions={actions} />
+    </tr>
+  );
+});
+
+const Cells = memo(function Cells({
+  one,
+  graph,
+  chosen,
+  actions,
+}: {
+  one: Actor | Flow;
+  graph: Graph;
+  chosen: boolean;
+  actions: RowActions;
+}) {
+  return (
+    <>
       <td>
         <button
           type="button"
@@ -235,19 +254,9 @@ const Row = memo(function Row({
       </td>
       <td>{isFlow(one) ? "–" : one.model ? modelWord(one.model) : t`any`}</td>
       <td>
-        <Tooltip label={one.spawn}>
-          <span>{placeWord(graph, one.spawn)}</span>
-        </Tooltip>
+        <span title={one.spawn}>{placeWord(graph, one.spawn)}</span>
       </td>
-      <td>
-        {one.goal ? (
-          <Tooltip label={one.goal}>
-            <span>{placeWord(graph, one.goal)}</span>
-          </Tooltip>
-        ) : (
-          t`random`
-        )}
-      </td>
+      <td>{one.goal ? <span title={one.goal}>{placeWord(graph, one.goal)}</span> : t`random`}</td>
       <td>{speedWord(one)}</td>
       <td>{isFlow(one) ? t`${one.begin} to ${one.end} s` : t`after ${one.depart} s`}</td>
       <td>
@@ -272,7 +281,7 @@ const Row = memo(function Row({
           <IconTrash size={15} />
         </ActionIcon>
       </td>
-    </tr>
+    </>
   );
 });
 

@@ -1,9 +1,12 @@
 import type { Actor, Edit, EditOf, Flow, ScenarioDocument } from "../api/types";
+import { withoutTiming, withStage, withTiming } from "./foreseenSignals";
 import newParts from "./newParts.json";
 import { everyone } from "./placing";
+import { toldRule, waitingFor } from "./rules/toldRule";
 
 /** What is not said of a new road user or flow; a test holds it against the server's own defaults. */
 const NEW_ACTOR: Omit<Actor, "id" | "category" | "spawn"> = newParts.actor;
+type Measure = ScenarioDocument["measures"][number];
 const NEW_FLOW: Omit<Flow, "id" | "spawn" | "per_hour"> = newParts.flow;
 
 /**
@@ -66,15 +69,62 @@ function afterOne(document: ScenarioDocument, edit: Edit): ScenarioDocument | nu
       // Who starts there goes, too, or the server refuses.
       if (edit.with_actors) return null;
       return { ...document, roi: document.roi.filter((segment) => segment !== edit.segment) };
+    case "set_environment":
+      return { ...document, environment: environmentAfter(document.environment, edit) };
     case "set_criteria":
       return { ...document, criteria: edit.criteria };
+    case "set_measure": {
+      const measures = withPart(document.measures, edit.measure as Measure, edit.instead_of);
+      return measures && { ...document, measures };
+    }
     case "remove_measure":
       return { ...document, measures: document.measures.filter(({ id }) => id !== edit.measure) };
+    case "set_rule": {
+      const { rule, instead_of } = edit;
+      const rules = withPart(document.rules, toldRule(rule), instead_of);
+      if (!rules || instead_of == null) return rules && { ...document, rules };
+      return { ...document, rules: rules.map((one) => waitingFor(one, instead_of, rule.id)) };
+    }
+    case "set_signal_control":
+      return { ...document, signals: { ...document.signals, control: edit.control } };
+    case "set_timing":
+      return withTiming(document, edit.junction, without(edit, "kind", "junction"));
+    case "set_offset":
+      // Of a plan of the day or of the whole light: only the server knows that.
+      return edit.plan ? null : withTiming(document, edit.junction, { offset: edit.offset });
+    case "set_stage":
+      return withStage(document, edit.junction, edit.stage, without(edit, "kind", "junction", "stage"));
+    case "clear_timing":
+      return withoutTiming(document, edit.junction);
     case "remove_rule":
       return { ...document, rules: document.rules.filter(({ id }) => id !== edit.rule) };
     default:
       return null;
   }
+}
+
+/** A part in the place of that with its id, or of another one, or at the end; null if that is not there. */
+function withPart<T extends { id: string }>(
+  parts: readonly T[],
+  part: T,
+  insteadOf: string | null | undefined,
+): T[] | null {
+  const row = parts.findIndex(({ id }) => id === (insteadOf ?? part.id));
+  if (row >= 0) return parts.with(row, part);
+  return insteadOf == null ? [...parts, part] : null;
+}
+
+/** Another preset drops the values that differed from the one before. */
+function environmentAfter(
+  old: ScenarioDocument["environment"],
+  { preset, parameters, affects_driving }: EditOf<"set_environment">,
+): ScenarioDocument["environment"] {
+  const begun = preset == null ? old : { ...old, preset, parameters: {} };
+  return {
+    ...begun,
+    parameters: parameters ?? begun.parameters,
+    affects_driving: affects_driving ?? begun.affects_driving,
+  };
 }
 
 function withNewActor(document: ScenarioDocument, edit: EditOf<"add_actor">): ScenarioDocument {

@@ -1,6 +1,6 @@
 import { plural, t } from "@lingui/core/macro";
 
-import { type Assets, CATEGORIES, type ScenarioDocument } from "../api/types";
+import { type Assets, CATEGORIES, type Category, type ScenarioDocument } from "../api/types";
 import { countOf, weatherWord } from "../ui/words";
 
 export function weatherNote(assets: Assets | null, preset: string): string {
@@ -10,8 +10,10 @@ export function weatherNote(assets: Assets | null, preset: string): string {
 
 export function actorNote({ actors, flows }: Pick<ScenarioDocument, "actors" | "flows">): string {
   if (actors.length + flows.length === 0) return t`Who is on the road?`;
+  const numbers = new Map<Category, number>();
+  for (const { category } of actors) numbers.set(category, (numbers.get(category) ?? 0) + 1);
   const parts = CATEGORIES.flatMap((category) => {
-    const n = actors.filter((actor) => actor.category === category).length;
+    const n = numbers.get(category);
     return n ? [countOf(category, n)] : [];
   });
   if (flows.length) parts.push(plural(flows.length, { one: "# flow", other: "# flows" }));

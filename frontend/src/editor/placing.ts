@@ -17,10 +17,9 @@ export const stationsOf = (one: Actor | Flow): string[] => [
   ...viasOf(one),
   ...(one.goal === null ? [] : [one.goal]),
 ];
-export const everyone = (document: ScenarioDocument): (Actor | Flow)[] => [
-  ...document.actors,
-  ...document.flows,
-];
+/** Those of a document who start somewhere. */
+export type Placed = Pick<ScenarioDocument, "actors" | "flows">;
+export const everyone = ({ actors, flows }: Placed): (Actor | Flow)[] => [...actors, ...flows];
 
 /** How far from a click a start may be found, metres, when the map is zoomed in. */
 const SNAP = 12;
@@ -33,9 +32,9 @@ export class Starts {
     private readonly graph: Graph,
     private readonly picker: Picker,
     private readonly inside: ReadonlySet<number>,
-    document: ScenarioDocument,
+    placed: Placed,
   ) {
-    this.taken = new Set(everyone(document).map((one) => one.spawn));
+    this.taken = new Set(everyone(placed).map((one) => one.spawn));
   }
 
   private free(index: number, walk: boolean, besides?: ReadonlySet<string>): boolean {

@@ -65,12 +65,12 @@ export const wrongOnes = (problems: readonly Problem[], document: ScenarioDocume
 
 export function sceneActors(
   graph: Graph,
-  document: ScenarioDocument,
+  { actors }: Pick<ScenarioDocument, "actors">,
   assets: Assets | null,
   selection: ReadonlySet<string>,
   wrong: ReadonlySet<string>,
 ): SceneActor[] {
-  return document.actors.flatMap((actor) => {
+  return actors.flatMap((actor) => {
     const place = graph.place(actor.spawn);
     if (!place) return [];
     const [length, width] = bodyOf(actor, assets);
@@ -95,11 +95,11 @@ export function sceneActors(
 
 export function sceneFlows(
   graph: Graph,
-  document: ScenarioDocument,
+  { flows }: Pick<ScenarioDocument, "flows">,
   selection: ReadonlySet<string>,
   wrong: ReadonlySet<string>,
 ): SceneFlow[] {
-  return document.flows.flatMap((flow) => {
+  return flows.flatMap((flow) => {
     const place = graph.place(flow.spawn);
     return place
       ? [

@@ -106,7 +106,8 @@ export function useEditing(
   const region = useRegion(name, roiKey, scenario.version);
   // That of the server: where one can go is asked of it.
   const saidRoi = useMemo(() => region.inside.join("\n"), [region]);
-  const ones = useMemo(() => everyone(document), [document]);
+  const { actors: placed, flows: sent } = document;
+  const ones = useMemo(() => everyone({ actors: placed, flows: sent }), [placed, sent]);
   const one = useMemo(
     () => (selection.length === 1 ? (ones.find(({ id }) => id === selection[0]) ?? null) : null),
     [ones, selection],
@@ -115,7 +116,7 @@ export function useEditing(
   const trial = (hover?.is === "place" && hover.trial) || null;
   const tried = useTrial(name, trial);
   const route = useMemo(() => (trial ? tried.points : legs.flat()), [trial, tried, legs]);
-  const wrong = useMemo(() => wrongOnes(problems, checked ?? document), [problems, checked, document]);
+  const wrong = useWrong(problems, checked ?? document);
   const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, wrong);
   const sights = useMemo(() => sightsOf(handle, graph, () => lights), [graph, lights]);
   const { roi } = document;
@@ -207,6 +208,12 @@ export function useEditing(
       sights.problem(problem, checked ?? document);
     },
   };
+}
+
+/** Ids of those that cannot be run as they are: the same set as long as it has the same ids. */
+function useWrong(problems: readonly Problem[], checked: ScenarioDocument): ReadonlySet<string> {
+  const found = useMemo(() => [...wrongOnes(problems, checked)].join("\n"), [problems, checked]);
+  return useMemo(() => new Set(found ? found.split("\n") : []), [found]);
 }
 
 /** The step that the address names, if it names one. */

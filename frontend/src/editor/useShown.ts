@@ -21,16 +21,20 @@ export function useShown(
   selection: readonly string[],
   wrong: ReadonlySet<string>,
 ): Shown {
-  const inside = useMemo(() => insideRows(graph, document.roi), [graph, document.roi]);
+  const { roi, actors: placed, flows: sent } = document;
+  const inside = useMemo(() => insideRows(graph, roi), [graph, roi]);
   const starts = useMemo(
-    () => new Starts(graph, picker, inside, document),
-    [graph, picker, inside, document],
+    () => new Starts(graph, picker, inside, { actors: placed, flows: sent }),
+    [graph, picker, inside, placed, sent],
   );
   const chosen = useMemo(() => new Set(selection), [selection]);
   const actors = useMemo(
-    () => sceneActors(graph, document, assets, chosen, wrong),
-    [graph, document, assets, chosen, wrong],
+    () => sceneActors(graph, { actors: placed }, assets, chosen, wrong),
+    [graph, placed, assets, chosen, wrong],
   );
-  const flows = useMemo(() => sceneFlows(graph, document, chosen, wrong), [graph, document, chosen, wrong]);
+  const flows = useMemo(
+    () => sceneFlows(graph, { flows: sent }, chosen, wrong),
+    [graph, sent, chosen, wrong],
+  );
   return { inside, starts, actors, flows };
 }

@@ -32,6 +32,27 @@ export const toShown = (value: number, quantity: Quantity): number => value * un
 /** Inverse of {@link toShown}. */
 export const fromShown = (shown: number, quantity: Quantity): number => shown / unitFor(quantity).scale;
 
+/** How numbers of one unit of the document are shown; only speeds and lengths in another one. */
+export interface ShownUnit {
+  sign: string;
+  shown: (value: number) => number;
+  /** Inverse of `shown`. */
+  told: (shown: number) => number;
+}
+
+/** The reader's unit of what the document has in `unit`, such as `m/s` or `s`. */
+export function shownUnit(unit: string): ShownUnit {
+  const quantity: Quantity | null = unit === "m/s" ? "speed" : unit === "m" ? "length" : null;
+  const { sign, scale } = quantity ? unitFor(quantity) : { sign: unit, scale: 1 };
+  if (scale === 1) return { sign, shown: (value) => value, told: (shown) => shown };
+  // What was typed comes back as it was: 30 km/h are not 30.000000000000004.
+  return {
+    sign,
+    shown: (value) => Number((value * scale).toPrecision(9)),
+    told: (shown) => Number((shown / scale).toPrecision(12)),
+  };
+}
+
 /** A speed, m/s, in words. */
 export function speedText(speed: number): string {
   const { sign, scale } = unitFor("speed");

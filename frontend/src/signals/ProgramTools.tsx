@@ -24,6 +24,7 @@ import {
 } from "../api/signals";
 import type { Edit } from "../api/types";
 import { Committed } from "../editor/Committed";
+import { useAsked } from "../ui/useAsked";
 import type { SignalEditing, TimingResult } from "./editing";
 
 interface Editable {
@@ -85,10 +86,6 @@ export function ProgramControl({ light, junction, editing }: Editable) {
 export function TurnChoices({ light, junction, editing }: Editable) {
   if (light.turns.length === 0) return null;
   const own = light.origin === "scenario";
-  const choose = (turn: CrossingTurn, value: string): void => {
-    const treatment = value === "both" || value === "protected" ? value : "permissive";
-    void editing.edit({ kind: "set_turn", junction, approach: turn.approach, turn: turn.turn, treatment });
-  };
   return (
     <>
       <h3>
@@ -105,14 +102,7 @@ export function TurnChoices({ light, junction, editing }: Editable) {
             {turn.approach} {turn.turn}
           </span>
           {turn.alone ? (
-            <SegmentedControl
-              size="xs"
-              data={TREATMENTS()}
-              value={turn.treatment}
-              disabled={!own}
-              aria-label={`${turn.approach} ${turn.turn}`}
-              onChange={(value) => choose(turn, value)}
-            />
+            <Treatment light={light} turn={turn} junction={junction} editing={editing} />
           ) : (
             <Text size="xs" c="dimmed">
               <Trans>through gaps: it has no lane for itself</Trans>
@@ -124,11 +114,31 @@ export function TurnChoices({ light, junction, editing }: Editable) {
   );
 }
 
+function Treatment({ light, junction, editing, turn }: Editable & { turn: CrossingTurn }) {
+  const { approach, turn: side } = turn;
+  const [treatment, ask] = useAsked<string>(turn.treatment, light);
+  const choose = (value: string): void => {
+    const next = value === "both" || value === "protected" ? value : "permissive";
+    ask(next, editing.edit({ kind: "set_turn", junction, approach, turn: side, treatment: next }));
+  };
+  return (
+    <SegmentedControl
+      size="xs"
+      data={TREATMENTS()}
+      value={treatment}
+      disabled={light.origin !== "scenario"}
+      aria-label={`${approach} ${side}`}
+      onChange={choose}
+    />
+  );
+}
+
 /** Whether a stage with a crossing waits for a call. */
 export function StageCall({ light, junction, editing, stage }: Editable & { stage: string }) {
   const one = light.plans[0]?.stages.find(({ id }) => id === stage);
   const first = light.plans[0]?.stages[0]?.id === stage;
   const walks = new Set(light.groups.filter(({ walk }) => walk).map(({ id }) => id));
+  const [called, ask] = useAsked(one?.on_call ?? false, light);
   if (!one || first || light.origin !== "scenario" || !one.groups.some((id) => walks.has(id))) return null;
   const change = (on_call: boolean): Edit => ({ kind: "set_stage", junction, stage, on_call });
   return (
@@ -136,8 +146,8 @@ export function StageCall({ light, junction, editing, stage }: Editable & { stag
       size="xs"
       label={t`only when called`}
       aria-label={t`Stage ${stage} only when a pedestrian calls`}
-      checked={one.on_call}
-      onChange={(event) => void editing.edit(change(event.currentTarget.checked))}
+      checked={called}
+      onChange={({ currentTarget: { checked } }) => ask(checked, editing.edit(change(checked)))}
     />
   );
 }

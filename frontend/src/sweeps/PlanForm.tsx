@@ -1,20 +1,9 @@
-import {
-  Alert,
-  Button,
-  Group,
-  NumberInput,
-  SegmentedControl,
-  Select,
-  TagsInput,
-  Text,
-  TextInput,
-} from "@mantine/core";
+import { Alert, Button, Group, NumberInput, Select, TagsInput, Text } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useMemo, useRef, useState } from "react";
 
 import { fixed } from "../language/numbers";
-import { localized } from "../language/localized";
 import { allFigures } from "../api/figures";
 import { type PlannedSweep, sweeps } from "../api/sweeps";
 import type { ScenarioDocument } from "../api/types";
@@ -23,13 +12,8 @@ import { go } from "../ui/address";
 import { reasonOf } from "../ui/reason";
 import { useLoaded } from "../ui/useLoaded";
 import { bytes } from "../ui/words";
-import { countOf, faultOf, lasting, METHODS, newForm, type SweepForm, type Varied, wishOf } from "./plan";
-
-const HOW = localized(() => [
-  { value: "fixed", label: t`Fixed` },
-  { value: "range", label: t`Range` },
-  { value: "set", label: t`Set` },
-]);
+import { countOf, faultOf, lasting, METHODS, newForm, type SweepForm, wishOf } from "./plan";
+import { VariedRow } from "./VariedRow";
 
 /** What is varied and how; says what it takes before it starts. */
 export function PlanForm({ scenario, document }: { scenario: string; document: ScenarioDocument }) {
@@ -266,92 +250,5 @@ function Whole({
         if (typeof next === "number") onValue(Math.max(least, next));
       }}
     />
-  );
-}
-
-/** One parameter of the form: fixed, a range, or a set of values. */
-function VariedRow({
-  name,
-  unit,
-  value,
-  description,
-  computed,
-  grid,
-  varied,
-  onVaried,
-}: {
-  name: string;
-  unit: string;
-  value: number;
-  description: string;
-  computed: string | undefined;
-  grid: boolean;
-  varied: Varied | undefined;
-  onVaried: (varied: Varied) => void;
-}) {
-  if (!varied) return null;
-  const suffix = unit ? ` ${unit}` : "";
-  const number = (label: string, key: "low" | "high") => (
-    <NumberInput
-      label={label}
-      aria-label={t`${label} of ${name}`}
-      suffix={suffix}
-      value={varied[key]}
-      onChange={(next) => {
-        if (typeof next === "number") onVaried({ ...varied, [key]: next });
-      }}
-    />
-  );
-  return (
-    <section className="fold varied" aria-label={t`Parameter ${name}`}>
-      <div className="varied-name">
-        <Text fw={600} size="sm">
-          {name}
-        </Text>
-        <Text size="xs" c="dimmed">
-          {[description, t`now ${shortNumber(value)}${suffix}`].filter(Boolean).join(", ")}
-        </Text>
-      </div>
-      {computed !== undefined ? (
-        <Text size="sm">
-          <Trans>Computed: {computed}</Trans>
-        </Text>
-      ) : (
-        <SegmentedControl
-          size="xs"
-          aria-label={t`How ${name} is varied`}
-          data={HOW()}
-          value={varied.how}
-          onChange={(how) => onVaried({ ...varied, how: how as Varied["how"] })}
-        />
-      )}
-      {varied.how === "range" && (
-        <>
-          {number(t`From`, "low")}
-          {number(t`To`, "high")}
-          {grid && (
-            <NumberInput
-              label={t`Values`}
-              aria-label={t`Values of ${name}`}
-              allowDecimal={false}
-              min={2}
-              max={10_000}
-              value={varied.steps}
-              onChange={(next) => {
-                if (typeof next === "number") onVaried({ ...varied, steps: Math.max(2, next) });
-              }}
-            />
-          )}
-        </>
-      )}
-      {varied.how === "set" && (
-        <TextInput
-          label={t`Values, between commas${unit ? `, ${unit}` : ""}`}
-          aria-label={t`Values of ${name}`}
-          value={varied.values}
-          onChange={(event) => onVaried({ ...varied, values: event.currentTarget.value })}
-        />
-      )}
-    </section>
   );
 }

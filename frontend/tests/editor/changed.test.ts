@@ -4,6 +4,8 @@ import type { DocumentChange, Edit, ScenarioState } from "../../src/api/types";
 import { patched, reused } from "../../src/editor/documentChanges";
 import { foreseen } from "../../src/editor/foreseen";
 import { createEditorStore } from "../../src/editor/store";
+import { type Draft, draftOf, ruleOf } from "../../src/editor/rules/draft";
+import { toldRule } from "../../src/editor/rules/toldRule";
 import { Timeline } from "../../src/editor/timeline";
 import { actor, flow, scenario } from "../example";
 
@@ -123,6 +125,101 @@ test("a region that grows or shrinks is foreseen, as far as no road user goes wi
   ]);
   expect(grown?.roi).toEqual(["r2", "r3"]);
   expect(grown?.actors).toBe(document.actors);
+});
+
+const closure = (id: string, places: string[]) => ({
+  id,
+  kind: "closure" as const,
+  begin: 0,
+  end: null,
+  places,
+});
+
+test("measures are foreseen: new ones, changed ones, and under another name", () => {
+  const made = foreseen(document, [
+    { kind: "set_measure", measure: closure("a", ["r1"]) },
+    { kind: "set_measure", measure: closure("b", ["r2"]) },
+    { kind: "set_measure", measure: closure("a", ["r1", "r3"]) },
+    { kind: "set_measure", measure: closure("c", ["r2"]), instead_of: "b" },
+  ]);
+  expect(made?.measures).toEqual([closure("a", ["r1", "r3"]), closure("c", ["r2"])]);
+  const unknown: Edit = { kind: "set_measure", measure: closure("c", ["r2"]), instead_of: "z" };
+  expect(foreseen(document, [unknown])).toBeNull();
+});
+
+test("a rule is foreseen with what it leaves out, and those that wait for it follow its new name", () => {
+  const draft = draftOf(
+    toldRule({ id: "first", actor: "a", when: { time: { after: 3 } }, then: [{ brake: { by: 4 } }] }),
+  );
+  const waits: Draft = {
+    ...draft,
+    id: "second",
+    when: {
+      join: "all",
+      of: [
+        { kind: "rule", values: { id: "first" }, delay: 0, edge: "none" },
+        { kind: "time", values: { after: 9 }, delay: 2, edge: "rising" },
+      ],
+      delay: 0,
+      edge: "none",
+    },
+  };
+  const made = foreseen(document, [
+    { kind: "set_rule", rule: ruleOf(draft) },
+    { kind: "set_rule", rule: ruleOf(waits) },
+    { kind: "set_rule", rule: ruleOf({ ...draft, id: "begin" }), instead_of: "first" },
+  ]);
+  expect(made?.rules.map(draftOf)).toEqual([
+    { ...draft, id: "begin" },
+    {
+      ...waits,
+      when: {
+        ...waits.when,
+        of: [
+          { kind: "rule", values: { id: "begin" }, delay: 0, edge: "none" },
+          { kind: "time", values: { after: 9 }, delay: 2, edge: "rising" },
+        ],
+      },
+    },
+  ]);
+  expect(made?.rules[0]).toMatchObject({ times: 1, when: { delay: 0, edge: "none" } });
+});
+
+test("control, offset and stages of lights are foreseen, and lights given back to the map", () => {
+  const timed = foreseen(document, [
+    { kind: "set_signal_control", control: "actuated" },
+    { kind: "set_timing", junction: "j1", control: "fixed" },
+    { kind: "set_offset", junction: "j1", offset: 5 },
+    { kind: "set_timing", junction: "j2", bus_priority: true },
+    { kind: "clear_timing", junction: "j2" },
+  ]);
+  if (!timed) throw new Error();
+  expect(timed.signals).toMatchObject({
+    control: "actuated",
+    junctions: [{ junction: "j1", control: "fixed", offset: 5, stages: [], bus_priority: null }],
+  });
+  const stage = { id: "A", green: 20, on_call: false } as never;
+  const own = foreseen(timed, [
+    { kind: "set_timing", junction: "j1", stages: [stage] },
+    { kind: "set_stage", junction: "j1", stage: "A", on_call: true },
+  ]);
+  expect(own?.signals.junctions[0]?.stages).toEqual([{ id: "A", green: 20, on_call: true }]);
+  const unknown: Edit[] = [
+    { kind: "set_stage", junction: "j1", stage: "B", on_call: true },
+    { kind: "set_offset", junction: "j1", offset: 5, plan: "morning" },
+    { kind: "set_green", junction: "j1", stage: "A", green: 9 },
+  ];
+  for (const edit of unknown) expect(foreseen(timed, [edit])).toBeNull();
+});
+
+test("another preset of the weather drops the values that differed from the last", () => {
+  const rain = foreseen(document, [
+    { kind: "set_environment", parameters: { fog_density: 9 } },
+    { kind: "set_environment", affects_driving: false },
+  ]);
+  expect(rain?.environment).toMatchObject({ parameters: { fog_density: 9 }, affects_driving: false });
+  const noon = rain && foreseen(rain, [{ kind: "set_environment", preset: "WetNoon" }]);
+  expect(noon?.environment).toEqual({ preset: "WetNoon", parameters: {}, affects_driving: false });
 });
 
 test("changes without a server are all kept, and made again in their order", async () => {

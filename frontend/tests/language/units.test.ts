@@ -12,6 +12,7 @@ import {
   roughLength,
   roundLength,
   shownAs,
+  shownUnit,
   speedText,
   toShown,
 } from "../../src/language/units";
@@ -97,4 +98,14 @@ test("what is remembered and no longer known is as at first", () => {
   expect(read(null, ["fr", "xx"])).toEqual(first);
   expect(read('{"language":"en"}', ["de"])).toEqual(first);
   expect(read('{"language":"xx","speed":"mph","hours":"12"}')).toEqual({ ...first, speed: "mph" });
+});
+
+test("numbers with a unit of the document are shown in that of the reader, and come back as they were", () => {
+  prefer({ speed: "mph", length: "ft" });
+  const [speed, length, time] = ["m/s", "m", "s"].map(shownUnit);
+  expect([speed?.sign, length?.sign, time?.sign]).toEqual(["mph", "ft", "s"]);
+  expect(speed?.shown(speed.told(30))).toBe(30);
+  expect(length?.shown(3.048)).toBe(10);
+  expect(length?.told(10)).toBeCloseTo(3.048, 12);
+  expect([time?.shown(2.5), time?.told(2.5)]).toEqual([2.5, 2.5]);
 });

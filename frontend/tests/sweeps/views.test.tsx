@@ -1,9 +1,10 @@
 // @vitest-environment happy-dom
-import { screen, within } from "@testing-library/react";
+import { screen, waitFor, within } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
 import type { SweepCase, SweepCases, SweepInfo } from "../../src/api/sweeps";
 import type { ScenarioDocument } from "../../src/api/types";
+import { prefer } from "../../src/language/preferences";
 import { CaseTable } from "../../src/sweeps/CaseTable";
 import { costOf, PlanForm } from "../../src/sweeps/PlanForm";
 import { Parallel } from "../../src/sweeps/Parallel";
@@ -161,4 +162,25 @@ test("a sweep that was stopped says so and can be resumed", async () => {
   expect(await screen.findByText(/4 cases of gap, speed: 3 have ended. It was stopped/)).toBeDefined();
   await user.click(screen.getByRole("button", { name: "Resume" }));
   expect(asked.some(({ path }) => path === "/api/sweeps/s-1/resume")).toBe(true);
+});
+
+test("ranges and values of a sweep are in the reader's unit, and sent in the parameter's own", async () => {
+  prefer({ length: "ft" });
+  const swept: ScenarioDocument = {
+    ...scenario([actor("a")]),
+    parameters: { gap: { value: 6.096, unit: "m", min: 3.048, max: 30.48, description: "" } },
+  };
+  const asked = server({ "/api/figures": [], "/api/sweeps/plan": planned });
+  const { user } = show(<PlanForm scenario="s" document={swept} />);
+  expect(screen.getByText("now 20 ft")).toBeDefined();
+  expect(screen.getByRole("textbox", { name: "From of gap" })).toHaveProperty("value", "10 ft");
+  await user.click(screen.getByText("Set"));
+  const values = screen.getByRole("textbox", { name: "Values of gap" });
+  await user.clear(values);
+  await user.type(values, "10, 100");
+  await user.click(screen.getByRole("button", { name: "Plan the sweep" }));
+  await waitFor(() => expect(asked.some(({ path }) => path === "/api/sweeps/plan")).toBe(true));
+  const sent = asked.find(({ path }) => path === "/api/sweeps/plan")?.body as { vary: unknown[] };
+  expect(sent.vary).toEqual([{ parameter: "gap", values: [3.048, 30.48] }]);
+  prefer({ length: "m" });
 });

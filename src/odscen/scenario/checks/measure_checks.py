@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -144,25 +144,72 @@ def _overlap(one: Measure, other: Measure) -> bool:
 
 def _cut_off(scenario: Scenario, region: Region, places: PlaceNames) -> Iterator[Problem]:
     """Yield placed actors that depart while every route to their goal is closed."""
-    routers: dict[bytes, Router] = {}
+    asked = _routes_when_closed(scenario, region, places)
+    stranded: dict[int, tuple[Measure, ...]] = {}
+    for mask, routes in asked.values():
+        stranded |= {one.actor: one.closing for one in _without_way(region, mask, routes)}
+    for index, closing in sorted(stranded.items()):
+        actor = scenario.actors[index]
+        names = ", ".join(repr(one.id) for one in closing)
+        message = (
+            f"{actor.id!r} departs at {actor.depart:g} s, when {names} has closed every route "
+            "to its goal; it will be stranded"
+        )
+        yield warning("only_route_closed", f"actors[{index}].goal", message)
+
+
+class _Route(NamedTuple):
+    """Nodes that an actor must reach one after another, and the measures that are in its way."""
+
+    actor: int
+    nodes: tuple[int, ...]
+    closing: tuple[Measure, ...]
+
+
+def _routes_when_closed(
+    scenario: Scenario, region: Region, places: PlaceNames
+) -> dict[bytes, tuple[BoolArray, list[_Route]]]:
+    """Routes of actors that measures may stop, by the nodes that are open to them."""
+    segments = region.graph.lanes.segment
+    found: dict[bytes, tuple[BoolArray, list[_Route]]] = {}
+    closed_by: dict[tuple[int, ...], BoolArray] = {}
+    open_to: dict[tuple[tuple[int, ...], int | None], tuple[bytes, BoolArray]] = {}
     for index, actor in enumerate(scenario.actors):
-        closing = [one for one in scenario.measures if _stops(one, actor.category, actor.depart)]
+        rows = tuple(
+            row
+            for row, one in enumerate(scenario.measures)
+            if _stops(one, actor.category, actor.depart)
+        )
         spawn = region.place(actor.spawn)
         goal = None if actor.goal is None else region.place(actor.goal)
-        if not closing or spawn is None or goal is None or spawn.walk or goal.walk:
+        if not rows or spawn is None or goal is None or spawn.walk or goal.walk:
             continue
-        closed = _closed_nodes(closing, places, len(region.lanes))
-        own = region.graph.lanes.segment == region.graph.lanes.segment[spawn.node]
-        mask = region.lanes & (~closed | (own & closed[spawn.node]))
-        router = routers.setdefault(mask.tobytes(), Router(region.graph, mask))
-        nodes = [spawn.node, *(p.node for one in actor.via if (p := region.place(one))), goal.node]
-        if not all(mask[b] and router.reachable(a)[b] for a, b in pairwise(nodes)):
-            names = ", ".join(repr(one.id) for one in closing)
-            message = (
-                f"{actor.id!r} departs at {actor.depart:g} s, when {names} has closed every route "
-                "to its goal; it will be stranded"
-            )
-            yield warning("only_route_closed", f"actors[{index}].goal", message)
+        closing = tuple(scenario.measures[row] for row in rows)
+        if rows not in closed_by:
+            closed_by[rows] = _closed_nodes(closing, places, len(region.lanes))
+        closed = closed_by[rows]
+        # Who starts in a place that is closed may still leave it.
+        own = int(segments[spawn.node]) if closed[spawn.node] else None
+        if (rows, own) not in open_to:
+            mask = region.lanes & (~closed | (segments == own if own is not None else False))
+            open_to[rows, own] = mask.tobytes(), mask
+        name, mask = open_to[rows, own]
+        nodes = (spawn.node, *(p.node for one in actor.via if (p := region.place(one))), goal.node)
+        found.setdefault(name, (mask, []))[1].append(_Route(index, nodes, closing))
+    return found
+
+
+def _without_way(region: Region, mask: BoolArray, routes: Sequence[_Route]) -> Iterator[_Route]:
+    """Yield the routes of which a part does not lead on over the nodes of the mask."""
+    open_routes = [one for one in routes if mask[list(one.nodes)].all()]
+    pairs = [(pair, one.actor) for one in open_routes for pair in pairwise(one.nodes)]
+    broken: set[int] = set()
+    if pairs:
+        nodes = np.array([pair for pair, _ in pairs], dtype=np.int32)
+        leads = Router(region.graph, mask).leads(nodes[:, 0], nodes[:, 1])
+        broken = {index for (_, index), way in zip(pairs, leads, strict=True) if not way}
+    whole = {one.actor for one in open_routes} - broken
+    yield from (one for one in routes if one.actor not in whole)
 
 
 def _stops(measure: Measure, category: Category, time: float) -> bool:
