@@ -39,7 +39,7 @@ _NOT_SENTENCES = frozenset(
         "stream",
     }
 )
-_NOT_KEYWORDS = frozenset({"description", "help", "definition", "source"})
+_NOT_KEYWORDS = frozenset({"class_", "description", "help", "definition", "source"})
 _PROSE = re.compile(r"[a-z]{2,}[,;:]? +(?:[a-z(]|\0)|\0[,;:]? +[a-z]{2,}|[A-Za-z]{2,}: \0")
 _MARKUP = re.compile(
     r"^\s*<|\w=\"|<!--|\\\w|^\(.+[<>] |^Content-|^multipart/|^default-src|^import sys|^%s"

@@ -40,6 +40,7 @@ SHOWN = (
     "results/measures/usability",
     "results/measures/traffic_files",
     "results/records/",
+    "results/report/signals/stage_diagrams",
     "scenario/",
     "sumo/",
     "web/",

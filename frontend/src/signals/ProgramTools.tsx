@@ -25,6 +25,7 @@ import {
 import type { Edit } from "../api/types";
 import { Committed } from "../editor/Committed";
 import type { SignalEditing, TimingResult } from "./editing";
+import { served } from "../language/served";
 
 interface Editable {
   light: LightProgram;
@@ -265,7 +266,7 @@ export function TimingTools({
           <>
             <List size="sm" aria-label={t`What has been done`}>
               {result.notes.length > 0 ? (
-                result.notes.map((note) => <List.Item key={note}>{note}</List.Item>)
+                result.notes.map((note) => <List.Item key={note}>{served(note)}</List.Item>)
               ) : (
                 <List.Item>
                   <Trans>Done. Undo brings the times of before back.</Trans>
