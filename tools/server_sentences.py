@@ -145,7 +145,7 @@ def _all() -> list[str]:
         if name.startswith(SHOWN) and not name.startswith(HIDDEN):
             for form, template in templates_of(path.read_text(encoding="utf-8")):
                 known.setdefault(form, template)
-    for text in (*_validation_texts(), *Category):  # categories as they stand in sentences
+    for text in (*_validation_texts(), *Category, "figure"):  # single words that stand in sentences
         for form, template in templates_of_text(text):
             known.setdefault(form, template)
     return sorted(known.values())

@@ -26,6 +26,8 @@ const JOINT = /^[\s;,]+(?:- )?/;
 const BETWEEN = ["; ", ". ", ", ", " and "];
 /** Placeholders whose words are names that somebody gave, not words of the server. */
 const GIVEN = /^(id|names?|file|actor|segment|node|text|key|path|map_name)\d*$/;
+/** What is put in quotes, or a number: in a list of them there are no words. */
+const DATUM = /^'[^']*'$|^-?[\d.,]*\d$/;
 const NUMBER = /^-?(?:\d{1,3}(?:,\d{3})+|\d+)(?:\.\d+)?$/;
 /** No sentence of people is nested deeper. */
 const DEEPEST = 4;
@@ -120,8 +122,13 @@ function inParts(text: string, depth: number): string | null {
   for (const between of BETWEEN) {
     const parts = text.split(between);
     if (parts.length === 1) continue;
-    const known = parts.map((part) => whole(part, depth + 1) ?? numberOf(part));
-    if (known.every((part) => part !== null) && parts.some((part) => !NUMBER.test(part)))
+    const known = parts.map(
+      (part) => whole(part, depth + 1) ?? numberOf(part) ?? (DATUM.test(part) ? part : null),
+    );
+    if (
+      known.every((part) => part !== null) &&
+      (between === " and " || !parts.every((part) => DATUM.test(part)))
+    )
       return known.join(between === " and " ? t` and ` : between);
   }
   return null;

@@ -82,6 +82,11 @@ test.each([
     "'a' wants to go 70 m/s (252 km/h); plausible for a car are 1 to 55.6 m/s",
     "'a' soll 70 m/s (252 km/h) schnell sein; plausibel sind 1 bis 55,6 m/s (Pkw)",
   ],
+  // Quoted ids in a list.
+  [
+    "'a' and 'b' start on the same node 'n'; move all but one",
+    "'a' und 'b' starten auf demselben Knoten 'n'; alle bis auf einen verschieben",
+  ],
   // What pydantic says of a document.
   [
     "actors[0].speed: Input should be greater than 0, not -3.5",
