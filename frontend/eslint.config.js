@@ -2,7 +2,15 @@ import hooks from "eslint-plugin-react-hooks";
 import tseslint from "typescript-eslint";
 
 export default tseslint.config(
-  { ignores: ["node_modules", "dist", "src/api/schema.ts", "src/language/serverTexts.ts"] },
+  {
+    ignores: [
+      "node_modules",
+      "dist",
+      "src/api/schema.ts",
+      "src/language/serverSentences.ts",
+      "src/language/serverTexts.ts",
+    ],
+  },
   ...tseslint.configs.strict,
   {
     plugins: { "react-hooks": hooks },

@@ -1,8 +1,9 @@
 """The OpenAPI schema of the server as the page's types: ``frontend/src/api/schema.ts``.
 
-Beside it the texts of its closed lists, see :mod:`tools.server_texts`. Writes the files, or with
-``--check`` says whether they are what the server says of itself now, or with ``--json`` prints the
-schema. Needs neither a network nor a server that runs.
+Beside it the texts of its closed lists, see :mod:`tools.server_texts`, and its sentences, see
+:mod:`tools.server_sentences`. Writes the files, or with ``--check`` says whether they are what the
+server says of itself now, or with ``--json`` prints the schema. Needs neither a network nor a
+server that runs.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any
 
 from odscen.web.application import create_app
 from odscen.workspace.store import Workspace
-from tools import server_texts
+from tools import server_sentences, server_texts
 
 ROOT = Path(__file__).parents[1]
 TYPES = ROOT / "frontend/src/api/schema.ts"
@@ -96,10 +97,20 @@ def main() -> None:
         sys.stdout.write(schema_json())
     elif not wish.check:
         TYPES.write_text(schema_types(), encoding="utf-8")
-        server_texts.TARGET.write_text(server_texts.server_texts(), encoding="utf-8")
+        for target, text in _texts():
+            target.write_text(text, encoding="utf-8")
     else:
         _check(TYPES, schema_types())
-        _check(server_texts.TARGET, server_texts.server_texts())
+        for target, text in _texts():
+            _check(target, text)
+
+
+def _texts() -> tuple[tuple[Path, str], ...]:
+    """The modules of the page with what the server says, and where they lie."""
+    return (
+        (server_texts.TARGET, server_texts.server_texts()),
+        (server_sentences.TARGET, server_sentences.server_sentences()),
+    )
 
 
 def _check(file: Path, text: str) -> None:

@@ -8,6 +8,7 @@ import { useEffect } from "react";
 import { localized } from "../language/localized";
 import type { CarlaInfo } from "../api/carla";
 import { useCarla } from "./useCarla";
+import { served } from "../language/served";
 
 const WORD = localized((): Record<CarlaInfo["state"], string> => ({
   connected: "connected",
@@ -39,7 +40,7 @@ export function CarlaChoice({ chosen, onChoose }: { chosen: boolean; onChoose: (
       ) : (
         info && (
           <Text size="xs" c="dimmed">
-            {info.message}
+            {served(info.message)}
           </Text>
         )
       )}

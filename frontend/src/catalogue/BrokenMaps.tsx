@@ -3,6 +3,7 @@ import { Alert, Button, Group, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import type { BrokenMap } from "../api/removal";
+import { served } from "../language/served";
 
 /** Maps whose folders are damaged: what is wrong with each, and what can be done. */
 export function BrokenMaps({ list, onRemove }: { list: BrokenMap[]; onRemove: (name: string) => void }) {
@@ -16,7 +17,7 @@ export function BrokenMaps({ list, onRemove }: { list: BrokenMap[]; onRemove: (n
       {list.map(({ name, problem }) => (
         <Group key={name} justify="space-between" wrap="nowrap" mt={6}>
           <Text size="sm" style={{ overflowWrap: "anywhere" }}>
-            <b>{name}</b>: {problem}
+            <b>{name}</b>: {served(problem)}
           </Text>
           <Button
             size="compact-sm"

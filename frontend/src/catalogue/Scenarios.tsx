@@ -22,6 +22,7 @@ import { IconTrash } from "../ui/icons";
 import { tellError } from "../ui/notices";
 import { go, hashOf } from "../ui/address";
 import { when } from "../run/figures";
+import { served } from "../language/served";
 
 /** The scenarios there are; one can be opened from a file. */
 export function Scenarios({
@@ -108,7 +109,7 @@ export function Scenarios({
                   </Anchor>
                   {one.error && (
                     <Text size="xs" c="red">
-                      {one.error}
+                      {served(one.error)}
                     </Text>
                   )}
                 </Table.Td>

@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 import { localized } from "../language/localized";
 import type { ConversionReport, ElementOutcome } from "../api/types";
 import { sentence } from "../ui/words";
+import { served } from "../language/served";
 
 /** Entries with the same reason for several elements. */
 export interface Finding {
@@ -65,8 +66,8 @@ export function plainFinding(reason: string): string {
     const match = pattern.exec(reason);
     if (match) return text.replace("$1", match[1] ?? "");
   }
-  const words = reason.replace(/\bSUMO('s)?( network)?/g, "the simulation$1");
-  return sentence(words);
+  const said = served(reason);
+  return sentence(said === reason ? reason.replace(/\bSUMO('s)?( network)?/g, "the simulation$1") : said);
 }
 
 /** What became of a map, what matters most first; elements of which the same is said are together. */

@@ -2,6 +2,7 @@ import { t } from "@lingui/core/macro";
 
 import { localized } from "../language/localized";
 import { sentence } from "../ui/words";
+import { served } from "../language/served";
 
 /** What the server does with a map, in its words and in ours. */
 const STEPS = localized((): [said: string, words: string][] => [
@@ -17,6 +18,6 @@ export function stepWords(step: string): string {
   const known = STEPS().find(([key]) => key === said);
   const words = known
     ? t`step ${STEPS().indexOf(known) + 1} of ${STEPS().length}: ${known[1]}`
-    : said.replaceAll("SUMO", "simulation");
+    : served(said ?? "").replaceAll("SUMO", "simulation");
   return name ? `${name}, ${words}` : sentence(words);
 }

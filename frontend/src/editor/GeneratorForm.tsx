@@ -9,6 +9,7 @@ import {
   type OptionValue,
 } from "../api/generators";
 import { useLoaded } from "../ui/useLoaded";
+import { served } from "../language/served";
 
 const AT_RANDOM = "";
 
@@ -52,7 +53,7 @@ function Options({
   if (generator.error)
     return (
       <Alert color="red" title={t`This generator cannot be used`}>
-        {generator.error}
+        {served(generator.error)}
       </Alert>
     );
   const change = (name: string, value: OptionValue | null): void => {
@@ -66,7 +67,7 @@ function Options({
     <>
       {generator.summary && (
         <Text size="sm" c="dimmed">
-          {generator.summary}
+          {served(generator.summary)}
         </Text>
       )}
       {generator.options.map((option) => (

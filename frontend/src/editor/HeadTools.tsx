@@ -14,6 +14,7 @@ import { go } from "../ui/address";
 import { ExportMenu } from "./ExportMenu";
 import { NameDialog, OpenDialog } from "./fileDialogs";
 import type { EditorStore } from "./store";
+import { served } from "../language/served";
 
 const SAVED = localized(
   () => ({ saved: t`All changes saved`, saving: t`Saving …`, failed: t`Not saved` }) as const,
@@ -48,8 +49,20 @@ export const HeadTools = memo(function HeadTools({
   if (!slot || !scenario) return null;
   const close = (): void => setDialog(null);
   const tools = [
-    { word: t`Undo`, keys: t`Ctrl+Z`, label: scenario.undo, act: undo, icon: <IconUndo /> },
-    { word: t`Redo`, keys: t`Ctrl+Y`, label: scenario.redo, act: redo, icon: <IconRedo /> },
+    {
+      word: t`Undo`,
+      keys: t`Ctrl+Z`,
+      label: scenario.undo && served(scenario.undo),
+      act: undo,
+      icon: <IconUndo />,
+    },
+    {
+      word: t`Redo`,
+      keys: t`Ctrl+Y`,
+      label: scenario.redo && served(scenario.redo),
+      act: redo,
+      icon: <IconRedo />,
+    },
   ];
   const upload = (chosen: File | undefined): void => {
     if (!chosen) return;

@@ -12,6 +12,7 @@ import { reasonOf } from "../ui/reason";
 import { exampleTable } from "./demand";
 import type { EditorStore } from "./store";
 import { sentence } from "../ui/words";
+import { served } from "../language/served";
 
 const KINDS = localized((): Record<TableKind, { label: string; stem: string | null; text: string }> => ({
   od: {
@@ -157,5 +158,5 @@ export function TableForm({
 /** All reasons for a refusal; each begins with a capital letter. */
 function problemsOf(error: unknown): string[] {
   const reported = error instanceof ApiError ? error.body.problems : [];
-  return (reported.length > 0 ? reported : [reasonOf(error)]).map(sentence);
+  return (reported.length > 0 ? reported.map(served) : [reasonOf(error)]).map(sentence);
 }

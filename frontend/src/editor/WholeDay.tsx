@@ -13,6 +13,7 @@ import { tell } from "../ui/notices";
 import { reasonOf } from "../ui/reason";
 import { sentence } from "../ui/words";
 import type { EditorStore } from "./store";
+import { served } from "../language/served";
 
 const DAYS = localized(() => ({ weekday: t`Weekday`, weekend: t`Weekend` }));
 
@@ -42,7 +43,7 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
           t`${plural(Math.round(made.trips), { one: "# trip", other: "# trips" })}, ${peak} in the peak hour.`,
           t`The busiest approach of a junction then reaches ${load} % of its capacity.`,
           ...(made.trips < trips ? [t`More trips would have exceeded the capacity of the junctions.`] : []),
-          ...(made.found === null ? [] : [`${made.found}.`]),
+          ...(made.found === null ? [] : [`${served(made.found)}.`]),
         ].join(" "),
       );
       return api.scenario(name);
@@ -97,7 +98,7 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
       {busy && (
         <Group justify="space-between" wrap="nowrap" gap="xs">
           <Text size="sm" c="dimmed" role="status">
-            {sentence(busy.step)}
+            {sentence(served(busy.step))}
           </Text>
           <Button
             size="compact-sm"

@@ -9,7 +9,7 @@ import { sentence } from "../ui/words";
 export const OPERATORS = localized((): [op: string, words: string][] => [
   [">=", t`at least`],
   ["<=", t`at most`],
-  ["==", "exactly"],
+  ["==", t`exactly`],
   [">", t`more than`],
   ["<", t`less than`],
 ]);

@@ -5,6 +5,7 @@ import { localized } from "../language/localized";
 import type { Problem } from "../api/types";
 import type { Graph } from "../map/graph";
 import { placeWord } from "./placeWords";
+import { served } from "../language/served";
 
 /** From so many of one kind on they are one line, which opens. */
 const MANY = 4;
@@ -55,4 +56,4 @@ const TITLE = localized((): Record<string, string> => ({
 
 /** The message with its nodes as places: `Road 4, right lane 1, 12 m` in place of an id. */
 export const inWords = ({ message, nodes }: Problem, graph: Graph): string =>
-  nodes.reduce((text, id) => text.replaceAll(`'${id}'`, placeWord(graph, id)), message);
+  nodes.reduce((text, id) => text.replaceAll(`'${id}'`, placeWord(graph, id)), served(message));

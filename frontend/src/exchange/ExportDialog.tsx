@@ -13,6 +13,7 @@ import { IconDown } from "../ui/icons";
 import { useLoaded } from "../ui/useLoaded";
 import { sentence } from "../ui/words";
 import { type Format, FORMATS, VERSIONS } from "./formats";
+import { served } from "../language/served";
 
 /** Notes that are shown at once. */
 const SHOWN = 200;
@@ -54,7 +55,7 @@ function Body({ name, format, version }: { name: string; format: Format; version
   const load = useCallback(
     () =>
       exchange.notes(name, format, version).catch((error: unknown) => {
-        if (error instanceof ApiError) setProblems(error.body.problems ?? []);
+        if (error instanceof ApiError) setProblems((error.body.problems ?? []).map(served));
         throw error;
       }),
     [name, format, version],
@@ -130,7 +131,7 @@ function List({ title, notes }: { title: string; notes: readonly ExportNote[] })
       <ul className="import-reasons" style={{ maxHeight: 260, overflow: "auto" }} tabIndex={0}>
         {[...reasons].slice(0, SHOWN).map(([reason, places]) => (
           <li key={reason}>
-            <Text size="sm">{sentence(reason)}</Text>
+            <Text size="sm">{sentence(served(reason))}</Text>
             <Text size="xs" c="dimmed">
               {places.slice(0, 12).join(", ")}
               {places.length > 12 && t` and ${places.length - 12} more`}

@@ -5,6 +5,7 @@ import type { ImportReport, ImportRow } from "../api/exchange";
 import type { Bounds } from "../api/types";
 import type { ScenePin } from "../map/scene";
 import { sentence } from "../ui/words";
+import { served } from "../language/served";
 
 /** What may have become of an element, what matters most first. */
 export const VERDICTS = ["refused", "approximated", "ignored", "taken"] as const;
@@ -58,7 +59,7 @@ export function plainReason(reason: string): string {
   if (!reason) return "";
   for (const [pattern, text] of PLAIN()) if (pattern.test(reason)) return text;
   const words = reason.replace(/^left out: /, "").replace(PATH, "$1 in line $2");
-  return sentence(words);
+  return sentence(served(words));
 }
 
 /** Rows of one list by their reason, the commonest first; what lies in another row of it is counted there. */

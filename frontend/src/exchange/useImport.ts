@@ -6,6 +6,7 @@ import { exchange } from "../api/exchange";
 import { go } from "../ui/address";
 import { reasonOf } from "../ui/reason";
 import { sentence } from "../ui/words";
+import { served } from "../language/served";
 
 /** An import that is running, or that was refused; its files can be sent again with others. */
 export interface ImportState {
@@ -33,7 +34,9 @@ export function useImport(): Import {
     busy.current = true;
     setState({ files, step: t`Sending the files`, job: null, refusal: null });
     exchange
-      .bring(files, ({ id, step }) => setState({ files, step: sentence(step), job: id, refusal: null }))
+      .bring(files, ({ id, step }) =>
+        setState({ files, step: sentence(served(step)), job: id, refusal: null }),
+      )
       .then(
         (name) => {
           setState(null);

@@ -2,11 +2,18 @@ import { i18n, type Messages } from "@lingui/core";
 import { compileMessage } from "@lingui/message-utils/compileMessage";
 
 import { type Language, LANGUAGES, usePreferences } from "./preferences";
+import { serveSentences } from "./served";
 
 /** The catalogues, each loaded when its language is first chosen; English texts come with the code. */
 const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
   en: () => Promise.resolve({ messages: {} }),
   de: () => import("../locales/de.po"),
+};
+
+/** Those of the sentences of the server, which are loaded after the page; as it sends them, they are English. */
+const SENTENCES: Record<Language, (() => Promise<{ messages: Messages }>) | null> = {
+  en: null,
+  de: () => import("../locales/server/de.po"),
 };
 
 /** Compiled as they are first shown; the catalogue of English would be more than a tenth of the first load. */
@@ -23,8 +30,21 @@ async function speak(language: Language): Promise<void> {
   const { messages } = await CATALOGUES[language]();
   // Another may have been chosen meanwhile.
   if (usePreferences.getState().language !== language) return;
+  serveSentences(null);
   i18n.loadAndActivate({ locale: language, messages });
   document.documentElement.lang = language;
+  // Where it cannot be had, sentences stay as the server says them.
+  speakForServer(language).catch(() => undefined);
+}
+
+/** Has what the server says in a language, too. */
+async function speakForServer(language: Language): Promise<void> {
+  const load = SENTENCES[language];
+  if (!load) return;
+  const [{ messages }, { translated }] = await Promise.all([load(), import("./sentences")]);
+  if (usePreferences.getState().language !== language) return;
+  serveSentences(translated);
+  i18n.load(language, messages);
 }
 
 /** Loads the language of this reader, and follows their choice from then on. */

@@ -2,8 +2,16 @@ import { i18n } from "@lingui/core";
 
 import { SERVER_TEXTS } from "./serverTexts";
 
-/** A text of the server in the language of the reader; one that no list has stays as it is. */
+/** What finds sentences of the server and their place in the catalogue; none where the reader reads English. */
+let sentences: ((text: string) => string) | null = null;
+
+/** Sets, or with null takes away, what {@link served} asks for a text that no list has. */
+export const serveSentences = (translated: ((text: string) => string) | null): void => {
+  sentences = translated;
+};
+
+/** A text of the server in the language of the reader; one that is not known stays as it is. */
 export function served(text: string): string {
   const known = SERVER_TEXTS[text];
-  return known ? i18n._(known) : text;
+  return known ? i18n._(known) : (sentences?.(text) ?? text);
 }

@@ -10,6 +10,7 @@ import { useLoaded } from "../ui/useLoaded";
 import { span } from "../ui/words";
 import { worstFirst } from "./fit";
 import { Scatter } from "./Scatter";
+import { served } from "../language/served";
 
 /** Rows of the list; all of them are in the tables that can be downloaded. */
 const LISTED = 200;
@@ -61,7 +62,7 @@ export function CountsFit({
         <Alert color="gray" title={t`Counts that contradict each other`} mb="md">
           <List size="sm">
             {contradictions.slice(0, 20).map((text) => (
-              <List.Item key={text}>{text}</List.Item>
+              <List.Item key={text}>{served(text)}</List.Item>
             ))}
           </List>
         </Alert>
@@ -140,7 +141,7 @@ function Row({ row, onShow }: { row: FitRow; onShow: (x: number, y: number) => v
       {why && (
         <Table.Tr>
           <Table.Td colSpan={4} c="dimmed" pt={0}>
-            {why}
+            {served(why)}
           </Table.Td>
         </Table.Tr>
       )}

@@ -8,6 +8,7 @@ import { fixed } from "../language/numbers";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
 import { hoursMinutes, span } from "../ui/words";
+import { served } from "../language/served";
 
 /** A long run that was interrupted: how much is saved, and resuming it. */
 export function Interrupted({
@@ -60,7 +61,7 @@ export function Interrupted({
           <summary>
             <Trans>Why it was interrupted</Trans>
           </summary>
-          <pre tabIndex={0}>{words}</pre>
+          <pre tabIndex={0}>{served(words)}</pre>
         </details>
       )}
     </section>

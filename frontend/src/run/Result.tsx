@@ -124,7 +124,7 @@ function Reservations({ verdict }: { verdict: Verdict }) {
     >
       <ul className="verdict-reasons">
         {verdict.reasons.map(({ kind, words }) => (
-          <li key={kind}>{words}</li>
+          <li key={kind}>{served(words)}</li>
         ))}
       </ul>
     </Alert>
@@ -150,7 +150,7 @@ function Failure({ info }: { info: RunInfo }) {
           <Trans>Messages of the simulator</Trans>
         </summary>
         {words ? (
-          <pre tabIndex={0}>{words}</pre>
+          <pre tabIndex={0}>{served(words)}</pre>
         ) : (
           <Text size="sm">
             <Trans>There are none.</Trans>

@@ -2,6 +2,7 @@ import { Loader } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
 import type { RunInfo } from "../api/runs";
+import { served } from "../language/served";
 
 /** What is said on the map of a run: how its preparation goes, or who is followed. */
 export function RunHint({
@@ -36,7 +37,7 @@ export function RunHint({
           <Loader size={16} aria-hidden="true" />
           {planned
             ? t`Preparing, step 2 of 2: starting the simulation …`
-            : t`Preparing, step 1 of 2: planning the routes … ${info.preparing ?? ""}`}
+            : t`Preparing, step 1 of 2: planning the routes … ${served(info.preparing ?? "")}`}
         </span>
       </div>
     );

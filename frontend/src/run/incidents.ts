@@ -6,6 +6,7 @@ import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import type { Mark, MarkKind } from "../map/scene";
 import { CATEGORY_WORD, hoursMinutes } from "../ui/words";
+import { served } from "../language/served";
 
 /** Simulated seconds for which something counts as having just happened. */
 const FRESH = 4;
@@ -45,7 +46,7 @@ export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ??
 export function sentence(incident: Incident, categories: ReadonlyMap<string, Category>): string {
   const who = named(incident.actor, categories);
   const rule = incident.rule ?? "";
-  const detail = incident.detail ?? "";
+  const detail = served(incident.detail ?? "");
   switch (incident.kind) {
     case "collision":
       return incident.partner

@@ -26,6 +26,7 @@ import type { Edit } from "../api/types";
 import { Committed } from "../editor/Committed";
 import { useAsked } from "../ui/useAsked";
 import type { SignalEditing, TimingResult } from "./editing";
+import { served } from "../language/served";
 
 interface Editable {
   light: LightProgram;
@@ -275,7 +276,7 @@ export function TimingTools({
           <>
             <List size="sm" aria-label={t`What has been done`}>
               {result.notes.length > 0 ? (
-                result.notes.map((note) => <List.Item key={note}>{note}</List.Item>)
+                result.notes.map((note) => <List.Item key={note}>{served(note)}</List.Item>)
               ) : (
                 <List.Item>
                   <Trans>Done. Undo brings the times of before back.</Trans>

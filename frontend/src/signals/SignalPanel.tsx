@@ -18,6 +18,7 @@ import { ProgramControl, StageBounds, StageCall, TimingTools, TurnChoices } from
 import type { Queue } from "./queues";
 import { QueueTable } from "./QueueTable";
 import { RingBar } from "./RingBar";
+import { served } from "../language/served";
 
 const ORIGIN = localized((): Record<LightProgram["origin"], string> => ({
   scenario: t`the engineer’s, in this scenario`,
@@ -164,7 +165,7 @@ function Program({ light, junction, junctions, now, occupied, queues, editing }:
         {plan.stages.map((stage, row) => (
           <li key={stage.begin} aria-current={cursor?.stage === row ? "step" : undefined}>
             {stage.picture && <Drawn svg={stage.picture} />}
-            <b>{stage.words}</b>
+            <b>{served(stage.words)}</b>
             <span>
               {stage.groups.join(" ")}
               {stage.on_call && t`, on call`}
@@ -197,7 +198,7 @@ function Program({ light, junction, junctions, now, occupied, queues, editing }:
         {light.legend.map(({ picture, words }) => (
           <li key={words}>
             <Drawn svg={picture} />
-            {words}
+            {served(words)}
           </li>
         ))}
       </ul>

@@ -146,7 +146,7 @@ function Problems({ info, onChanged }: { info: StudyInfo; onChanged: () => void 
       <ul className="study-problems" aria-label={t`Why runs failed`}>
         {info.problems.map(({ words, runs }) => (
           <li key={words}>
-            {plural(runs, { one: "# run", other: "# runs" })}: {words}
+            {plural(runs, { one: "# run", other: "# runs" })}: {served(words)}
           </li>
         ))}
       </ul>

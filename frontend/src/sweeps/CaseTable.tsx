@@ -7,6 +7,7 @@ import { useMemo, useState } from "react";
 import type { SweepCase, SweepCases } from "../api/sweeps";
 import { shortNumber } from "../editor/parameters";
 import { type Column, sorted, VERDICT_WORD, verdictOf } from "./plan";
+import { served } from "../language/served";
 
 /** Rows at first; a browser is slow with thousands. */
 const MOST = 200;
@@ -100,7 +101,7 @@ function Row({
         </span>
         {one.detail && (
           <Text size="xs" c="dimmed">
-            {one.detail}
+            {served(one.detail)}
           </Text>
         )}
       </Table.Td>

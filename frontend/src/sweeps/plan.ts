@@ -5,6 +5,7 @@ import { localized } from "../language/localized";
 import type { SweepCase, SweepCases, SweepWish, VaryWish } from "../api/sweeps";
 import type { ScenarioDocument } from "../api/types";
 import { shortNumber } from "../editor/parameters";
+import { served } from "../language/served";
 
 type Method = SweepWish["method"] & string;
 
@@ -236,6 +237,8 @@ export function titleOf(one: SweepCase, { parameters }: SweepCases, verdict: Ver
     `${name} ${shortNumber(one.values[n] ?? 0)} ${unit}`.trim(),
   );
   const word =
-    verdict === "other" ? [one.status, one.detail].filter(Boolean).join(": ") : VERDICT_WORD()[verdict];
+    verdict === "other"
+      ? [one.status, served(one.detail ?? "")].filter(Boolean).join(": ")
+      : VERDICT_WORD()[verdict];
   return `${one.case}: ${values.join(", ")}: ${word}`;
 }

@@ -1,2 +1,5 @@
-/** Why something failed, in words. */
-export const reasonOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
+import { served } from "../language/served";
+
+/** Why something failed, in the words of the reader. */
+export const reasonOf = (error: unknown): string =>
+  error instanceof Error ? served(error.message) : String(error);

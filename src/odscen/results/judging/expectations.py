@@ -180,8 +180,9 @@ def parse_expectation(text: str, *, own: Mapping[str, Figure] | None = None) -> 
         figure, names = actor_measure(name), ACTOR_NAMES
     counts = isinstance(figure, RunFigure) and figure.count
     if figure is None:
-        msg = f"expectation {text!r}: no {_KIND[names is NAMES]} is named {name!r}; "
-        raise InputError(msg + _hint(name, names))
+        kind, hint = _KIND[names is NAMES], _hint(name, names)
+        msg = f"expectation {text!r}: no {kind} is named {name!r}; {hint}"
+        raise InputError(msg)
     if percent and not counts:
         msg = f"expectation {text!r}: {name} is no count of actors, so it has no percentage"
         raise InputError(msg)
