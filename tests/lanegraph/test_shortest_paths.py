@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import csgraph
 
 from odscen.base.errors import InputError
+from odscen.lanegraph import shortest_paths
+from odscen.lanegraph.chained_distances import ChainedDistances
+from odscen.lanegraph.edge_matrix import shortest_edges
 from odscen.lanegraph.graph_files import to_networkx
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import induced, node_id, node_ids, node_index, walk_node_id
-from odscen.lanegraph.shortest_paths import (
-    Router,
-    WalkRouter,
+from odscen.lanegraph.shortest_paths import Router, WalkRouter
+from odscen.lanegraph.single_paths import (
     goal_candidates,
     reachable,
     shortest_path,
@@ -160,6 +163,43 @@ def test_a_candidate_is_what_the_list_of_candidates_holds(kind: type, graph: Map
         assert router.has_goals(spawn) == bool(candidates)
         reached = set(np.flatnonzero(router.reachable(spawn)).tolist()) - {spawn}
         assert {goal for goal in reached if router.is_candidate(spawn, goal)} == candidates
+
+
+@pytest.mark.parametrize("kind", [Router, WalkRouter])
+@pytest.mark.parametrize("graph", [FORK, ring(), two_lane_road(), line_of_segments(4)])
+def test_candidates_of_many_are_those_of_each(
+    kind: type, graph: MapGraph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shortest_paths, "_MANY", 0)
+    router = kind(graph)
+    spawns = range(0, len(router.mask), 7)
+    found = [goals.tolist() for goals in router.each_candidates(spawns)]
+    assert found == [router.goal_candidates(spawn).tolist() for spawn in spawns]
+    assert any(found) or not spawns  # not every toy map has walks
+
+
+def test_of_many_one_outside_the_region_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shortest_paths, "_MANY", 0)
+    router = Router(FORK, induced(FORK, ["r2"]).nodes)
+    with pytest.raises(InputError, match=r"node 1\.0\.-1\.0 is outside the region"):
+        list(router.each_candidates([0]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(2, 40), st.integers(0, 1000), st.sampled_from([0.3, 1.0, 3.0]))
+def test_distances_along_chains_are_those_over_all_nodes(
+    count: int, seed: int, density: float
+) -> None:
+    """On any graph: with loops, parallel edges, rings that no hub leads to, and dead ends."""
+    rng = np.random.default_rng(seed)
+    ring_of = np.arange(count // 2)
+    rows = np.r_[ring_of, rng.integers(0, count, int(count * density))]
+    columns = np.r_[np.roll(ring_of, 1), rng.integers(0, count, int(count * density))]
+    matrix = shortest_edges(count, rows, columns, rng.uniform(0.0, 9.0, len(rows)))
+    chained = ChainedDistances(matrix)
+    for source in range(count):
+        distances = csgraph.dijkstra(matrix, indices=source)
+        assert chained.of(source) == pytest.approx(distances, rel=chained.rounding)
 
 
 def test_paths_to_a_node_are_as_long_as_those_from_each_source() -> None:

@@ -1,7 +1,7 @@
 """Reachability, goal candidates and shortest paths, on the lane graph and on the pedestrian graph.
 
-All paths are shortest by length. A router is made once for a region and answers many queries; the
-functions below make one for a single query.
+All paths are shortest by length. A router is made once for a region and answers many queries;
+:mod:`odscen.lanegraph.single_paths` makes one for a single query.
 """
 
 from __future__ import annotations
@@ -16,24 +16,27 @@ from odscen.base.late_modules import function_when_used, import_when_used
 
 import_when_used("numpy.ctypeslib", "numpy.f2py", "numpy.ma", "numpy.polynomial", "numpy.testing")
 function_when_used("scipy.sparse.csgraph._laplacian", "laplacian")
-from scipy import sparse  # noqa: E402 - which names these
-from scipy.sparse import csgraph  # noqa: E402
+from scipy.sparse import csgraph  # noqa: E402 - which names these
 
 from odscen.base.errors import InputError  # noqa: E402
+from odscen.lanegraph.chained_distances import ChainedDistances  # noqa: E402
+from odscen.lanegraph.edge_matrix import shortest_edges  # noqa: E402
 from odscen.lanegraph.kept_trees import KEPT_TREES, ROUTERS, Tree  # noqa: E402
 from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo  # noqa: E402
 from odscen.lanegraph.query import node_id, walk_node_id  # noqa: E402
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from scipy import sparse
+
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.lanegraph.graphs import MapGraph
 
-MIN_EDGE_LENGTH = 1e-6
-"""Metres; scipy's sparse graphs drop edges of weight zero."""
-
-
 _FEW = 64
 """Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
+_MANY = 1 << 20
+"""Nodes, times sources, from which chains are worth their making."""
 
 
 class _PathFinder:
@@ -64,7 +67,7 @@ class _PathFinder:
         rows, columns = self._local[source[inside]], self._local[target[inside]]
         self._directed = directed
         self._lane = lane[self.nodes]
-        self._matrix = _shortest_edges(len(self.nodes), rows, columns, length[inside])
+        self._matrix = shortest_edges(len(self.nodes), rows, columns, length[inside])
         self.out_degree = np.bincount(rows, minlength=len(self.nodes))
         if not directed:
             self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
@@ -187,14 +190,30 @@ class _PathFinder:
         InputError
             If ``spawn`` is outside the region.
         """
-        distances = self._from(spawn).distances
+        distances = self._from(spawn).distances  # refuses a spawn outside
         if not self.has_goals(spawn):
             return np.empty(0, dtype=np.int32)
         if not self._reaches_end(spawn):
-            return self._farthest_per_lane(spawn, distances)
+            return self._one_per_lane(self._farthest(spawn, distances))
         ends = np.isfinite(distances) & self._is_end
         ends[self._local[spawn]] = False
         return self.nodes[ends].astype(np.int32)
+
+    def each_candidates(self, spawns: Sequence[int]) -> Iterator[Int32Array]:
+        """Yield the goal candidates of many spawns in turn; the same, sooner on a large map."""
+        if not self._directed or len(spawns) * len(self.nodes) < _MANY:
+            yield from map(self.goal_candidates, spawns)
+            return
+        chained = ChainedDistances(self._matrix)
+        for spawn in spawns:
+            if not self._holds(spawn) or not self.has_goals(spawn) or self._reaches_end(spawn):
+                yield self.goal_candidates(spawn)
+                continue
+            distances = chained.of(int(self._local[spawn]))
+            rounding = chained.rounding * float(distances[np.isfinite(distances)].max())
+            rows = self._farthest(spawn, distances, within=rounding)
+            sure = len(np.unique(self._lane[rows])) == len(rows)
+            yield self._one_per_lane(rows) if sure else self.goal_candidates(spawn)
 
     def is_candidate(self, spawn: int, goal: int) -> bool:
         """Whether ``goal``, which can be reached, is among the candidates of ``spawn``."""
@@ -256,7 +275,7 @@ class _PathFinder:
         return bool(self._ends_ahead[row] > int(self._is_end[row]))
 
     def _from(self, source: int) -> Tree:
-        if not 0 <= source < len(self.mask) or not self.mask[source]:
+        if not self._holds(source):
             msg = f"{self._name(source)} is outside the region of interest"
             raise InputError(msg)
         tree = KEPT_TREES.get(self._number, source)
@@ -271,19 +290,35 @@ class _PathFinder:
             KEPT_TREES.add(self._number, source, tree)
         return tree
 
+    def _holds(self, node: int) -> bool:
+        return 0 <= node < len(self.mask) and bool(self.mask[node])
+
     def _name(self, node: int) -> str:
         return f"node {node}"
 
-    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> Int32Array:
-        """Return the farthest reachable node of each lane, the first where several are."""
+    def _farthest(self, spawn: int, distances: FloatArray, *, within: float = 0.0) -> Int32Array:
+        """Rows of the farthest reachable node of each lane, and of those at most that much less."""
         away = np.where(np.isfinite(distances), distances, -1.0)
         away[self._local[spawn]] = -1.0
-        lane_starts = np.flatnonzero(np.r_[True, self._lane[1:] != self._lane[:-1]])
-        farthest = np.maximum.reduceat(away, lane_starts)
-        sizes = np.diff(np.r_[lane_starts, len(away)])
-        hits = np.flatnonzero((away == np.repeat(farthest, sizes)) & (away >= 0))
-        _, first = np.unique(self._lane[hits], return_index=True)
-        return np.sort(self.nodes[hits[first]]).astype(np.int32)
+        farthest = np.maximum.reduceat(away, self._lane_starts)
+        least = np.repeat(farthest, self._lane_sizes) - within
+        return np.flatnonzero((away >= least) & (away >= 0)).astype(np.int32)
+
+    def _one_per_lane(self, rows: Int32Array) -> Int32Array:
+        """Return the first node of each lane among these, ascending."""
+        _, first = np.unique(self._lane[rows], return_index=True)
+        nodes: Int32Array = np.sort(self.nodes[rows[first]]).astype(np.int32)
+        return nodes
+
+    @cached_property
+    def _lane_starts(self) -> Int32Array:
+        """Where the nodes of each lane begin."""
+        starts: Int32Array = np.flatnonzero(np.diff(self._lane, prepend=-1)).astype(np.int32)
+        return starts
+
+    @cached_property
+    def _lane_sizes(self) -> Int32Array:
+        return np.diff(self._lane_starts, append=len(self._lane)).astype(np.int32)
 
 
 class Router(_PathFinder):
@@ -324,11 +359,11 @@ class Router(_PathFinder):
         """Whether no edge leaves ``node`` inside the region."""
         return bool(self._is_end[self._local[node]])
 
-    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> Int32Array:
+    def _one_per_lane(self, rows: Int32Array) -> Int32Array:
         """Leave lanes inside junctions out if others remain."""
-        farthest = super()._farthest_per_lane(spawn, distances)
-        on_roads = farthest[~self._in_junction[farthest]]
-        return on_roads if len(on_roads) else farthest
+        nodes = super()._one_per_lane(rows)
+        on_roads = nodes[~self._in_junction[nodes]]
+        return on_roads if len(on_roads) else nodes
 
     def _name(self, node: int) -> str:
         inside_map = 0 <= node < len(self.mask)
@@ -358,50 +393,3 @@ class WalkRouter(_PathFinder):
     def _name(self, node: int) -> str:
         inside_map = 0 <= node < len(self.mask)
         return f"node {walk_node_id(self._graph, node) if inside_map else node}"
-
-
-def goal_candidates(graph: MapGraph, roi_mask: BoolArray | None, spawn: int) -> Int32Array:
-    """Goal candidates of a vehicle; see :meth:`Router.goal_candidates`."""
-    return Router(graph, roi_mask).goal_candidates(spawn)
-
-
-def walk_goal_candidates(graph: MapGraph, roi_mask: BoolArray | None, spawn: int) -> Int32Array:
-    """Goal candidates of a walker; see :meth:`WalkRouter.goal_candidates`."""
-    return WalkRouter(graph, roi_mask).goal_candidates(spawn)
-
-
-def shortest_path(
-    graph: MapGraph, source: int, target: int, mask: BoolArray | None = None
-) -> Int32Array:
-    """Lane-graph nodes of the shortest path, both ends included; empty if there is none."""
-    return Router(graph, mask).path(source, target)
-
-
-def walk_shortest_path(
-    graph: MapGraph, source: int, target: int, mask: BoolArray | None = None
-) -> Int32Array:
-    """Pedestrian nodes of the shortest path, both ends included; empty if there is none."""
-    return WalkRouter(graph, mask).path(source, target)
-
-
-def reachable(graph: MapGraph, source: int, mask: BoolArray | None = None) -> BoolArray:
-    """Lane-graph nodes that can be reached from ``source``, itself included; shape ``(N,)``."""
-    return Router(graph, mask).reachable(source)
-
-
-def walk_reachable(graph: MapGraph, source: int, mask: BoolArray | None = None) -> BoolArray:
-    """Pedestrian nodes that can be reached from ``source``, itself included; shape ``(P,)``."""
-    return WalkRouter(graph, mask).reachable(source)
-
-
-def _shortest_edges(
-    count: int, rows: Int32Array, columns: Int32Array, length: FloatArray
-) -> sparse.csr_matrix[np.float64]:
-    """CSR matrix with the shortest of parallel edges (scipy would add them up)."""
-    weight = np.maximum(length, MIN_EDGE_LENGTH)
-    order = np.lexsort((weight, columns, rows))
-    rows, columns, weight = rows[order], columns[order], weight[order]
-    first = np.ones(len(rows), dtype=np.bool_)
-    first[1:] = (rows[1:] != rows[:-1]) | (columns[1:] != columns[:-1])
-    shape = (count, count)
-    return sparse.csr_matrix((weight[first], (rows[first], columns[first])), shape=shape)

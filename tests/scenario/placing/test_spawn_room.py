@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from odscen.base.categories import DEFAULT_BODY, Body, Category
+from odscen.lanegraph.single_paths import reachable
 from odscen.scenario.placing.bodies import Box, Crowd, box_at, overlap
-from odscen.scenario.placing.spawn_room import distance_to_end, max_fit, standing_room
+from odscen.scenario.placing.spawn_room import Reach, distance_to_end, max_fit, standing_room
 from tests.graphs import fork, ring, two_lane_road
 
 CAR = {Category.CAR: Body(5.0, 1.8, 1.5)}
@@ -137,3 +138,12 @@ def test_the_path_to_the_nearest_end_follows_the_lanes() -> None:
     # From the first node of road 1 to the last of road 3: 99 m, the quarter circle, 59 m.
     assert to_end[0] == pytest.approx(99 + 12 * radians(90) + 59, abs=0.2)
     assert np.isinf(to_end[50])
+
+
+@pytest.mark.parametrize("graph", [fork(), ring(), two_lane_road()])
+def test_what_is_reached_is_told_for_each_node_and_inside_the_mask_only(graph) -> None:
+    mask = np.arange(len(graph.lanes.x)) % 50 != 49
+    reach = Reach(graph.lanes, mask)
+    for node in range(0, len(mask), 3):
+        within = reachable(graph, node, mask) if mask[node] else np.zeros(len(mask), np.bool_)
+        assert reach.of(node).tolist() == within.tolist()

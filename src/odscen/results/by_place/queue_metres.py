@@ -15,11 +15,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from odscen.results.by_place.lane_positions import NEEDED, positions
 
 if TYPE_CHECKING:
     import polars as pl
 
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.results.by_place.facilities import NetFacts
     from odscen.results.by_place.lane_groups import LaneGroups
 
@@ -156,26 +159,61 @@ def _joined(rows: pl.DataFrame, *, period: float) -> pl.DataFrame:
 
     col = pl.col
     spell = (
-        (col("time").diff() > 1.5 * period)
-        | (col("lane_group") != col("lane_group").shift(1))
-    ).fill_null(value=True).cum_sum().over("id")  # fmt: skip
+        (col("id") != col("id").shift(1)).fill_null(value=True)
+        | (
+            (col("time").diff() > 1.5 * period)
+            | (col("lane_group") != col("lane_group").shift(1))
+        ).fill_null(value=True)
+    ).cum_sum()  # fmt: skip
     at = ("lane_group", "time")
     # Ordered from the line backwards, one that is more than the gap behind begins another cluster.
     behind = col("front") - col("rear").cum_max().shift(1).over(*at)
+    other = col("lane_group").ne_missing(col("lane_group").shift(1))
+    cluster = (
+        other | col("time").ne_missing(col("time").shift(1)) | (behind > GAP).fill_null(value=False)
+    ).cum_sum()
     ordered = (
-        rows.with_columns(spell=spell)
+        rows.sort("id", "time")
+        .with_columns(spell=spell)
+        .with_row_index("row")
         .sort("lane_group", "time", "front", "id")
-        .with_columns(cluster=(behind > GAP).fill_null(value=False).cum_sum().over(*at))
+        .with_columns(cluster=cluster)
     )
-    cluster = (*at, "cluster")
-    found = ordered.with_columns(queued=(col("front").min() <= GAP).over(*cluster))
+    if not ordered.height:
+        return ordered
+    return ordered.filter(_queued(*(ordered[name].to_numpy() for name in _SORTED)))
+
+
+_SORTED = ("row", "spell", "cluster", "front")
+
+
+def _queued(row: IntArray, spell: IntArray, cluster: IntArray, front: FloatArray) -> BoolArray:
+    """Who is in a queue; the vehicles of a moment are reached by it again and again.
+
+    Parameters
+    ----------
+    row
+        Place of each in the order of vehicles and times.
+    spell, cluster
+        Numbers of the stretch of time in which it is slow, and of the cluster that it is in, which
+        are in the order of what is given.
+    front
+        Metres from the stop line.
+    """
+    first = np.flatnonzero(np.diff(cluster, prepend=cluster[0] - 1))
+    queued = np.repeat(np.fmin.reduceat(front, first) <= GAP, np.diff(first, append=len(front)))
+    by_time = np.argsort(row)
+    place = np.arange(len(row))
+    spells = spell[by_time]
+    begin = np.maximum.accumulate(np.where(np.diff(spells, prepend=-1), place, 0))
     for _ in range(_PASSES):
-        found = (
-            found.sort("id", "time")
-            .with_columns(queued=col("queued").cum_max().over("id", "spell"))
-            .with_columns(queued=col("queued").any().over(*cluster))
-        )
-    return found.filter("queued")
+        # Whoever has joined stays: the last that was queued lies in the same spell.
+        last = np.maximum.accumulate(np.where(queued[by_time], place, -1))
+        queued[by_time] = last >= begin
+        reached = np.zeros(int(cluster[-1]) + 1, dtype=np.bool_)
+        reached[cluster[queued]] = True
+        queued = reached[cluster]
+    return queued
 
 
 def queue_sums(

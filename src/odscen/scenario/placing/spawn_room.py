@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.lanegraph.edge_matrix import MIN_EDGE_LENGTH
 from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, LaneGraph, PedestrianGraph, Relation
-from odscen.lanegraph.shortest_paths import MIN_EDGE_LENGTH
 from odscen.scenario.placing.bodies import SIDE_GAP, Crowd, box_at
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ this many metres are accepted for sampled spawns."""
 LANE_CHANGE = 8.0
 """Metres beyond its front that a vehicle setting off needs to change lanes; our choice, about what
 a car at full lock needs to move a lane's width aside."""
+_PARTS_KEPT = 64
+"""Parts of a graph of which it is kept what they reach: a byte for each node."""
 
 
 class MaximalCrowd(NamedTuple):
@@ -147,14 +149,29 @@ def distance_to_end(ends: NDArray[np.integer], graph: LaneGraph, mask: BoolArray
 
 
 class Reach:
-    """What can be reached on the lane graph inside ``mask``; quick, for many spawns."""
+    """What can be reached on the lane graph inside ``mask``; quick, for many spawns.
+
+    Nodes that can be reached from each other reach the same: of a town almost all.
+    """
 
     def __init__(self, graph: LaneGraph, mask: BoolArray) -> None:
+        from scipy.sparse.csgraph import connected_components
+
         self._edges = _shortest_edges(graph, mask)
         self._mask = mask
+        _, self._part = connected_components(self._edges, connection="strong")
+        self._known: dict[int, BoolArray] = {}
 
     def of(self, node: int) -> BoolArray:
         """Nodes that can be reached from ``node``, itself included; shape ``(N,)``."""
+        part = int(self._part[node])
+        if part not in self._known:
+            if len(self._known) >= _PARTS_KEPT:
+                self._known.clear()
+            self._known[part] = self._reached(node)
+        return self._known[part]
+
+    def _reached(self, node: int) -> BoolArray:
         from scipy.sparse.csgraph import breadth_first_order
 
         reached = np.zeros(len(self._mask), dtype=np.bool_)

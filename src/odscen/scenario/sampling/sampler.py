@@ -104,15 +104,18 @@ def sample_roi(
     if not bases:
         msg = f"map {graph.map_name!r} has no segment to start from"
         raise ScenarioError(msg)
-    region = [bases[int(rng.integers(len(bases)))]]
+    region = dict.fromkeys([bases[int(rng.integers(len(bases)))]])
     beside = _neighbour_table(graph)
     eligible: dict[SegmentId, None] = {}
+    latest = next(iter(region))
     while len(region) < size:
-        eligible.update(dict.fromkeys(n for n in beside[region[-1]] if n not in barred))
-        choices = [name for name in eligible if name not in region]
-        if not choices:
+        fresh = (name for name in beside[latest] if name not in barred and name not in region)
+        eligible.update(dict.fromkeys(fresh))
+        if not eligible:
             break
-        region.append(choices[int(rng.integers(len(choices)))])
+        latest = list(eligible)[int(rng.integers(len(eligible)))]
+        del eligible[latest]
+        region[latest] = None
     return tuple(region)
 
 
@@ -319,8 +322,10 @@ def _drafts(
     if usable.drivable is not None and not walk:
         reach = Reach(region.graph.lanes, region.lanes & usable.drivable)
     drafts = []
-    for spot in spots:
-        goals: Int32Array = region.candidates(NodePlace(walk, spot.node))
+    router = region.walk_router if walk else region.router
+    candidates = router.each_candidates([spot.node for spot in spots])
+    for spot, found in zip(spots, candidates, strict=True):
+        goals: Int32Array = found
         if reach is not None:
             goals = goals[reach.of(spot.node)[goals]]
         elif walk and usable.walkable is not None:

@@ -11,7 +11,7 @@ from odscen.interchange.openscenario_import.places.map_points import MapPoint
 from odscen.interchange.openscenario_import.story.read_motions import put_there
 from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.query import node_id, walk_node_id
-from odscen.lanegraph.shortest_paths import reachable
+from odscen.lanegraph.single_paths import reachable
 
 if TYPE_CHECKING:
     from odscen.interchange.openscenario_import.import_report import ImportReport
