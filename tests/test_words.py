@@ -125,7 +125,8 @@ def test_texts_of_the_page_use_the_terms_of_the_glossary() -> None:
         path.relative_to(sources).as_posix(): words
         for path in sorted(sources.rglob("*.ts*"))
         if "glossary" not in path.name.lower()
-        and path.name != "schema.ts"
+        # Generated; messages of the server are looked at in its source, without its names.
+        and path.name not in {"schema.ts", "serverSentences.ts"}
         and (words := replaced_words(path.read_text(encoding="utf-8")))
     }
     assert found == {}

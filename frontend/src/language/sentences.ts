@@ -14,17 +14,17 @@ interface Template {
   counted: number;
   /** Letters of its own; of several templates that fit, the one with the most is meant. */
   weight: number;
-  /** As long as that, and what else stands in it. */
+  /** Its length with everything else in it. */
   length: number;
 }
 
 /** So few letters say little: what they part must be single words. */
 const LITTLE = 8;
-/** What may stand before a sentence that goes on another. */
+/** What may be before a sentence that continues another. */
 const JOINT = /^[\s;,]+(?:- )?/;
 /** Between sentences that stand in one; where all parts must be known, and where the last one only. */
 const BETWEEN = ["; ", ". ", ", ", " and "];
-/** Placeholders whose words are names that somebody gave, not words of the server. */
+/** Placeholders whose words are names given by the user, not words of the server. */
 const GIVEN = /^(id|names?|file|actor|segment|node|text|key|path|map_name)\d*$/;
 /** What is put in quotes, or a number: in a list of them there are no words. */
 const DATUM = /^'[^']*'$|^-?[\d.,]*\d$/;
@@ -134,7 +134,7 @@ function inParts(text: string, depth: number): string | null {
   return null;
 }
 
-/** What a sentence inserts: a number, words of the server, or something that somebody has given. */
+/** What a sentence inserts: a number, words of the server, or something that the user has given. */
 function valueOf(value: string, name: string, depth: number): string {
   const given = GIVEN.test(name);
   if (given && !value.includes(" ")) return value;
