@@ -2,6 +2,7 @@
 import { screen } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
+import type { PlacePick } from "../../src/editor/pick";
 import type { LightProgram } from "../../src/api/signals";
 import type { SignalEditing, Timing } from "../../src/signals/editing";
 import { QueueLanes } from "../../src/signals/queues";
@@ -30,11 +31,21 @@ const timing = (more: Partial<Timing> = {}): Timing => ({
   ...more,
 });
 
+const NOT_PICKING: PlacePick = {
+  now: null,
+  start: vi.fn(),
+  stop: vi.fn(),
+  begin: vi.fn(),
+  taker: { current: vi.fn() },
+};
+
 const editable = (more: Partial<SignalEditing> = {}): SignalEditing => ({
   name: "one",
   timing: timing(),
   control: "fixed",
   edit: vi.fn(() => Promise.resolve(true)),
+  attempt: vi.fn(() => Promise.resolve(null)),
+  pick: NOT_PICKING,
   retime: vi.fn(() => Promise.resolve(true)),
   takeOver: vi.fn(() => Promise.resolve(true)),
   time: vi.fn(() => Promise.resolve({ notes: ["cycle 60 s (was 40 s)"], picture: "" })),
