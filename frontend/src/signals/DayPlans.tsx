@@ -218,15 +218,16 @@ function NewTime({ ids, junction, timing, editing }: Omit<Props, "light"> & { id
           maxLength={64}
           onChange={(event) => setPlan(event.currentTarget.value)}
         />
-        <Button
-          size="xs"
-          variant="default"
-          disabled={!time.trim() || !plan.trim()}
-          onClick={() => void add()}
-        >
-          <Trans>Add the time</Trans>
-        </Button>
       </Group>
+      <Button
+        size="compact-sm"
+        style={{ justifySelf: "start" }}
+        variant="default"
+        disabled={!time.trim() || !plan.trim()}
+        onClick={() => void add()}
+      >
+        <Trans>Add the time</Trans>
+      </Button>
       <Refused by={attempt} />
     </>
   );
@@ -244,7 +245,7 @@ function PlanForm({ plan, light, junction, timing, editing }: Props & { plan: Pl
   return (
     <section className="fold" aria-label={t`Plan ${id}`}>
       <Group grow gap="xs" align="flex-end" wrap="nowrap">
-        <CommittedText label={t`Plan of the day`} value={id} maxLength={64} onCommit={rename} />
+        <CommittedText label={t`Name`} value={id} maxLength={64} onCommit={rename} />
         <Committed
           label={t`Cycle`}
           suffix={" s"}

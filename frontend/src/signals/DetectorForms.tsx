@@ -157,11 +157,10 @@ function DetectorForm({ one, light, junction, editing }: Props & { one: Detector
         pick={editing.pick}
         pickKey={`detector ${junction} ${id}`}
         by="loop"
-        name={t`Place ${id} on the map`}
         style={{ justifySelf: "start" }}
         onTake={({ name, s }) => void attempt.ask([{ ...set, at: name, before: s }])}
       >
-        {t`Place it on the map`}
+        {t`Place ${id} on the map`}
       </PickButton>
     </section>
   );

@@ -130,8 +130,8 @@ function GroupForm({
       <Refused by={members} />
       <Group grow gap="xs" align="flex-end" wrap="nowrap">
         {seconds(t`Least green`, "min_green", t`none`)}
-        {seconds(t`Yellow`, "yellow", t`by speed limit`)}
-        {seconds(t`All red`, "all_red", t`as needed`)}
+        {seconds(t`Yellow`, "yellow", t`auto`)}
+        {seconds(t`All red`, "all_red", t`auto`)}
       </Group>
       <Refused by={times} />
       <Text size="sm" fw={500}>

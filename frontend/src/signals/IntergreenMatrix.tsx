@@ -47,16 +47,15 @@ export function IntergreenMatrix({
     <div className="signal-forms">
       <Text size="xs" c="dimmed">
         <Trans>
-          Rows clear, columns enter. The small number is what the paths need; an empty field keeps to it.
+          Rows (↓) clear, columns (→) enter. The small number is what the paths need; an empty field keeps to
+          it.
         </Trans>
       </Text>
       <div className="signal-matrix" tabIndex={0} role="region" aria-label={t`Matrix of intergreens`}>
         <table>
           <thead>
             <tr>
-              <th scope="col">
-                <Trans>clears ↓ enters →</Trans>
-              </th>
+              <td aria-hidden="true">↓ →</td>
               {ids.map((id) => (
                 <th key={id} scope="col">
                   {id}
@@ -132,6 +131,7 @@ function Cell({
       <input
         inputMode="decimal"
         aria-label={t`Intergreen from ${ending} to ${beginning}, seconds; the paths need ${short(needed, 1)}`}
+        data-set={given !== null || undefined}
         aria-invalid={wrong || tooShort(pair)}
         placeholder={short(pair.used, 1)}
         value={text}
