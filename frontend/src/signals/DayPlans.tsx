@@ -91,11 +91,7 @@ export function DayPlans({ light, junction, timing, editing }: Props) {
             <th scope="col">
               <Trans>Plan of the day</Trans>
             </th>
-            <th scope="col">
-              <span className="signal-hidden">
-                <Trans>Remove</Trans>
-              </span>
-            </th>
+            <td />
           </tr>
         </thead>
         <tbody>

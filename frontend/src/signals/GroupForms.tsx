@@ -301,7 +301,7 @@ const movementsOf = (light: LightProgram, group: string): string[] =>
 export const stageLabel = (stage: string, groups: readonly string[]): string =>
   groups.length > 0 ? t`Stage ${stage}: ${groups.join(" ")}` : t`Stage ${stage}`;
 
-/** A name that nobody has: a letter and the first free number. */
+/** A name that is free: a letter and the first number that is not taken. */
 export function freeName(taken: ReadonlySet<string>, letter: string): string {
   let number = 1;
   while (taken.has(`${letter}${number}`)) number++;

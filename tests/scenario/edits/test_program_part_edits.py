@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -15,7 +16,7 @@ from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.scenario.signals.stage_sequence import cycle_length
 from tests.scenario.edits.test_signal_edits import TWO, empty, timing
-from tests.signal_case import JUNCTION, light, one_plan, program
+from tests.signal_case import JUNCTION, ROOT, light, one_plan, program
 
 if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
@@ -215,3 +216,22 @@ def test_a_stage_that_goes_takes_its_detectors_and_times_along() -> None:
         edits.remove_stage(one, LIGHTS, JUNCTION, stage="3")
     with pytest.raises(InputError, match="has a stage '1' already"):
         edits.add_stage(one, LIGHTS, JUNCTION, "1", protected=["K1L"], green=6)
+
+
+def test_the_edits_of_the_guide_can_be_made_on_its_program() -> None:
+    guide = (ROOT / "docs" / "signals.md").read_text(encoding="utf-8")
+    block = next(
+        found for found in re.findall(r"```json\n(.*?)```", guide, re.DOTALL) if '"kind"' in found
+    )
+    one = empty(program())
+    for data in json.loads(block):
+        message = read_edit(data)
+        one = EDIT_ENTRIES[message.kind].function(one, lights=LIGHTS, **message.arguments)
+    assert members(one)["K2L"] == ("r2 left",)
+    assert timing(one).intergreens == (
+        ("K2", "F1", 9.0), ("K2L", "F1", 9.0), ("K4", "F1", 11.0),
+    )  # fmt: skip
+    assert [(d.id, d.before, d.gap) for d in timing(one).detectors] == [
+        ("D1", 30.0, 3.0), ("D2", 25.0, 2.5),
+    ]  # fmt: skip
+    assert [plan.id for plan in timing(one).plans] == ["day", "evening", "night"]
