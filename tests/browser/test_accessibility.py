@@ -163,8 +163,16 @@ def test_the_program_of_a_light_that_can_be_changed(
     user, inspector = visit(served.url)
     light = open_program(user, saved(served))
     inspector.look("editor-signals")
-    for summary in ("Shortest and longest greens", "Signal groups and their movements"):
-        light.get_by_text(summary).click()
+    for summary in (
+        "Shortest and longest greens",
+        "Signal groups and their movements",
+        "Change signal groups and stages",
+        "Change intergreens",
+        "Change detectors",
+        "Change the plans of the day",
+    ):
+        light.get_by_text(summary, exact=True).click()
+    light.get_by_role("button", name="Change K1L").click()
     inspector.look("editor-signals-open")
 
 

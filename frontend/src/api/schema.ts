@@ -1996,6 +1996,37 @@ export interface components {
             profile?: string | null;
         };
         /**
+         * AddStageEdit
+         * @description Put a stage in, behind the stage ``after`` or at the end.
+         */
+        AddStageEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "add_stage";
+            /** Id */
+            id?: string;
+            /** Protected */
+            protected?: string[];
+            /** Permissive */
+            permissive?: string[];
+            /** Green */
+            green?: number;
+            /** Min Green */
+            min_green?: number | null;
+            /** Max Green */
+            max_green?: number | null;
+            /** On Call */
+            on_call?: boolean;
+            /** Junction */
+            junction: string;
+            /** Stage */
+            stage: string;
+            /** After */
+            after?: string | null;
+        };
+        /**
          * AfterRule
          * @description Another rule has started, or has ended, at least once.
          */
@@ -2969,7 +3000,7 @@ export interface components {
          * DayPlanInfo
          * @description A plan of the day; ``times`` are seconds of the day at which it begins, none if always.
          *
-         *     ``bars`` is the time bar as SVG, in which the cycle lasts from the first to the second share of
+         *     ``begins`` are the seconds of a run at which it takes over. ``bars`` is the time bar as SVG, in which the cycle lasts from the first to the second share of
          *     the width.
          */
         DayPlanInfo: {
@@ -2981,6 +3012,8 @@ export interface components {
             offset: number;
             /** Times */
             times: number[];
+            /** Begins */
+            begins: number[];
             /** Stages */
             stages: components["schemas"]["StageInfo"][];
             /** Phases */
@@ -3102,6 +3135,21 @@ export interface components {
             ][];
             /** Place */
             place: [
+                number,
+                number
+            ][];
+        };
+        /**
+         * DetectorLaneInfo
+         * @description A lane before the light, and its approach; ``line`` leads to the stop line, metres.
+         */
+        DetectorLaneInfo: {
+            /** At */
+            at: string;
+            /** Approach */
+            approach: string;
+            /** Line */
+            line: [
                 number,
                 number
             ][];
@@ -3349,7 +3397,7 @@ export interface components {
             /** Version */
             version: number;
             /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetParkingEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["SetParameterEdit"] | components["schemas"]["RemoveParameterEdit"] | components["schemas"]["SetFormulaEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ExtendRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetCriteriaEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetGreenEdit"] | components["schemas"]["SetOffsetEdit"] | components["schemas"]["SetStageEdit"] | components["schemas"]["SetTurnEdit"] | components["schemas"]["SetStudyEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetParkingEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["SetParameterEdit"] | components["schemas"]["RemoveParameterEdit"] | components["schemas"]["SetFormulaEdit"] | components["schemas"]["SetGroupEdit"] | components["schemas"]["RemoveGroupEdit"] | components["schemas"]["AddStageEdit"] | components["schemas"]["RemoveStageEdit"] | components["schemas"]["SetIntergreenEdit"] | components["schemas"]["SetDetectorEdit"] | components["schemas"]["RemoveDetectorEdit"] | components["schemas"]["SetPlanEdit"] | components["schemas"]["RemovePlanEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ExtendRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetCriteriaEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetGreenEdit"] | components["schemas"]["SetOffsetEdit"] | components["schemas"]["SetStageEdit"] | components["schemas"]["SetTurnEdit"] | components["schemas"]["SetStudyEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
             /** Label */
             label?: string | null;
         };
@@ -3867,6 +3915,31 @@ export interface components {
             places: components["schemas"]["Incident"][];
         };
         /**
+         * GroupPairInfo
+         * @description A group that ends and one that begins; seconds of intergreen.
+         *
+         *     ``needed`` is what their paths need, ``given`` what the scenario says, ``used`` what is kept.
+         *     ``together`` says whether both may have green: ``yields`` if ``ending`` gives way, ``first`` if
+         *     ``beginning`` does.
+         */
+        GroupPairInfo: {
+            /** Ending */
+            ending: string;
+            /** Beginning */
+            beginning: string;
+            /** Needed */
+            needed: number;
+            /** Given */
+            given: number | null;
+            /** Used */
+            used: number;
+            /**
+             * Together
+             * @enum {string}
+             */
+            together: "free" | "yields" | "first" | "never";
+        };
+        /**
          * GrowRoiEdit
          * @description Add a segment to the region of interest (R29).
          */
@@ -4367,7 +4440,9 @@ export interface components {
          * @description What a light is told to show. ``site`` is the junction with its detectors, as SVG.
          *
          *     ``ground`` is what the pictures of the stages refer to: it has to be in the page with them.
-         *     ``turns`` are those across oncoming traffic; none in a run.
+         *     ``turns`` are those across oncoming traffic, ``movements`` all that groups may have, ``pairs``
+         *     the groups of the scenario's own program that meet, and ``lanes`` where detectors can be placed;
+         *     none of these in a run.
          */
         LightProgramInfo: {
             /** Id */
@@ -4392,6 +4467,12 @@ export interface components {
             detectors: components["schemas"]["DetectorInfo"][];
             /** Turns */
             turns: components["schemas"]["TurnInfo"][];
+            /** Movements */
+            movements: components["schemas"]["MovementInfo"][];
+            /** Pairs */
+            pairs: components["schemas"]["GroupPairInfo"][];
+            /** Lanes */
+            lanes: components["schemas"]["DetectorLaneInfo"][];
             /** Site */
             site: string;
             /** Ground */
@@ -4583,6 +4664,18 @@ export interface components {
             actor: string;
             /** Spawn */
             spawn: string;
+        };
+        /**
+         * MovementInfo
+         * @description A movement as a group names it, and the group that has it now; empty without one.
+         */
+        MovementInfo: {
+            /** Name */
+            name: string;
+            /** Walk */
+            walk: boolean;
+            /** Group */
+            group: string;
         };
         /**
          * NetCounts
@@ -5138,7 +5231,8 @@ export interface components {
          *     ``right``, ``turnaround``), ``r12`` (all of the approach), ``12.0.-1>8.1.-1`` (from lane to
          *     lane) or ``walk r12`` (the crossings over a leg). ``yellow`` ``None`` follows from the speed
          *     limit: 3 s up to 50 km/h, 4 s up to 60 km/h, 5 s above. With ``all_red``, what begins after this
-         *     group waits for yellow and all-red; otherwise as long as the paths need.
+         *     group waits for yellow and all-red; otherwise as long as the paths need. Whenever it has green,
+         *     it is to have it for ``min_green`` at least, over as many stages as it takes.
          */
         "ProgramGroup-Input": {
             /** Id */
@@ -5149,6 +5243,8 @@ export interface components {
             yellow?: number | null;
             /** All Red */
             all_red?: number | null;
+            /** Min Green */
+            min_green?: number | null;
         };
         /**
          * ProgramGroup
@@ -5158,7 +5254,8 @@ export interface components {
          *     ``right``, ``turnaround``), ``r12`` (all of the approach), ``12.0.-1>8.1.-1`` (from lane to
          *     lane) or ``walk r12`` (the crossings over a leg). ``yellow`` ``None`` follows from the speed
          *     limit: 3 s up to 50 km/h, 4 s up to 60 km/h, 5 s above. With ``all_red``, what begins after this
-         *     group waits for yellow and all-red; otherwise as long as the paths need.
+         *     group waits for yellow and all-red; otherwise as long as the paths need. Whenever it has green,
+         *     it is to have it for ``min_green`` at least, over as many stages as it takes.
          */
         "ProgramGroup-Output": {
             /** Id */
@@ -5169,6 +5266,8 @@ export interface components {
             yellow: number | null;
             /** All Red */
             all_red: number | null;
+            /** Min Green */
+            min_green: number | null;
         };
         /**
          * ProgramStage
@@ -5325,6 +5424,21 @@ export interface components {
             part: string;
         };
         /**
+         * RemoveDetectorEdit
+         * @description Take a detector out.
+         */
+        RemoveDetectorEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_detector";
+            /** Junction */
+            junction: string;
+            /** Detector */
+            detector: string;
+        };
+        /**
          * RemoveFlowEdit
          * @description Remove a flow.
          */
@@ -5336,6 +5450,23 @@ export interface components {
             kind: "remove_flow";
             /** Flow */
             flow: string;
+        };
+        /**
+         * RemoveGroupEdit
+         * @description Take a signal group out; its movements join the group ``into``.
+         */
+        RemoveGroupEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_group";
+            /** Junction */
+            junction: string;
+            /** Group */
+            group: string;
+            /** Into */
+            into: string;
         };
         /**
          * RemoveMeasureEdit
@@ -5364,6 +5495,21 @@ export interface components {
             parameter: string;
         };
         /**
+         * RemovePlanEdit
+         * @description Take a plan of the day out; after the last one the program has its offset.
+         */
+        RemovePlanEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_plan";
+            /** Junction */
+            junction: string;
+            /** Plan */
+            plan: string;
+        };
+        /**
          * RemoveRuleEdit
          * @description Remove a rule by its id; a rule that waits for it then has an error in the checks.
          */
@@ -5375,6 +5521,21 @@ export interface components {
             kind: "remove_rule";
             /** Rule */
             rule: string;
+        };
+        /**
+         * RemoveStageEdit
+         * @description Take a stage out, and detectors that prolong nothing else.
+         */
+        RemoveStageEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_stage";
+            /** Junction */
+            junction: string;
+            /** Stage */
+            stage: string;
         };
         /**
          * RemoveTransitEdit
@@ -6428,6 +6589,33 @@ export interface components {
             criteria: string[];
         };
         /**
+         * SetDetectorEdit
+         * @description Lay a loop before a light, or change one.
+         */
+        SetDetectorEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_detector";
+            /** Id */
+            id?: string;
+            /** At */
+            at?: string;
+            /** Before */
+            before?: number;
+            /** Length */
+            length?: number;
+            /** Stages */
+            stages?: string[];
+            /** Gap */
+            gap?: number;
+            /** Junction */
+            junction: string;
+            /** Detector */
+            detector: string;
+        };
+        /**
          * SetDriversEdit
          * @description Change fields of :class:`~odscen.scenario.document.scenario_document.Drivers`.
          */
@@ -6539,6 +6727,35 @@ export interface components {
             keep_cycle?: boolean;
         };
         /**
+         * SetGroupEdit
+         * @description Put a signal group in, or change it; its movements leave the groups that had them.
+         */
+        SetGroupEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_group";
+            /** Id */
+            id?: string;
+            /** Movements */
+            movements?: string[];
+            /** Yellow */
+            yellow?: number | null;
+            /** All Red */
+            all_red?: number | null;
+            /** Min Green */
+            min_green?: number | null;
+            /** Junction */
+            junction: string;
+            /** Group */
+            group: string;
+            /** Protected */
+            protected?: string[] | null;
+            /** Permissive */
+            permissive?: string[] | null;
+        };
+        /**
          * SetInputEdit
          * @description Add vehicles that drive in at the boundary of the region, or change those of that name.
          */
@@ -6584,6 +6801,25 @@ export interface components {
             ][];
             /** Inflow */
             inflow: string;
+        };
+        /**
+         * SetIntergreenEdit
+         * @description Say how long after the end of green of a group another may begin.
+         */
+        SetIntergreenEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_intergreen";
+            /** Junction */
+            junction: string;
+            /** Ending */
+            ending: string;
+            /** Beginning */
+            beginning: string;
+            /** Seconds */
+            seconds: number | null;
         };
         /**
          * SetLineEdit
@@ -6730,6 +6966,43 @@ export interface components {
             stay?: components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"];
             /** Within */
             within?: number;
+        };
+        /**
+         * SetPlanEdit
+         * @description Put a plan of the day in, or change one.
+         */
+        SetPlanEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_plan";
+            /** Id */
+            id?: string;
+            /** Times */
+            times?: string[];
+            /** Cycle */
+            cycle?: number | null;
+            /** Offset */
+            offset?: number;
+            /** Stages */
+            stages?: string[];
+            /** Green */
+            green?: {
+                [key: string]: number;
+            };
+            /** Min Green */
+            min_green?: {
+                [key: string]: number;
+            };
+            /** Max Green */
+            max_green?: {
+                [key: string]: number;
+            };
+            /** Junction */
+            junction: string;
+            /** Plan */
+            plan: string;
         };
         /**
          * SetProfileEdit
@@ -9901,7 +10174,8 @@ export interface components {
          *     ``right``, ``turnaround``), ``r12`` (all of the approach), ``12.0.-1>8.1.-1`` (from lane to
          *     lane) or ``walk r12`` (the crossings over a leg). ``yellow`` ``None`` follows from the speed
          *     limit: 3 s up to 50 km/h, 4 s up to 60 km/h, 5 s above. With ``all_red``, what begins after this
-         *     group waits for yellow and all-red; otherwise as long as the paths need.
+         *     group waits for yellow and all-red; otherwise as long as the paths need. Whenever it has green,
+         *     it is to have it for ``min_green`` at least, over as many stages as it takes.
          */
         "ProgramGroup-File": {
             /** Id */
@@ -9918,6 +10192,11 @@ export interface components {
              * @default null
              */
             all_red?: number | null;
+            /**
+             * Min Green
+             * @default null
+             */
+            min_green?: number | null;
         };
         /**
          * ProgramStage

@@ -10,6 +10,10 @@ export type Stage = Schemas["StageInfo"];
 export type Detector = Schemas["DetectorInfo"];
 /** A turn across oncoming traffic. */
 export type CrossingTurn = Schemas["TurnInfo"];
+/** Two signal groups that meet: the intergreen from the first to the second. */
+export type GroupPair = Schemas["GroupPairInfo"];
+/** A lane before a light, with its line to the stop line. */
+export type DetectorLane = Schemas["DetectorLaneInfo"];
 /** What a light showed in a run: from `times[i]` on `states[shown[i]]`. */
 export type ShownStates = Schemas["ShownStates"];
 /** A scenario whose lights have been timed, and what came of it. */

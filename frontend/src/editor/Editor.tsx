@@ -52,12 +52,12 @@ export function Editor({
     // eslint-disable-next-line react-hooks/exhaustive-deps
     [name, version],
   );
-  const { light } = now;
+  const { light, pick } = now;
   const lightEditing = useMemo(() => {
     if (!light) return null;
     const names = map?.lights.find((one) => one.names.includes(light))?.names ?? [light];
-    return signalEditing(store, scenario, light, names);
-  }, [store, scenario, light, map]);
+    return signalEditing(store, scenario, light, names, pick);
+  }, [store, scenario, light, map, pick]);
   useFinishedOnLeaving();
   useAskBeforeClosing(refusal?.again != null);
   const [help, setHelp] = useState(false);

@@ -19,6 +19,7 @@ export const PICK_WORD = localized((): Record<PickBy, string> => ({
   turn: t`Turn`,
   point: t`Point of a lane`,
   light: t`Traffic light`,
+  loop: t`Detector`,
   node: t`Point of a lane`,
   goal: t`Goal`,
   place: t`Place`,

@@ -1,16 +1,18 @@
 import { type RefObject, useEffect, useMemo, useRef, useState } from "react";
 
 /**
- * What a click on the map names while a place is picked: `node` a node of a lane of the region,
- * `goal` any node of a lane or walkway, `place` that or where there is none the ground, `ground` x and y.
+ * What a click on the map names while a place is picked: `loop` a lane before the light that is shown,
+ * `node` a node of a lane of the region, `goal` any node of a lane or walkway, `place` that or where
+ * there is none the ground, `ground` x and y.
  */
-export type PickBy = "segment" | "lane" | "turn" | "point" | "light" | "node" | "goal" | "place" | "ground";
+export type PickBy =
+  "segment" | "lane" | "turn" | "point" | "light" | "loop" | "node" | "goal" | "place" | "ground";
 
 /** A place that was pointed at. */
 export interface Picked {
   /** Empty of the ground. */
   name: string;
-  /** Of a point of a lane how far along the road it is, metres. */
+  /** Of a point of a lane how far along the road it is, of a loop how far before the stop line; metres. */
   s: number;
   /** Metres, and radians counter-clockwise; of places that are points. */
   x: number;

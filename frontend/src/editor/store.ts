@@ -33,7 +33,7 @@ export interface EditorState {
    */
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
   /** Asks for a change that is no edit; a refusal is thrown, for the caller to show. */
-  take: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState>;
+  take: (call: (version: number) => Promise<Answer>) => Promise<ScenarioState>;
   /** Asks for a change that is no edit; the answer is null if it was refused, which is shown. */
   ask: Ask<ScenarioState>;
   undo: () => Promise<ScenarioState | null>;
@@ -187,7 +187,7 @@ export function createEditorStore(name: string): EditorStore {
       return send({ step, foresee: () => there }, call);
     };
     const ask: Ask<ScenarioState> = (call) => send({ ...UNKNOWN }, call);
-    const take = async (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState> => {
+    const take: EditorState["take"] = async (call) => {
       const found = await turn<never>({ ...UNKNOWN }, call, async (error) => {
         set({ saving: unsent.length > 0 ? "failed" : "saved" });
         if (!(error instanceof ApiError) || error.status !== 409) throw error;

@@ -25,10 +25,6 @@ export interface EditorNow extends Editing {
   scenario: ScenarioState;
   document: ScenarioDocument;
   problems: readonly Problem[];
-  /** The junction whose traffic light is shown. */
-  light: string | null;
-  /** Its program, once it is there. */
-  program: LightProgram | null;
   setProgram: (program: LightProgram | null) => void;
   /** The rule whose form is open, as it is there. */
   drafted: Draft | null;
@@ -66,6 +62,7 @@ export const sameButPointer = (one: EditorNow, other: EditorNow): boolean =>
     (key) => POINTED.has(key) || typeof one[key] === "function" || one[key] === other[key],
   );
 
+const NONE: Editing["detectors"] = [];
 /** Pixels of the right of the map that the program of a light covers. */
 const PROGRAM = 430;
 
@@ -139,7 +136,11 @@ export function useEditing(
     if (next) goTo("actors");
     if (next?.makes) select([]);
   };
+  const names = map?.lights.find((one) => light !== null && one.names.includes(light))?.names ?? [];
   const editing: Editing = {
+    light,
+    program,
+    detectors: document.signals.junctions.find(({ junction }) => names.includes(junction))?.detectors ?? NONE,
     graph,
     picker,
     roi: document.roi,
@@ -175,12 +176,13 @@ export function useEditing(
     scenario,
     document,
     problems,
-    light,
-    program,
     setProgram,
     drafted,
     setDrafted,
-    closeLight: () => setLight(null),
+    closeLight: () => {
+      setLight(null);
+      pick.stop();
+    },
     step,
     tool,
     arm,

@@ -61,7 +61,10 @@ export function useScene(now: EditorNow): Scene {
         ...(RULED.has(step) ? ruled.pins : []),
       ],
       lines: RULED.has(step) ? ruled.lines : [],
-      detectors,
+      detectors:
+        hover?.is === "loop"
+          ? [...detectors, { place: hover.place, label: "", bus: false, occupied: true }]
+          : detectors,
       hoverSegment: hover?.is === "segment" ? hover.row : null,
       nodes: {
         vehicles: step !== "region" && (!placing || walks !== true),

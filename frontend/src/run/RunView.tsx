@@ -17,6 +17,7 @@ import { sceneDetectors } from "../signals/sceneDetectors";
 import { SignalPanel } from "../signals/SignalPanel";
 import { useQueues } from "../signals/useQueues";
 import { useRunLights } from "../signals/useSignals";
+import { loggedPlans, plannedPlans } from "../time/plans";
 import { RunBar } from "../time/RunBar";
 import { useNearest } from "../time/useNearest";
 import { go } from "../ui/address";
@@ -86,6 +87,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const { learn: learnLights, learnDetectors, drawn } = lights;
   const [junction, setJunction] = useState<string | null>(null);
   const shownJunction = junction ?? lights.heads?.junctions[0] ?? null;
+  const history = shownJunction === null ? null : lights.history(shownJunction);
   const queues = useQueues({ map, graph: loaded?.graph ?? null, junction: shownJunction, picture });
   const [program, setProgram] = useState<LightProgram | null>(null);
   // Anew at the end, when there are the calls of detectors.
@@ -146,6 +148,14 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     () => new Set(fit ? countMarks(fit).map(({ kind }) => kind) : incidents.map(markKind)),
     [incidents, fit],
   );
+  const reached = player.replay?.end ?? now.time;
+  const longest = (ended ? Math.max(player.replay?.end ?? 0, now.time) : info?.progress?.until) || 60;
+  // What was logged is what ran; a live run has a plan only.
+  const plans = history?.plans
+    ? loggedPlans(history.times, history.plans, reached)
+    : program
+      ? plannedPlans(program, longest)
+      : [];
   const time = mode === "replay" ? player.time : ended ? Infinity : now.time;
   useEffect(() => {
     handle.current?.setHeads(drawn(time));
@@ -357,13 +367,14 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
         </aside>
       </div>
       <RunBar
-        end={(ended ? Math.max(player.replay?.end ?? 0, now.time) : info.progress?.until) || 60}
-        reached={player.replay?.end ?? now.time}
+        end={longest}
+        reached={reached}
         time={mode === "replay" ? player.time : now.time}
         incidents={incidents}
         categories={categories}
         junction={shownJunction}
-        history={shownJunction === null ? null : lights.history(shownJunction)}
+        history={history}
+        plans={plans}
         ttc={ttc}
         spacing={player.replay?.spacing ?? 0.2}
         onSeek={player.replay ? jump : null}

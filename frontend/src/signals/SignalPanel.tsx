@@ -7,18 +7,20 @@ import "./signals.css";
 import { Alert, CloseButton, Loader, Select, Switch, Text, VisuallyHidden } from "@mantine/core";
 import { type ReactNode, useCallback, useEffect, useRef, useState } from "react";
 
-import { dayTime, lengthText } from "../language/units";
+import { dayTime } from "../language/units";
 import { localized } from "../language/localized";
-import type { DayPlan, Detector, LightProgram } from "../api/signals";
+import type { DayPlan, LightProgram } from "../api/signals";
 import { useLoaded } from "../ui/useLoaded";
 import { cursorAt, type Cursor, type SignalNow } from "./cursor";
 import type { SignalEditing } from "./editing";
-import { seenInLog, seenLive, type Sight } from "./occupancy";
+import { seenInLog, seenLive } from "./occupancy";
 import { ProgramControl, StageBounds, StageCall, TimingTools, TurnChoices } from "./ProgramTools";
+import { ProgramParts } from "./ProgramParts";
 import type { Queue } from "./queues";
 import { QueueTable } from "./QueueTable";
 import { RingBar } from "./RingBar";
 import { served } from "../language/served";
+import { DetectorTable, Drawn, GroupTable, JunctionPicture } from "./SignalTables";
 
 const ORIGIN = localized((): Record<LightProgram["origin"], string> => ({
   scenario: t`the engineer’s, in this scenario`,
@@ -188,12 +190,16 @@ function Program({ light, junction, junctions, now, occupied, queues, editing }:
           <ProgramControl light={light} junction={junction} editing={editing} />
           <StageBounds junction={junction} editing={editing} />
           <TurnChoices light={light} junction={junction} editing={editing} />
+          <h3>
+            <Trans>Groups, intergreens, detectors and plans</Trans>
+          </h3>
+          <ProgramParts light={light} junction={junction} editing={editing} />
           <TimingTools junction={junction} junctions={junctions} editing={editing} />
         </>
       )}
       <h3>{light.detectors.length > 0 ? t`Junction and detectors` : t`Junction`}</h3>
-      {light.site && <Site light={light} sight={sight} />}
-      <Detectors light={light} sight={sight} />
+      {light.site && <JunctionPicture light={light} sight={sight} />}
+      <DetectorTable light={light} sight={sight} />
       <ul className="signal-legend" aria-label={t`What the pictures show`}>
         {light.legend.map(({ picture, words }) => (
           <li key={words}>
@@ -202,7 +208,7 @@ function Program({ light, junction, junctions, now, occupied, queues, editing }:
           </li>
         ))}
       </ul>
-      <Groups light={light} />
+      <GroupTable light={light} />
     </>
   );
 }
@@ -236,11 +242,6 @@ function Splitting({ light, plan, editing }: { light: LightProgram; plan: DayPla
       )}
     </>
   );
-}
-
-/** What the server has drawn: names in it are escaped there. */
-function Drawn({ svg, className }: { svg: string; className?: string }) {
-  return <div className={className} dangerouslySetInnerHTML={{ __html: svg }} />;
 }
 
 function Fact({ word, children }: { word: string; children: ReactNode }) {
@@ -331,123 +332,6 @@ function Splits({ plan }: { plan: DayPlan }) {
         ))}
       </tbody>
     </table>
-  );
-}
-
-interface Seen {
-  light: LightProgram;
-  sight: Sight | null;
-}
-
-/** The junction, with the detectors filled that are occupied. */
-function Site({ light, sight }: Seen) {
-  const box = useRef<HTMLDivElement>(null);
-  useEffect(() => {
-    for (const shape of box.current?.querySelectorAll<SVGElement>("[data-detector]") ?? [])
-      shape.classList.toggle("occupied", sight?.on.has(shape.dataset.detector ?? "") ?? false);
-  }, [light, sight]);
-  return (
-    <div ref={box}>
-      <Drawn className="signal-site" svg={light.site} />
-    </div>
-  );
-}
-
-interface Loops {
-  label: string;
-  purpose: string;
-  loops: Detector[];
-}
-
-function Detectors({ light, sight }: Seen) {
-  if (light.detectors.length === 0)
-    return (
-      <Text size="sm" c="dimmed">
-        <Trans>No detectors: fixed-time control needs none.</Trans>
-      </Text>
-    );
-  const rows: Loops[] = [];
-  for (const one of light.detectors) {
-    const purpose = purposeOf(one);
-    const row = rows.find((other) => other.label === one.label && other.purpose === purpose);
-    if (row) row.loops.push(one);
-    else rows.push({ label: one.label, purpose, loops: [one] });
-  }
-  return (
-    <table className="signal-table" aria-label={t`Detectors`}>
-      <thead>
-        <tr>
-          <th scope="col">
-            <Trans>Detector</Trans>
-          </th>
-          <th scope="col">
-            <Trans>Place</Trans>
-          </th>
-          <th scope="col">
-            <Trans>For</Trans>
-          </th>
-          {sight && (
-            <th scope="col">
-              <Trans>Now</Trans>
-            </th>
-          )}
-        </tr>
-      </thead>
-      <tbody>
-        {rows.map(({ label, purpose, loops }) => (
-          <tr key={`${label} ${purpose}`}>
-            <th scope="row">{label}</th>
-            <td>{placeWords(loops)}</td>
-            <td>{purpose}</td>
-            {sight && <td>{sight.words(loops)}</td>}
-          </tr>
-        ))}
-      </tbody>
-    </table>
-  );
-}
-
-const placeWords = (loops: readonly Detector[]): string => {
-  const [first] = loops;
-  if (!first || first.call) return t`where people wait`;
-  const lanes = loops.length > 1 ? t`, ${loops.length} lanes` : "";
-  if (first.bus) return t`last ${lengthText(first.length)} before the stop line${lanes}`;
-  return t`${lengthText(first.ahead)} before the stop line${lanes}`;
-};
-
-function purposeOf({ call, bus, stages }: Detector): string {
-  const named = stages.join(", ");
-  if (call) return t`calls stage ${named}`;
-  return bus ? t`priority in stage ${named}` : t`prolongs stage ${named}`;
-}
-
-function Groups({ light }: { light: LightProgram }) {
-  return (
-    <details>
-      <summary>
-        <Trans>Signal groups and their movements</Trans>
-      </summary>
-      <table className="signal-table" aria-label={t`Signal groups`}>
-        <thead>
-          <tr>
-            <th scope="col">
-              <Trans>Group</Trans>
-            </th>
-            <th scope="col">
-              <Trans>Movements</Trans>
-            </th>
-          </tr>
-        </thead>
-        <tbody>
-          {light.groups.map(({ id, movements }) => (
-            <tr key={id}>
-              <th scope="row">{id}</th>
-              <td>{movements.join(", ")}</td>
-            </tr>
-          ))}
-        </tbody>
-      </table>
-    </details>
   );
 }
 

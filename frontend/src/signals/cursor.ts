@@ -57,11 +57,15 @@ function spansOf(plan: DayPlan): Span[] {
 /** What one light showed in a recorded run. */
 export class ShownSignal {
   /** All that it showed, in order: from `times[i]` on `states[i]`. */
-  readonly history: { times: readonly number[]; states: readonly string[] };
+  readonly history: {
+    times: readonly number[];
+    states: readonly string[];
+    plans: readonly string[];
+  };
 
   constructor(private readonly columns: ShownStates) {
-    const { times, shown, states } = columns;
-    this.history = { times, states: shown.map((row) => nth(states, row)) };
+    const { times, shown, states, plans } = columns;
+    this.history = { times, states: shown.map((row) => nth(states, row)), plans };
   }
 
   get light(): string {

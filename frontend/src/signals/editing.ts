@@ -1,7 +1,10 @@
 import type { TimedSignals } from "../api/signals";
 import { signals } from "../api/signals";
 import type { Edit, ScenarioDocument, ScenarioState } from "../api/types";
+import { api } from "../api/client";
+import type { PlacePick } from "../editor/pick";
 import type { EditorStore } from "../editor/store";
+import { reasonOf } from "../ui/reason";
 import type { Grip } from "./ring";
 
 export type Timing = ScenarioDocument["signals"]["junctions"][number];
@@ -18,6 +21,10 @@ export interface SignalEditing {
   control: LightControl;
   /** Answers whether it was done, as all of these. */
   edit: (edit: Edit, label?: string) => Promise<boolean>;
+  /** Asks for edits that are one step for undo; the answer is why they were refused, for the field to say. */
+  attempt: (edits: readonly Edit[], label?: string) => Promise<string | null>;
+  /** Places that are picked on the map. */
+  pick: PlacePick;
   retime: (grip: Grip, seconds: number, plan: string | null, keepCycle: boolean) => Promise<boolean>;
   takeOver: () => Promise<boolean>;
   /** What came of it; null if it was refused. */
@@ -30,8 +37,9 @@ export function signalEditing(
   { name, document }: ScenarioState,
   junction: string,
   names: readonly string[],
+  pick: PlacePick,
 ): SignalEditing {
-  const { edit: change, ask } = store.getState();
+  const { edit: change, ask, take } = store.getState();
   const edit: SignalEditing["edit"] = async (one, label) => (await change(one, label)) !== null;
   const made = async (call: (version: number) => Promise<ScenarioState>): Promise<boolean> =>
     (await ask(call)) !== null;
@@ -40,6 +48,15 @@ export function signalEditing(
     timing: document.signals.junctions.find((one) => names.includes(one.junction)) ?? null,
     control: document.signals.control,
     edit,
+    attempt: async (edits, label) => {
+      try {
+        await take((version) => api.edit(name, version, edits, label));
+        return null;
+      } catch (error) {
+        return reasonOf(error);
+      }
+    },
+    pick,
     retime: (grip, seconds, plan, keepCycle) => {
       if (grip.is === "cycle")
         return made((version) => signals.setCycle(name, version, junction, seconds, plan));

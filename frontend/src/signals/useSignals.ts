@@ -5,6 +5,13 @@ import type { MapDetails } from "../api/types";
 import { changed, ShownSignal, type SignalNow } from "./cursor";
 import { type Head, Heads } from "./heads";
 
+export interface LightHistory {
+  times: readonly number[];
+  states: readonly string[];
+  /** Plans of the day that ran, as they were logged. */
+  plans?: readonly string[];
+}
+
 export interface RunLights {
   heads: Heads | null;
   /** What is shown at a time, at all stop lines. */
@@ -12,7 +19,7 @@ export interface RunLights {
   /** What the light of a junction shows. */
   now: (junction: string, time: number) => SignalNow | null;
   /** All that the light of a junction has shown so far; of a live run since one began to look. */
-  history: (junction: string) => { times: readonly number[]; states: readonly string[] } | null;
+  history: (junction: string) => LightHistory | null;
   /** Takes in what has changed in a live run. */
   learn: (lights: Record<string, string>, time: number) => void;
   /** The same of detectors. */
@@ -89,7 +96,7 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
     [map, nowOf],
   );
   const history = useCallback(
-    (junction: string) => {
+    (junction: string): LightHistory | null => {
       const light = map?.lights.find(({ names }) => names.includes(junction))?.id ?? "";
       return (recorded ? logged?.get(light)?.history : seen.current.get(light)) ?? null;
     },

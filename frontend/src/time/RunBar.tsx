@@ -21,6 +21,7 @@ import { type Band, bandsOf, type History, shownWords } from "./bands";
 import { linePath, pointAt, SEEN, SERIOUS } from "./collision";
 import { firingsOf, GLYPH, isRule, nearestIncident, neighbour, thinnedMarks } from "./fired";
 import type { EgoTtc } from "./useNearest";
+import { planAt, type PlanSpan } from "./plans";
 import { useWidth } from "./useWidth";
 
 /** Pixels around a mark that are it. */
@@ -44,6 +45,7 @@ export function RunBar({
   categories,
   junction,
   history,
+  plans,
   ttc,
   spacing,
   onSeek,
@@ -59,6 +61,8 @@ export function RunBar({
   /** Whose light is shown. */
   junction: string | null;
   history: History | null;
+  /** Plans of the day of that light; fewer than two are not worth a row. */
+  plans: readonly PlanSpan[];
   ttc: EgoTtc;
   /** Seconds between two moments of the recording. */
   spacing: number;
@@ -195,6 +199,25 @@ export function RunBar({
           >
             {bands.length > 0 && <Signals bands={bands} sight={sight} />}
           </Row>
+          {new Set(plans.map(({ plan }) => plan)).size > 1 && (
+            <Row
+              name="plans"
+              label={t`Plan of the day`}
+              note={planAt(plans, time) ?? ""}
+              onChoose={(event) => choose(event, [])}
+            >
+              {plans.map(({ plan, begin: from, end: to }) => (
+                <i
+                  key={from}
+                  className="time-plan"
+                  title={t`${plan}: ${clock(from)} to ${clock(to)}`}
+                  style={{ left: toX(sight, from), width: Math.max(0, toX(sight, to) - toX(sight, from)) }}
+                >
+                  {plan}
+                </i>
+              ))}
+            </Row>
+          )}
           <Row
             name="ttc"
             label={t`Time to collision`}

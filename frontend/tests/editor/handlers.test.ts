@@ -45,6 +45,9 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
   const none = new Set<string>();
   return {
     graph,
+    light: null,
+    program: null,
+    detectors: [],
     picker,
     roi: document.roi,
     ones,

@@ -8,6 +8,7 @@ export const plan: DayPlan = {
   cycle: 40,
   offset: 5,
   times: [6 * 3600],
+  begins: [],
   stages: [
     {
       id: "1",
@@ -75,6 +76,9 @@ export const program = (more: Partial<LightProgram> = {}): LightProgram => ({
   plans: [plan],
   detectors: [],
   turns: [],
+  movements: [],
+  pairs: [],
+  lanes: [],
   site: picture,
   ground: "",
   legend: [{ picture, words: "green" }],

@@ -2,6 +2,7 @@
 import { screen } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
+import type { PlacePick } from "../../src/editor/pick";
 import type { LightProgram } from "../../src/api/signals";
 import type { SignalEditing, Timing } from "../../src/signals/editing";
 import { QueueLanes } from "../../src/signals/queues";
@@ -30,11 +31,21 @@ const timing = (more: Partial<Timing> = {}): Timing => ({
   ...more,
 });
 
+const NOT_PICKING: PlacePick = {
+  now: null,
+  start: vi.fn(),
+  stop: vi.fn(),
+  begin: vi.fn(),
+  taker: { current: vi.fn() },
+};
+
 const editable = (more: Partial<SignalEditing> = {}): SignalEditing => ({
   name: "one",
   timing: timing(),
   control: "fixed",
   edit: vi.fn(() => Promise.resolve(true)),
+  attempt: vi.fn(() => Promise.resolve(null)),
+  pick: NOT_PICKING,
   retime: vi.fn(() => Promise.resolve(true)),
   takeOver: vi.fn(() => Promise.resolve(true)),
   time: vi.fn(() => Promise.resolve({ notes: ["cycle 60 s (was 40 s)"], picture: "" })),
@@ -50,7 +61,7 @@ const panel = (light: LightProgram, editing: SignalEditing, junctions: readonly 
 const turn = { approach: "r1", turn: "left", treatment: "permissive", alone: true } as const;
 
 test("a green is changed in the plan that is shown, and may be taken from the next stage", async () => {
-  const editing = editable({ timing: timing({ plans: [{ id: "day" }] as Timing["plans"] }) });
+  const editing = editable({ timing: timing({ plans: [{ id: "day", times: ["06:00"], offset: 5 }] as Timing["plans"] }) });
   const { user } = show(panel(program(), editing));
   (await screen.findByRole("slider", { name: "Green of stage 1" })).focus();
   await user.keyboard("{ArrowUp}{Enter}");

@@ -86,6 +86,7 @@ function bar(time: number, live = false) {
         incidents={FIRED}
         categories={new Map()}
         junction="j1"
+        plans={[]}
         history={{ times: [0, 30], states: ["Gr", "rG"] }}
         ttc={{ ego: "car-1", points: [{ time: 15, ttc: 2.04, other: "van-2" }], learn: () => undefined }}
         spacing={0.5}
@@ -134,6 +135,7 @@ test("the bar of a run shows less time by its buttons, and what is shown stays i
       incidents={FIRED}
       categories={new Map()}
       junction={null}
+      plans={[]}
       history={null}
       ttc={{ ego: null, points: [], learn: () => undefined }}
       spacing={0.5}

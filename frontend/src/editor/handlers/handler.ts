@@ -4,7 +4,10 @@ import type { Graph, Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
 import type { Picker } from "../../map/picking";
 import type { SceneActor, SceneFlow } from "../../map/scene";
+import type { LightProgram } from "../../api/signals";
+import type { Timing } from "../../signals/editing";
 import type { Heads } from "../../signals/heads";
+import type { LoopPlace } from "../../signals/laneLines";
 import type { Region } from "../asked";
 import type { Changes } from "../changes";
 import type { PlacePick } from "../pick";
@@ -19,7 +22,8 @@ export type Hover =
   | { is: "place"; place: Place; trial?: Trial | undefined }
   | { is: "segment"; row: number }
   | { is: "route"; id: string }
-  | { is: "light"; junction: string };
+  | { is: "light"; junction: string }
+  | ({ is: "loop" } & LoopPlace);
 
 /** What the pointer does on the map now: one for each step of the editor and for each tool. */
 export interface Handler {
@@ -89,6 +93,10 @@ export interface Editing {
   legs: readonly (readonly (readonly [number, number])[])[];
   /** Where the map has traffic lights, once that is known. */
   lights: Heads | null;
+  /** The junction whose traffic light is shown, its program once it is there, and its detectors of the scenario. */
+  light: string | null;
+  program: LightProgram | null;
+  detectors: readonly Timing["detectors"][number][];
   /** Shows the program of the light of a junction. */
   showLight: (junction: string) => void;
   changes: Changes;

@@ -1,4 +1,5 @@
 import type { Step } from "../scene";
+import { withDetectors } from "./detectors";
 import { type Editing, type Handler, LOOKING, type Tool } from "./handler";
 import { withLights } from "./lights";
 import { pickingHandler } from "./picking";
@@ -22,5 +23,5 @@ const OF_STEP: Partial<Record<Step, (editing: Editing) => Handler>> = {
 export function handlerFor(step: Step, tool: Tool | null, editing: Editing): Handler {
   if (editing.pick.now) return pickingHandler(editing);
   const handler = (OF_STEP[step] ?? tool?.handler ?? selectHandler)(editing);
-  return handler.aim ? handler : withLights(handler, editing);
+  return handler.aim ? handler : withDetectors(withLights(handler, editing), editing);
 }

@@ -7,6 +7,7 @@ import type { Place } from "../../map/graph";
 import { laneKey } from "../../map/laneShapes";
 import { laneWord } from "../placeWords";
 import { namedPlace, type PickBy } from "../pick";
+import { loopHover, loopUnder, loopWords } from "./detectors";
 import { type Editing, type Handler, type Hover, LOOKING, placeHover } from "./handler";
 import { segmentAt, segmentHover } from "./segments";
 
@@ -21,6 +22,7 @@ const PROMPT = localized((): Record<PickBy, string> => ({
   turn: t`Click the road that the turn leads from. Escape stops choosing.`,
   point: t`Click the point of a lane. Escape stops choosing.`,
   light: t`Click a traffic light. Escape stops choosing.`,
+  loop: t`Click a lane before the stop line. Escape stops choosing.`,
   node: t`Click a point of a lane inside the region. Escape stops choosing.`,
   goal: t`Click a point of a lane or walkway. Escape stops choosing.`,
   place: t`Click a point of a lane or walkway, or the ground. Escape stops choosing.`,
@@ -41,6 +43,7 @@ export const pickingHandler = (editing: Editing): Handler => {
       if (whole) return segmentHover(editing.picker, at);
       if (by === "goal" || by === "place") return placeHover(anyPlaceAt(editing, at));
       if (by === "ground") return null;
+      if (by === "loop") return loopHover(loopUnder(editing, at));
       return by === "light" ? lightHover(editing, at) : placeHover(laneAt(editing, at, by));
     },
     hint: (hover) => said(editing, by, hover),
@@ -50,6 +53,10 @@ export const pickingHandler = (editing: Editing): Handler => {
         const junction = lights?.junctionAt({ ...at, reach: Math.max(at.reach, LIGHT_REACH) });
         if (junction) take(junction);
         else editing.say(t`There is no traffic light here.`);
+      } else if (by === "loop") {
+        const loop = loopUnder(editing, at);
+        if (loop) take(loop.at, loop.before);
+        else editing.say(t`There is no lane before the stop line of this light here.`);
       } else if (by === "goal" || by === "place" || by === "ground") pickPoint(editing, at, by);
       else {
         const place = laneAt(editing, at, by);
@@ -115,6 +122,7 @@ function laneAt({ graph, picker, roi }: Editing, at: Pointed, by: PickBy): Place
 }
 
 function said({ graph, pick }: Editing, by: PickBy, hover: Hover | null): string {
+  if (hover?.is === "loop") return loopWords(hover);
   if (hover?.is === "light") return t`Traffic light of junction ${hover.junction}`;
   if (hover?.is === "place") return laneWord(graph, hover.place.id);
   const from = pick.now?.from;

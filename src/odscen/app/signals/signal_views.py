@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
 from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError, NotFoundError
+from odscen.scenario.signals.program_design import DesignedProgram
+from odscen.sumo.realize.actuated.detector_places import lane_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
+    from odscen.app.maps import LoadedMap
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.results.records.light_programs import LightProgram
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.scenario.document.signals_document import Signals
+    from odscen.scenario.document.signals_document import JunctionTiming, Signals
+    from odscen.scenario.signals.light import Light
+    from odscen.scenario.signals.program_design import DesignedGroup
     from odscen.workspace.store import Workspace
 
 ProgramOrigin = Literal["scenario", "retimed", "odscen", "netconvert", "file"]
 """Whose a program is: the scenario's own; stages of the map with times, control or priority of the
 scenario; or what a converter made, or the network that was brought in has."""
+
+DETECTABLE = 150.0
+"""Metres before the stop line within which detectors can be placed by pointing."""
 
 
 def program_origin(
@@ -96,3 +104,80 @@ def signal_sheets(
         name = f"{stem}.svg" if f"{stem}.svg" not in found else f"{stem}-{len(found)}.svg"
         found[name] = signal_sheet(light, drawing=drawing, title=scenario.name)
     return found
+
+
+class GroupPair(NamedTuple):
+    """Two signal groups of a program, one of which ends and the other begins.
+
+    Attributes
+    ----------
+    needed, given
+        Seconds of intergreen that their paths need, and that the scenario says; ``None`` if it does
+        not.
+    used
+        Seconds that the program keeps.
+    together
+        Whether both may have green at once: ``free`` if they do not meet, ``yields`` if ``ending``
+        has to give way, ``first`` if ``beginning`` has to, ``never``.
+    """
+
+    ending: str
+    beginning: str
+    needed: float
+    given: float | None
+    used: float
+    together: Literal["free", "yields", "first", "never"]
+
+
+def group_pairs(timing: JunctionTiming, light: Light) -> tuple[GroupPair, ...]:
+    """All ordered pairs of groups of a program that meet, as in the document; else none."""
+    program = DesignedProgram(timing, light, "fixed")
+    given = {row[:2]: row[2] for row in timing.intergreens}
+    found = []
+    for one in program.groups.values():
+        for other in program.groups.values():
+            if one is other:
+                continue
+            needed, _ = program.needed(one.id, other.id)
+            together = _together(light, one, other)
+            if needed or together != "free" or (one.id, other.id) in given:
+                pair = one.id, other.id
+                used = program.intergreen(*pair)
+                found.append(GroupPair(*pair, needed, given.get(pair), used, together))
+    return tuple(found)
+
+
+def _together(
+    light: Light, one: DesignedGroup, other: DesignedGroup
+) -> Literal["free", "yields", "first", "never"]:
+    own = set(one.movements)
+    met = [
+        meeting
+        for i in one.movements
+        for j in other.movements
+        if (meeting := light.met.get((min(i, j), max(i, j)))) is not None
+    ]
+    if any(not meeting.shares or meeting.yields < 0 for meeting in met):
+        return "never"
+    if any(meeting.yields in own for meeting in met):
+        return "yields"
+    return "first" if met else "free"
+
+
+class DetectorLane(NamedTuple):
+    """A lane before a light: its name and that of its approach, and its line to the stop line."""
+
+    at: str
+    approach: str
+    line: tuple[tuple[float, float], ...]
+
+
+def detector_lanes(loaded: LoadedMap, junction: str) -> tuple[DetectorLane, ...]:
+    """Lanes of vehicles before a light, with their last :data:`DETECTABLE` metres."""
+    found = []
+    for light, view in zip(loaded.sumo.lights, loaded.lights, strict=True):
+        if junction in view.names:
+            for n, line in lane_lines(light, loaded.sumo, DETECTABLE).items():
+                one = view.movements[n]
+                found.append(DetectorLane(one.lanes[0], one.approach, line))
+    return tuple(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from odscen.scenario.document.problems import error, warning
@@ -50,6 +51,7 @@ def program_problems(
     for index, plan in enumerate(plans):
         place = f"{where}.plans[{index}]" if timing.plans else where
         yield from _plan_problems(program, plan, place)
+        yield from _group_green_problems(program, plan, where)
     yield from _never_active(plans, where, clock=clock, until=until)
 
 
@@ -208,6 +210,48 @@ def _plan_problems(program: DesignedProgram, plan: TimedPlan, where: str) -> Ite
             "change one of them"
         )
         yield error("cycle_differs", f"{where}.cycle", message)
+
+
+def _group_green_problems(
+    program: DesignedProgram, plan: TimedPlan, where: str
+) -> Iterator[Problem]:
+    """Groups whose green may be over before their own shortest green."""
+    for index, group in enumerate(program.timing.groups):
+        if group.min_green is None:
+            continue
+        shortest = _shortest_green(program, plan.stages, group.id)
+        if shortest is not None and shortest[0] < group.min_green - _SAME:
+            seconds, stages = shortest
+            message = (
+                f"group {group.id!r} may have only {seconds:g} s of green in stage "
+                f"{', '.join(map(repr, stages))}, but its min_green is {group.min_green:g} s; "
+                "give the stage a longer green"
+            )
+            yield error("group_green_too_short", f"{where}.groups[{index}].min_green", message)
+
+
+def _shortest_green(
+    program: DesignedProgram, stages: tuple[PlannedStage, ...], group: str
+) -> tuple[float, tuple[str, ...]] | None:
+    """Least seconds for which a group has green at a time, and the stages in which it has them.
+
+    Stages on call may be left out, but those in which it has no other green.
+    """
+    if all(group in one.groups for one in stages):
+        return None
+    begin = next((n for n, one in enumerate(stages) if group not in one.groups), 0)
+    turned = (*stages[begin:], *stages[:begin])
+    actuated = program.control == "actuated"
+    found: list[tuple[float, tuple[str, ...]]] = []
+    for has, same in groupby(turned, lambda one: group in one.groups):
+        if not has:
+            continue
+        run = list(same)
+        sure = [one for one in run if not one.on_call]
+        for chain in [sure] if sure else [[one] for one in run]:
+            seconds = sum(one.least if actuated else one.green for one in chain)
+            found.append((seconds, tuple(one.id for one in chain)))
+    return min(found, default=None)
 
 
 def _never_active(

@@ -25,13 +25,15 @@ class ProgramGroup(Part):
     ``right``, ``turnaround``), ``r12`` (all of the approach), ``12.0.-1>8.1.-1`` (from lane to
     lane) or ``walk r12`` (the crossings over a leg). ``yellow`` ``None`` follows from the speed
     limit: 3 s up to 50 km/h, 4 s up to 60 km/h, 5 s above. With ``all_red``, what begins after this
-    group waits for yellow and all-red; otherwise as long as the paths need.
+    group waits for yellow and all-red; otherwise as long as the paths need. Whenever it has green,
+    it is to have it for ``min_green`` at least, over as many stages as it takes.
     """
 
     id: Identifier
     movements: Annotated[tuple[Label, ...], Field(min_length=1)]
     yellow: SignalSeconds | None = None
     all_red: SignalSeconds | None = None
+    min_green: SignalSeconds | None = None
 
 
 class ProgramStage(Part):

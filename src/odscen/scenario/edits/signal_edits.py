@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from odscen.base.errors import InputError, NotFoundError
-from odscen.scenario.checks.signal_timing import signal_problems
-from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.signals_document import JunctionTiming, ProgramStage
 from odscen.scenario.edits.edit_registry import edit
 from odscen.scenario.edits.edited_parts import changed_part, with_fields
+from odscen.scenario.edits.edited_timings import own_program, timing_of_light, with_timing
 from odscen.scenario.edits.program_changes import with_green, with_offset, with_stage
 from odscen.scenario.edits.turn_treatment import with_turn
-from odscen.scenario.signals.light import find_light
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,8 +48,8 @@ def set_timing(
     ScenarioError
         If no light is in the junction, or if it cannot be timed so.
     """
-    _, old = _timing(scenario, lights, junction)
-    return _with_timing(scenario, lights, changed_part(old, fields), strict="green" in fields)
+    _, old = timing_of_light(scenario, lights, junction)
+    return with_timing(scenario, lights, changed_part(old, fields), strict="green" in fields)
 
 
 @edit("Timing of light {junction} as in the map")
@@ -106,11 +103,11 @@ def set_green(
     ScenarioError
         If no light is in the junction, or a green is too short or out of the stage's bounds.
     """
-    light, old = _timing(scenario, lights, junction)
+    light, old = timing_of_light(scenario, lights, junction)
     if light is None:
-        return _with_timing(scenario, lights, old)
+        return with_timing(scenario, lights, old)
     new = with_green(old, light, stage=stage, green=green, plan=plan, keep_cycle=keep_cycle)
-    return _with_timing(scenario, lights, new, strict=True)
+    return with_timing(scenario, lights, new, strict=True)
 
 
 @edit("Offset of light {junction}")
@@ -131,8 +128,8 @@ def set_offset(
     ScenarioError
         If no light is in the junction.
     """
-    _, old = _timing(scenario, lights, junction)
-    return _with_timing(scenario, lights, with_offset(old, offset, plan=plan))
+    _, old = timing_of_light(scenario, lights, junction)
+    return with_timing(scenario, lights, with_offset(old, offset, plan=plan))
 
 
 @edit("Stage {stage} in junction {junction}")
@@ -157,8 +154,8 @@ def set_stage(
     if "id" in fields:
         msg = f"stage {stage!r} keeps its id: detectors and plans of the day refer to it"
         raise InputError(msg)
-    _, old = _own(scenario, lights, junction)
-    return _with_timing(scenario, lights, with_stage(old, stage, fields))
+    _, old = own_program(scenario, lights, junction)
+    return with_timing(scenario, lights, with_stage(old, stage, fields))
 
 
 @edit("Turn from {approach}: {treatment}")
@@ -191,51 +188,6 @@ def set_turn(
     ScenarioError
         If greens would conflict.
     """
-    light, old = _own(scenario, lights, junction)
+    light, old = own_program(scenario, lights, junction)
     new = with_turn(old, light, approach=approach, turn=turn, treatment=treatment)
-    return _with_timing(scenario, lights, new)
-
-
-def _timing(
-    scenario: Scenario, lights: Sequence[Light], junction: str
-) -> tuple[Light | None, JunctionTiming]:
-    """The light in a junction, and what the scenario says of it."""
-    light = find_light(lights, junction)
-    names = () if light is None else light.names
-    known = (one for one in scenario.signals.junctions if one.junction in names)
-    return light, next(known, JunctionTiming(junction=junction))
-
-
-def _own(
-    scenario: Scenario, lights: Sequence[Light], junction: str
-) -> tuple[Light, JunctionTiming]:
-    """A light with a program of the scenario's own."""
-    light, timing = _timing(scenario, lights, junction)
-    if light is None or not timing.stages:
-        msg = (
-            f"the light of junction {junction!r} has no program of this scenario; take over that "
-            "of the map first"
-        )
-        raise InputError(msg)
-    return light, timing
-
-
-def _with_timing(
-    scenario: Scenario, lights: Sequence[Light], new: JunctionTiming, *, strict: bool = False
-) -> Scenario:
-    """Put a timing in the place of that of its junction, or at the end.
-
-    ``strict`` if its greens are new: a file may have greens of a former network, but who changes
-    them now gives one for each stage.
-    """
-    timings = scenario.signals.junctions
-    names = [one.junction for one in timings]
-    index = names.index(new.junction) if new.junction in names else len(names)
-    changed = (*timings[:index], new, *timings[index + 1 :])
-    signals = changed_part(scenario.signals, {"junctions": changed})
-    place = f"signals.junctions[{index}].green"
-    refuse_errors(
-        replace(one, severity="error") if strict and one.where == place else one
-        for one in signal_problems(signals, lights)
-    )
-    return with_fields(scenario, signals=signals)
+    return with_timing(scenario, lights, new)

@@ -15,7 +15,12 @@ from odscen.app.signals.green_waves import coordinate_signals
 from odscen.app.signals.program_editing import stretch_cycle, take_over_program
 from odscen.app.signals.signal_optimisation import time_signals
 from odscen.app.signals.signal_plans import export_signals, lights_of, take_signals
-from odscen.app.signals.signal_views import chosen_lights, program_origin
+from odscen.app.signals.signal_views import (
+    chosen_lights,
+    detector_lanes,
+    group_pairs,
+    program_origin,
+)
 from odscen.base.errors import InputError, NotFoundError
 from odscen.results.records.light_programs import programs_from_json, stage_spans
 from odscen.results.report.signals.signal_charts import plan_chart, plan_scale
@@ -28,6 +33,7 @@ from odscen.results.report.signals.stage_diagrams import (
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.edits.turn_treatment import crossing_turns
 from odscen.scenario.signals.light import find_light
+from odscen.scenario.signals.movement_names import shortest_names
 from odscen.scenario.signals.program_design import seconds_of_day
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_calls, read_light_states
@@ -42,8 +48,11 @@ from odscen.web.wire.signal_messages import (
     CycleWish,
     DayPlanInfo,
     DetectorInfo,
+    DetectorLaneInfo,
+    GroupPairInfo,
     LightGroupInfo,
     LightProgramInfo,
+    MovementInfo,
     PhaseInfo,
     PictureKey,
     RunSignals,
@@ -60,6 +69,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.app.maps import LoadedMap
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.results.records.light_programs import LightProgram, ShownPlan
     from odscen.scenario.edits.turn_treatment import TurnTreatment
@@ -82,8 +92,11 @@ def of_scenario(name: str, junction: str, shared: Shared) -> LightProgramInfo:
     lights = lights_of(shared.workspace, scenario, whole_day=True)
     light = chosen_lights(lights, [junction])[0]
     info = _program(light, scenario, shared, {})
-    view = find_light(shared.map_of(scenario).lights, light.junctions[0])
-    return info if view is None else info.model_copy(update={"turns": _turns(light, view)})
+    loaded = shared.map_of(scenario)
+    view = find_light(loaded.lights, light.junctions[0])
+    return (
+        info if view is None else info.model_copy(update=_editable(light, view, scenario, loaded))
+    )
 
 
 @router.post("/scenarios/{name}/signals/{junction}/cycle")
@@ -233,6 +246,9 @@ def _program(
             for one in light.detectors
         ],
         turns=[],
+        movements=[],
+        pairs=[],
+        lanes=[],
         site=str(pictures.site() or ""),
         ground=str(pictures.ground() or ""),
         legend=[
@@ -240,6 +256,44 @@ def _program(
             for shape, words in legend_shapes([light])
         ],
     )
+
+
+def _editable(
+    light: LightProgram, view: Light, scenario: Scenario, loaded: LoadedMap
+) -> dict[str, Any]:
+    """What is needed to change a program: fields of a message that are empty in a run."""
+    timings = scenario.signals.junctions
+    own = next((one for one in timings if one.stages and one.junction in view.names), None)
+    group_of = {n: one.id for one in light.groups for n in one.links}
+    names: dict[str, MovementInfo] = {}
+    for n, one in enumerate(view.movements):
+        if not one.turn:
+            continue
+        # Turns of an approach are told apart; where one leads to several roads, these are.
+        for name in shortest_names(_alike(n, view), view.movements):
+            known = MovementInfo(name=name, walk=one.walk, group=group_of.get(n, ""))
+            names.setdefault(name, known)
+    return {
+        "turns": _turns(light, view),
+        "movements": list(names.values()),
+        "pairs": [
+            GroupPairInfo(**one._asdict()) for one in (group_pairs(own, view) if own else ())
+        ],
+        "lanes": [
+            DetectorLaneInfo(at=one.at, approach=one.approach, line=list(one.line))
+            for one in detector_lanes(loaded, view.names[0])
+        ],
+    }
+
+
+def _alike(movement: int, view: Light) -> set[int]:
+    """Movements that turn as one does, from the same approach into the same road."""
+    one = view.movements[movement]
+    return {
+        n
+        for n, other in enumerate(view.movements)
+        if (other.approach, other.exit, other.turn) == (one.approach, one.exit, one.turn)
+    }
 
 
 def _turns(light: LightProgram, view: Light) -> list[TurnInfo]:
@@ -290,6 +344,7 @@ def _plan(
         cycle=plan.cycle,
         offset=plan.offset,
         times=times,
+        begins=list(plan.begins),
         stages=stages,
         phases=[
             PhaseInfo(seconds=one.seconds, state=one.state, name=one.name, stage=one.stage)

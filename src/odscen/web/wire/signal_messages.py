@@ -43,14 +43,15 @@ class PhaseInfo(Answer):
 class DayPlanInfo(Answer):
     """A plan of the day; ``times`` are seconds of the day at which it begins, none if always.
 
-    ``bars`` is the time bar as SVG, in which the cycle lasts from the first to the second share of
-    the width.
+    ``begins`` are the seconds of a run at which it takes over. ``bars`` is the time bar as SVG, in
+    which the cycle lasts from the first to the second share of the width.
     """
 
     id: str
     cycle: float
     offset: float
     times: list[float]
+    begins: list[float]
     stages: list[StageInfo]
     phases: list[PhaseInfo]
     bars: str
@@ -101,6 +102,38 @@ class TurnInfo(Answer):
     alone: bool
 
 
+class MovementInfo(Answer):
+    """A movement as a group names it, and the group that has it now; empty without one."""
+
+    name: str
+    walk: bool
+    group: str
+
+
+class GroupPairInfo(Answer):
+    """A group that ends and one that begins; seconds of intergreen.
+
+    ``needed`` is what their paths need, ``given`` what the scenario says, ``used`` what is kept.
+    ``together`` says whether both may have green: ``yields`` if ``ending`` gives way, ``first`` if
+    ``beginning`` does.
+    """
+
+    ending: str
+    beginning: str
+    needed: float
+    given: float | None
+    used: float
+    together: Literal["free", "yields", "first", "never"]
+
+
+class DetectorLaneInfo(Answer):
+    """A lane before the light, and its approach; ``line`` leads to the stop line, metres."""
+
+    at: str
+    approach: str
+    line: list[tuple[float, float]]
+
+
 class PictureKey(Answer):
     """A shape of the pictures in 24 by 14 pixels, as SVG, and what it means."""
 
@@ -112,7 +145,9 @@ class LightProgramInfo(Answer):
     """What a light is told to show. ``site`` is the junction with its detectors, as SVG.
 
     ``ground`` is what the pictures of the stages refer to: it has to be in the page with them.
-    ``turns`` are those across oncoming traffic; none in a run.
+    ``turns`` are those across oncoming traffic, ``movements`` all that groups may have, ``pairs``
+    the groups of the scenario's own program that meet, and ``lanes`` where detectors can be placed;
+    none of these in a run.
     """
 
     id: str
@@ -123,6 +158,9 @@ class LightProgramInfo(Answer):
     plans: list[DayPlanInfo]
     detectors: list[DetectorInfo]
     turns: list[TurnInfo]
+    movements: list[MovementInfo]
+    pairs: list[GroupPairInfo]
+    lanes: list[DetectorLaneInfo]
     site: str
     ground: str
     legend: list[PictureKey]

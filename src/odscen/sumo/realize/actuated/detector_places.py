@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from odscen.convert.model.net import CROSSED, UNUSED
 from odscen.results.records.light_programs import ShownDetector
 from odscen.sumo.realize.light_detectors import lane_before
 
@@ -55,6 +56,19 @@ def shown_bus_areas(
         place = _area_place(area.lane, area.length, sumo_map) if stages and admits else ()
         if place:
             yield ShownDetector(area.id, "", stages, place=place, bus=True)
+
+
+def lane_lines(light: SumoLight, sumo_map: SumoMap, metres: float) -> dict[int, _Place]:
+    """Line of the last metres before the stop line, for the first movement of each lane.
+
+    Movements are by their places in the light's states; lanes too short for a node have none.
+    """
+    lanes: dict[str, int] = {}
+    for n, link in enumerate(light.links):
+        if link.turn not in (UNUSED, CROSSED):
+            lanes.setdefault(link.source, n)
+    lines = {n: _area_place(lane, metres, sumo_map) for lane, n in lanes.items()}
+    return {n: line for n, line in lines.items() if line}
 
 
 def _loop_place(loop: PlacedLoop, light: SumoLight, sumo_map: SumoMap) -> _Place:
