@@ -1,9 +1,9 @@
 """The editor in headless Chromium, drawn in software, with 2,000 road users on a town.
 
-Aims: 50 frames a second while the map is panned, zoomed or a road user is dragged; a change of road
-users, region, measures, rules, signals or criteria shown 100 ms after the key or the click that asks
-for it; a region filled with 2,000 in 3 s, with a word on its progress. When a change is saved, and
-the part of the server, is told apart.
+Aims: 50 frames a second while the map is panned, zoomed or a road user is dragged; a change of
+road users, region, measures, rules, signals or criteria shown 100 ms after the key or the click
+that asks for it; a region filled with 2,000 in 3 s, with a word on its progress. When a change is
+saved, and the part of the server, is told apart.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ const watch = () => {
 addEventListener('keydown', watch, true);
 addEventListener('pointerdown', watch, true);
 """
-"""Notes each frame, and how long after a key or a click its change is seen in what is watched for it
-(``odscenShown``), is saved, and whether it is said meanwhile that it is being made."""
+"""Notes each frame, and how long after a key or a click its change is seen in what is watched for
+it (``odscenShown``), is saved, and whether it is said meanwhile that it is being made."""
 
 
 def main() -> None:
@@ -186,7 +186,7 @@ def _changes(user: OdscenPage) -> None:
 
 
 def _changes_of_steps(user: OdscenPage, take_back: Callable[[], object]) -> None:
-    """The same of what the steps hold; what is open of a step, or its heading, tells of the change."""
+    """The same of what the steps hold; the heading of a step, or what is open, tells of it."""
     page = user.page
 
     def opened(step: str, shown: str = ".step-head[aria-expanded=true]") -> None:
@@ -237,11 +237,15 @@ def _changes_of_steps(user: OdscenPage, take_back: Callable[[], object]) -> None
     opened("Run", ".step-body")
     controls = itertools.cycle(("Actuated", "Fixed-time"))
     group = page.get_by_role("radiogroup", name="Signal control")
-    _timed(user, "control of signals", lambda: group.get_by_text(next(controls), exact=True).click())
+
+    def control() -> None:
+        group.get_by_text(next(controls), exact=True).click()
+
+    _timed(user, "control of signals", control)
 
 
 def _filled(user: OdscenPage) -> None:
-    """Seconds from the click that fills the region until all are shown, and what is said meanwhile."""
+    """From the click that fills the region until all are shown, and what is said meanwhile."""
     page = user.page
     user.step("Road users").click()
     page.get_by_role("button", name="Fill the whole region").click()

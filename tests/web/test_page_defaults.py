@@ -1,4 +1,4 @@
-"""What the page takes for granted of a new road user, flow or timing of a light, before the server has answered."""
+"""What the page takes for granted of new parts of a scenario, before the server has answered."""
 
 from __future__ import annotations
 
