@@ -109,7 +109,7 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
       />
       <div style={{ display: "grid", gap: 12, gridTemplateColumns: "1fr 1fr", alignItems: "end" }}>
         {template.numbers.map((one) => {
-          const { sign, shown, told } = shownUnit(one.unit);
+          const { sign, shown, kept } = shownUnit(one.unit);
           const bound = (end: number | null): number | undefined => (end === null ? undefined : shown(end));
           return (
             <NumberInput
@@ -121,7 +121,7 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
               max={bound(one.high)}
               decimalScale={3}
               defaultValue={bound(one.usual) ?? ""}
-              onChange={(value) => change(one.name, typeof value === "number" ? told(value) : value)}
+              onChange={(value) => change(one.name, typeof value === "number" ? kept(value) : value)}
             />
           );
         })}

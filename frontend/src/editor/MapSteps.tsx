@@ -55,7 +55,7 @@ export function RegionStep({
   onBegin: () => void;
   onShow: () => void;
 }) {
-  const { sign, shown, told } = shownUnit("m");
+  const { sign, shown, kept } = shownUnit("m");
   // In the reader's unit, in which 300 m are a round number, too.
   const [distance, setDistance] = useState<number | string>(Number(shown(NEAR).toPrecision(1)));
   const many = (
@@ -71,7 +71,7 @@ export function RegionStep({
           size="compact-sm"
           variant="default"
           disabled={typeof distance !== "number"}
-          onClick={() => onWithin(told(Number(distance)))}
+          onClick={() => onWithin(kept(Number(distance)))}
         >
           <Trans>Take all within</Trans>
         </Button>

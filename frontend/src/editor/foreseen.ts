@@ -2,7 +2,7 @@ import type { Actor, Edit, EditOf, Flow, ScenarioDocument } from "../api/types";
 import { withoutTiming, withStage, withTiming } from "./foreseenSignals";
 import newParts from "./newParts.json";
 import { everyone } from "./placing";
-import { toldRule, waitingFor } from "./rules/toldRule";
+import { shownRule, waitingFor } from "./rules/shownRule";
 
 /** What is not said of a new road user or flow; a test holds it against the server's own defaults. */
 const NEW_ACTOR: Omit<Actor, "id" | "category" | "spawn"> = newParts.actor;
@@ -81,7 +81,7 @@ function afterOne(document: ScenarioDocument, edit: Edit): ScenarioDocument | nu
       return { ...document, measures: document.measures.filter(({ id }) => id !== edit.measure) };
     case "set_rule": {
       const { rule, instead_of } = edit;
-      const rules = withPart(document.rules, toldRule(rule), instead_of);
+      const rules = withPart(document.rules, shownRule(rule), instead_of);
       if (!rules || instead_of == null) return rules && { ...document, rules };
       return { ...document, rules: rules.map((one) => waitingFor(one, instead_of, rule.id)) };
     }

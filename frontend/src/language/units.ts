@@ -37,19 +37,19 @@ export interface ShownUnit {
   sign: string;
   shown: (value: number) => number;
   /** Inverse of `shown`. */
-  told: (shown: number) => number;
+  kept: (shown: number) => number;
 }
 
 /** The reader's unit of what the document has in `unit`, such as `m/s` or `s`. */
 export function shownUnit(unit: string): ShownUnit {
   const quantity: Quantity | null = unit === "m/s" ? "speed" : unit === "m" ? "length" : null;
   const { sign, scale } = quantity ? unitFor(quantity) : { sign: unit, scale: 1 };
-  if (scale === 1) return { sign, shown: (value) => value, told: (shown) => shown };
+  if (scale === 1) return { sign, shown: (value) => value, kept: (shown) => shown };
   // What was typed comes back as it was: 30 km/h are not 30.000000000000004.
   return {
     sign,
     shown: (value) => Number((value * scale).toPrecision(9)),
-    told: (shown) => Number((shown / scale).toPrecision(12)),
+    kept: (shown) => Number((shown / scale).toPrecision(12)),
   };
 }
 

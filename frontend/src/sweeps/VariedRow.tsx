@@ -35,7 +35,7 @@ export function VariedRow({
   onVaried: (varied: Varied) => void;
 }) {
   if (!varied) return null;
-  const { sign, shown, told } = shownUnit(unit);
+  const { sign, shown, kept } = shownUnit(unit);
   const suffix = sign ? ` ${sign}` : "";
   const number = (label: string, key: "low" | "high") => (
     <NumberInput
@@ -44,7 +44,7 @@ export function VariedRow({
       suffix={suffix}
       value={shown(varied[key])}
       onChange={(next) => {
-        if (typeof next === "number") onVaried({ ...varied, [key]: told(next) });
+        if (typeof next === "number") onVaried({ ...varied, [key]: kept(next) });
       }}
     />
   );
@@ -96,7 +96,7 @@ export function VariedRow({
           name={name}
           values={varied.values}
           shown={shown}
-          told={told}
+          kept={kept}
           onValues={(values) => onVaried({ ...varied, values })}
         />
       )}
@@ -110,14 +110,14 @@ function SetInput({
   name,
   values,
   shown,
-  told,
+  kept,
   onValues,
 }: {
   label: string;
   name: string;
   values: string;
   shown: (value: number) => number;
-  told: (shown: number) => number;
+  kept: (shown: number) => number;
   onValues: (values: string) => void;
 }) {
   const [typed, setTyped] = useState(() => setOf(values)?.map(shown).join(", ") ?? values);
@@ -128,7 +128,7 @@ function SetInput({
       value={typed}
       onChange={({ currentTarget: { value } }) => {
         setTyped(value);
-        onValues(setOf(value)?.map(told).join(", ") ?? value);
+        onValues(setOf(value)?.map(kept).join(", ") ?? value);
       }}
     />
   );

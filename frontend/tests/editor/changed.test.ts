@@ -5,7 +5,7 @@ import { patched, reused } from "../../src/editor/documentChanges";
 import { foreseen } from "../../src/editor/foreseen";
 import { createEditorStore } from "../../src/editor/store";
 import { type Draft, draftOf, ruleOf } from "../../src/editor/rules/draft";
-import { toldRule } from "../../src/editor/rules/toldRule";
+import { shownRule } from "../../src/editor/rules/shownRule";
 import { Timeline } from "../../src/editor/timeline";
 import { actor, flow, scenario } from "../example";
 
@@ -149,7 +149,7 @@ test("measures are foreseen: new ones, changed ones, and under another name", ()
 
 test("a rule is foreseen with what it leaves out, and those that wait for it follow its new name", () => {
   const draft = draftOf(
-    toldRule({ id: "first", actor: "a", when: { time: { after: 3 } }, then: [{ brake: { by: 4 } }] }),
+    shownRule({ id: "first", actor: "a", when: { time: { after: 3 } }, then: [{ brake: { by: 4 } }] }),
   );
   const waits: Draft = {
     ...draft,

@@ -104,8 +104,8 @@ test("numbers with a unit of the document are shown in that of the reader, and c
   prefer({ speed: "mph", length: "ft" });
   const [speed, length, time] = ["m/s", "m", "s"].map(shownUnit);
   expect([speed?.sign, length?.sign, time?.sign]).toEqual(["mph", "ft", "s"]);
-  expect(speed?.shown(speed.told(30))).toBe(30);
+  expect(speed?.shown(speed.kept(30))).toBe(30);
   expect(length?.shown(3.048)).toBe(10);
-  expect(length?.told(10)).toBeCloseTo(3.048, 12);
-  expect([time?.shown(2.5), time?.told(2.5)]).toEqual([2.5, 2.5]);
+  expect(length?.kept(10)).toBeCloseTo(3.048, 12);
+  expect([time?.shown(2.5), time?.kept(2.5)]).toEqual([2.5, 2.5]);
 });

@@ -3,13 +3,14 @@ import type { Rule, SentRule } from "./draft";
 type Condition = Rule["when"];
 
 /**
- * A rule as it is sent, as a document tells it until the server has: what it leaves out of conditions
+ * A rule as it is sent, as the document shows it until the server has answered: what it leaves out of conditions
  * is there with its default. Fields that are not given are missing, where a document has null.
  */
-export const toldRule = (rule: SentRule): Rule => ({ times: 1, ...rule, when: told(rule.when) }) as Rule;
+export const shownRule = (rule: SentRule): Rule =>
+  ({ times: 1, ...rule, when: shownWhen(rule.when) }) as Rule;
 
-const told = (when: SentRule["when"]): Condition =>
-  within({ delay: 0, edge: "none", ...when } as Condition, told as (one: Condition) => Condition);
+const shownWhen = (when: SentRule["when"]): Condition =>
+  within({ delay: 0, edge: "none", ...when } as Condition, shownWhen as (one: Condition) => Condition);
 
 /** A rule that waits for the rule `next` wherever it waited for `old`. */
 export function waitingFor(rule: Rule, old: string, next: string): Rule {
