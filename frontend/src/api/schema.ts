@@ -3000,8 +3000,8 @@ export interface components {
          * DayPlanInfo
          * @description A plan of the day; ``times`` are seconds of the day at which it begins, none if always.
          *
-         *     ``begins`` are the seconds of a run at which it takes over. ``bars`` is the time bar as SVG, in which the cycle lasts from the first to the second share of
-         *     the width.
+         *     ``begins`` are the seconds of a run at which it takes over. ``bars`` is the time bar as SVG, in
+         *     which the cycle lasts from the first to the second share of the width.
          */
         DayPlanInfo: {
             /** Id */
