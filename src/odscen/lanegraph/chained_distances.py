@@ -2,8 +2,8 @@
 
 A lane is a chain of nodes two metres apart, each with one edge in and one out. Only where lanes
 begin, end or have another one beside them has a search a choice: it goes from one such node, a
-*fork*, to the next, and what lies between follows from the fork before it. In a town one node in ten
-is a fork.
+*fork*, to the next, and what lies between follows from the fork before it. In a town one node in
+eight is a fork.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class _Chain(NamedTuple):
-    """From fork to fork; ``stop`` is behind its last node in the order of all, ``metres`` its all."""
+    """From fork to fork, ``metres`` long; ``stop`` is behind its last node in the order of all."""
 
     head: int
     end: int
