@@ -190,7 +190,7 @@ def test_of_many_one_outside_the_region_is_refused_by_name(monkeypatch: pytest.M
 def test_distances_along_chains_are_those_over_all_nodes(
     count: int, seed: int, density: float
 ) -> None:
-    """On any graph: with loops, parallel edges, rings that no hub leads to, and dead ends."""
+    """On any graph: with loops, parallel edges, rings that no fork leads to, and dead ends."""
     rng = np.random.default_rng(seed)
     ring_of = np.arange(count // 2)
     rows = np.r_[ring_of, rng.integers(0, count, int(count * density))]

@@ -2,8 +2,8 @@
 
 A lane is a chain of nodes two metres apart, each with one edge in and one out. Only where lanes
 begin, end or have another one beside them has a search a choice: it goes from one such node, a
-*hub*, to the next, and what lies between follows from the hub before it. In a town one node in ten
-is a hub.
+*fork*, to the next, and what lies between follows from the fork before it. In a town one node in
+eight is a fork.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class _Chain(NamedTuple):
-    """From hub to hub; ``stop`` is behind its last node in the order of all, ``metres`` its all."""
+    """From fork to fork, ``metres`` long; ``stop`` is behind its last node in the order of all."""
 
     head: int
     end: int
@@ -47,13 +47,13 @@ class ChainedDistances:
     def __init__(self, matrix: sparse.csr_matrix[np.float64]) -> None:
         self._count = matrix.shape[0]
         self.rounding = 2.0 * self._count * float(np.finfo(np.float64).eps)
-        hubs, nodes, metres, chains = _chains(matrix)
-        self._hubs = np.array(hubs, dtype=np.int32)
+        forks, nodes, metres, chains = _chains(matrix)
+        self._forks = np.array(forks, dtype=np.int32)
         self._nodes = np.array(nodes, dtype=np.int32)
         self._metres = np.array(metres, dtype=np.float64)
         self._chains = chains
         self._number = np.full(self._count, -1, dtype=np.int32)
-        self._number[self._hubs] = np.arange(len(hubs))
+        self._number[self._forks] = np.arange(len(forks))
         self._place = np.full(self._count, -1, dtype=np.int32)
         self._place[self._nodes] = np.arange(len(nodes))
         stops = np.array([chain.stop for chain in chains], dtype=np.int64)
@@ -63,24 +63,24 @@ class ChainedDistances:
         self._head = np.repeat(heads, sizes)
         ends = self._number[[chain.end for chain in chains]]
         lengths = np.array([chain.metres for chain in chains], dtype=np.float64)
-        self._matrix = shortest_edges(len(hubs), heads, ends, lengths)
+        self._matrix = shortest_edges(len(forks), heads, ends, lengths)
 
     def of(self, source: int) -> FloatArray:
         """Metres from ``source`` to every node, shape ``(N,)``; inf where none leads."""
         place = int(self._place[source])
         if place < 0:
-            return self._from_hub(source)
+            return self._from_fork(source)
         chain = self._chains[self._chain[place]]
-        result = self._from_hub(chain.end)
+        result = self._from_fork(chain.end)
         result += chain.metres - self._metres[place]
         ahead = slice(place, chain.stop)
         result[self._nodes[ahead]] = self._metres[ahead] - self._metres[place]
         return result
 
-    def _from_hub(self, hub: int) -> FloatArray:
-        found = csgraph.dijkstra(self._matrix, indices=np.asarray(self._number[hub]))
+    def _from_fork(self, fork: int) -> FloatArray:
+        found = csgraph.dijkstra(self._matrix, indices=np.asarray(self._number[fork]))
         result: FloatArray = np.empty(self._count, dtype=np.float64)
-        result[self._hubs] = found
+        result[self._forks] = found
         result[self._nodes] = found[self._head] + self._metres
         return result
 
@@ -88,29 +88,29 @@ class ChainedDistances:
 def _chains(
     matrix: sparse.csr_matrix[np.float64],
 ) -> tuple[list[int], list[int], list[float], list[_Chain]]:
-    """Hubs; nodes between them in the order of their chains, with metres from the hub; chains."""
+    """Hubs; nodes between them in the order of their chains, with metres from the fork; chains."""
     out = np.diff(matrix.indptr)
     between = (out == 1) & (np.bincount(matrix.indices, minlength=len(out)) == 1)
-    is_hub = (~between).tolist()
+    is_fork = (~between).tolist()
     first, targets, lengths = (a.tolist() for a in (matrix.indptr, matrix.indices, matrix.data))
-    hubs: list[int] = []
+    forks: list[int] = []
     nodes: list[int] = []
     metres: list[float] = []
     chains: list[_Chain] = []
-    seen = [False] * len(is_hub)
-    # What no hub leads to lies on rings, each of which begins at one of its nodes.
-    for hub in (*np.flatnonzero(~between).tolist(), *np.flatnonzero(between).tolist()):
-        if seen[hub]:
+    seen = [False] * len(is_fork)
+    # What no fork leads to lies on rings, each of which begins at one of its nodes.
+    for fork in (*np.flatnonzero(~between).tolist(), *np.flatnonzero(between).tolist()):
+        if seen[fork]:
             continue
-        seen[hub] = is_hub[hub] = True
-        hubs.append(hub)
-        for edge in range(first[hub], first[hub + 1]):
+        seen[fork] = is_fork[fork] = True
+        forks.append(fork)
+        for edge in range(first[fork], first[fork + 1]):
             node, length = targets[edge], lengths[edge]
-            while not is_hub[node]:
+            while not is_fork[node]:
                 seen[node] = True
                 nodes.append(node)
                 metres.append(length)
                 onwards = first[node]
                 node, length = targets[onwards], length + lengths[onwards]
-            chains.append(_Chain(hub, node, len(nodes), length))
-    return hubs, nodes, metres, chains
+            chains.append(_Chain(fork, node, len(nodes), length))
+    return forks, nodes, metres, chains
