@@ -24,7 +24,7 @@ from odscen.convert.model.net import STAGE, Phase
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-FLOW_RATIO = 0.40
+FLOW_RATIO = 0.45
 """Sum of the critical flow ratios (Webster's Y) that programs are made for.
 
 Moderate traffic: a cycle for saturated roads would let everybody wait long on all others.
