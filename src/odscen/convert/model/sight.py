@@ -41,7 +41,8 @@ def sight_before(
 ) -> float | None:
     """Metres before the line from which one sees whom to let go; ``None``: as SUMO has it.
 
-    ``room``: it makes room for those who merge (:func:`making_room`).
+    ``room``: it makes room for those who merge
+    (:func:`odscen.convert.model.right_of_way.making_room`).
     """
     roads = {movements[n].source[0] for n in right.yields_to if n < len(movements)}
     if movement.sign is Sign.STOP or not roads:
