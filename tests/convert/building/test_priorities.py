@@ -51,12 +51,12 @@ def test_at_a_yield_sign_one_sees_others_late_and_who_only_merges_earlier() -> N
     assert {entries["5.0.f", "l"], entries["5.0.f", "r"]} == {None}
 
 
-def test_who_gives_way_without_a_sign_sees_others_10_m_before() -> None:
-    assert seen_from("t_junction_signs")["1.0.b", "l"] == "10"
+def test_who_gives_way_without_a_sign_sees_others_45_m_before_at_50_kmh() -> None:
+    assert seen_from("t_junction_signs")["1.0.b", "l"] == "45"
     crossing = of_model(parse(named("signal_crossing").read_bytes())).xml
     links = [link for link in crossing.iter("connection") if link.get("via")]
     waiting = [link for link in links if link.get("from", "").startswith(":")]
-    assert [link.get("visibility") for link in waiting] == ["10"] * 4
+    assert [link.get("visibility") for link in waiting] == ["45"] * 4
     assert {link.get("visibility") for link in links if link.get("state") == "O"} == {None}
 
 

@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
 
 import numpy as np
+import pytest
 import shapely
 import sumo
 
@@ -145,11 +146,19 @@ def pairs_on_town07(
     return counts
 
 
-def test_two_who_turn_past_each_other_never_touch(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lit", [False, True], ids=["lights off", "green together"])
+def test_two_who_turn_past_each_other_never_touch(tmp_path: Path, lit: bool) -> None:
     """80 pairs that arrive from 4 s before to 4 s after each other; 13 of them touched."""
     delays = [-4.0 + 0.1 * n for n in range(80)]
     turns = ("car", "45.0.b 0.0.f"), ("car", "44.0.f 55.0.f")
-    assert pairs_on_town07(tmp_path, *turns, *delays, lit=False)["safety"]["collisions"] == "0"
+    assert pairs_on_town07(tmp_path, *turns, *delays, lit=lit)["safety"]["collisions"] == "0"
+
+
+def test_opposing_turns_beside_each_other_share_a_stage_where_one_waits_for_the_other() -> None:
+    light = converted(named("carla-2020/Town07")).xml.find("tlLogic[@id='J68']")
+    assert light is not None
+    stages = [one.get("state", "") for one in light if one.get("name", "").startswith("stage")]
+    assert stages == ["gGGrrrrrrGGg", "rrrGGggGGrrr"]
 
 
 def test_nobody_enters_a_junction_so_far_that_the_flank_of_a_bus_touches_it(tmp_path: Path) -> None:

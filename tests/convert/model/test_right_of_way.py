@@ -19,9 +19,9 @@ from odscen.convert.model.right_of_way import (
     in_turn,
     making_room,
     requests,
-    sight_before,
     wrapped,
 )
+from odscen.convert.model.sight import sight_before, sight_without_sign
 
 RIGHT = Rules()
 LEFT = Rules(lefthand=True)
@@ -157,6 +157,14 @@ def test_a_motorway_makes_room_for_an_equally_fast_ramp_as_it_has_lanes_beside()
     rights = requests(listed, found, Rules())
     assert [right.yields_to for right in rights] == [{2}, frozenset(), frozenset()]
     assert sight_before(road, rights[0], listed, room=True) == 100.0
+
+
+def test_without_a_sign_one_sees_others_from_where_one_can_stop_for_them_in_comfort() -> None:
+    """AASHTO's legs of sight triangles; a car stops with 4.5 m/s2, SUMO's least anticipation."""
+    assert [sight_without_sign(kmh / 3.6) for kmh in (10.0, 30.0, 50.0, 75.0)] == [20, 25, 45, 70]
+    for kmh in range(20, 135, 5):
+        speed = kmh / 3.6
+        assert sight_without_sign(speed) > speed**2 / (2.0 * 4.5)
 
 
 def test_nobody_goes_in_turn_where_lanes_cross_or_somebody_must_wait() -> None:

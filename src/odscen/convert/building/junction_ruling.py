@@ -12,8 +12,8 @@ from odscen.convert.model.right_of_way import (
     in_turn,
     making_room,
     requests,
-    sight_before,
 )
+from odscen.convert.model.sight import sight_before
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

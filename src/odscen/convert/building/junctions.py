@@ -22,17 +22,19 @@ from odscen.convert.model.net import (
     TrafficLight,
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
-from odscen.convert.model.right_of_way import SIGHT_WITHOUT_SIGN, Sign
+from odscen.convert.model.right_of_way import Sign
+from odscen.convert.model.sight import sight_without_sign
 from odscen.convert.signals.light_links import direction, light_links, nearer_edge
 from odscen.convert.signals.shared_green import LightLinks, light_stages, link_conflicts
 from odscen.convert.signals.signal_programs import program
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from collections.abc import Set as AbstractSet
 
     from odscen.base.arrays import FloatArray
     from odscen.base.ids import SumoLaneId
-    from odscen.convert.model.net import Request
+    from odscen.convert.building.junction_ruling import Ruling
     from odscen.convert.model.right_of_way import Conflicts, Movement
     from odscen.convert.model.walk_net import PlacedCrossing
 
@@ -134,9 +136,6 @@ def build_junction(
         signalled=signalled,
     )
     movements, conflicts, rights = ruling.movements, ruling.conflicts, ruling.rights
-    light, rows = None, dict[int, int]()
-    if signalled:
-        light, rows = _light(name, passages, conflicts, rights, crossings, around)
     places = waiting_places(
         movements,
         walkways,
@@ -145,6 +144,9 @@ def build_junction(
         side=-1.0 if around.lefthand else 1.0,
         lit=signalled,
     )
+    light, rows = None, dict[int, int]()
+    if signalled:
+        light, rows = _light(name, passages, ruling, crossings, around, places.keys())
     inside = _Inside(name, passages, signposts(ruling, rows), rows, places)
     walked, walk_links = _crossings(name, passages, crossings, conflicts, rows, len(passages))
     starts = [lane_id(crossing.start) for crossing in crossings]
@@ -259,7 +261,7 @@ class _Inside:
             self.edges.append(NetEdge(inner, INTERNAL, (lane,)))
             link = NetLink(inner, target, 0, target_lane, direction=turn)
             if after:
-                seen = None if movement.sign else SIGHT_WITHOUT_SIGN
+                seen = None if movement.sign else sight_without_sign(movement.speed)
                 link = replace(link, via=after.id, state="m", visibility=seen)
             self.links.append(link)
 
@@ -305,10 +307,10 @@ def _crossings(
 def _light(
     name: str,
     passages: Sequence[Passage],
-    conflicts: Conflicts,
-    rights: Sequence[Request],
+    ruling: Ruling,
     crossings: Sequence[PlacedCrossing],
     around: Surroundings,
+    waiting: AbstractSet[int],
 ) -> tuple[TrafficLight, dict[int, int]]:
     """Traffic light of a junction, and the row in it of each link that it rules."""
     controlled = [n for n, passage in enumerate(passages) if passage.lights]
@@ -322,15 +324,16 @@ def _light(
         signals=[passage.lights for passage in passages],
         controllers=[around.controllers.get(p.lights[0], "") if p.lights else "" for p in passages],
         bicycles=["passenger" not in p.allowed and "bicycle" in p.allowed for p in passages],
-        conflicts=conflicts,
-        rights=rights,
+        conflicts=ruling.conflicts,
+        rights=ruling.rights,
         side=-1.0 if around.lefthand else 1.0,
+        waiting=waiting,
     )
     light = TrafficLight(
         name,
         program(light_stages(links, rows), len(rows)),
         signals=tuple(passages[n].lights if n < count else () for n in rows),
-        links=light_links(rows, links.movements, crossings, conflicts.crossed),
+        links=light_links(rows, links.movements, crossings, ruling.conflicts.crossed),
         conflicts=link_conflicts(links, rows),
     )
     return light, rows

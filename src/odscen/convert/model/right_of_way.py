@@ -57,29 +57,6 @@ _FASTER = 2.0
 _BESIDE = math.radians(75.0)
 """Difference of headings up to which two roads run into each other rather than meet."""
 
-SIGHT_BOTH_WAYS, SIGHT_ONE_WAY = 0.3, 1.25
-"""Metres before a yield line from which one sees whom to let go: on two roads, and on one.
-
-Calibrated: those who find nobody follow each other in 3.0 s, and in 2.5 s where they only merge,
-as into a roundabout. The Highway Capacity Manual (7th edition, chapters 20 and 22) has 3.5 s at a
-sign and 2.6 s at a roundabout; from SUMO's 4.5 m one passes the sign at 8 m/s, in 2.1 s.
-"""
-
-
-SIGHT_WITHOUT_SIGN = 10.0
-"""Metres before a line without a sign, or a waiting place, from which one sees whom to let go.
-
-From there a car that brakes comfortably stops at the line from 9.5 m/s, so that who finds nobody
-turns without slowing down for the sight; from SUMO's 4.5 m it would be 6.4 m/s.
-"""
-
-
-SIGHT_MAKING_ROOM = 100.0
-"""Metres before a merge from which drivers who make room see the others, as SUMO's zipper has it.
-
-Enough to stop from 30 m/s, so that nobody slows down on a motorway for a ramp that is empty.
-"""
-
 
 class Sign(IntEnum):
     """What makes an approach wait; more has less right."""
@@ -387,18 +364,3 @@ def _waits_by_place(one: Movement, other: Movement, rules: Rules, side: float) -
     if 0.05 < abs(angle) <= OPPOSING:
         return angle > 0.0
     return (one.source, one.target) > (other.source, other.target)
-
-
-def sight_before(
-    movement: Movement, right: Request, movements: Sequence[Movement], *, room: bool
-) -> float | None:
-    """Metres before the line from which one sees whom to let go; ``None``: as SUMO has it.
-
-    ``room``: it makes room for those who merge (:func:`making_room`).
-    """
-    roads = {movements[n].source[0] for n in right.yields_to if n < len(movements)}
-    if movement.sign is Sign.STOP or not roads:
-        return None
-    if movement.sign is Sign.NONE:
-        return SIGHT_MAKING_ROOM if room else SIGHT_WITHOUT_SIGN
-    return SIGHT_BOTH_WAYS if len(roads) > 1 else SIGHT_ONE_WAY

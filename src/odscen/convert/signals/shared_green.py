@@ -5,13 +5,15 @@ only as drivers expect it (RiLSA 2015, section 2.3; HCM 7th edition, chapter 19)
 
 - a turn across oncoming traffic, unless that has three lanes or more that go on, or is faster than
   70 km/h, or two lanes or more make the turn: then the turn is protected;
-- opposing turns whose paths cross, so that SUMO sees who is inside; not if they only pass beside
-  each other, nearer than a vehicle is wide;
+- opposing turns; if they only pass beside
+  each other, nearer than a vehicle is wide, so that their paths do not cross, only where the one
+  that gives way waits inside: there alone SUMO sees who is on such a path;
 - a turn over a crossing at its far end, with those who walk in parallel;
 - a turn over the path of others from the same approach, as of bicycles beside it.
 
 Clearing times (RiLSA 2015, section 2.5): all-red lasts until the last vehicle has passed the place
-where the paths meet, less what the first one from the other stop line needs to get there.
+where the paths meet, less what the first one from the other stop line needs to get there. Who waits
+inside for oncoming traffic moves off as the last of it has passed; crossing traffic starts later.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ from odscen.convert.signals.signal_programs import GroupConflicts, SignalGroup, 
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from collections.abc import Set as AbstractSet
 
     from odscen.convert.model.net import Request
     from odscen.convert.model.right_of_way import Conflicts, Movement, Walkway
@@ -59,6 +62,9 @@ ENTERING_WALKER = 1.5
 VEHICLE = 6.0
 """Metres of a vehicle that must have left."""
 
+LAST_IN = 0.5
+"""Seconds before the end of yellow after which none of those who go straight on enters."""
+
 TURNING_HEAD_START, BICYCLE_HEAD_START = 1.0, 2.0
 """Seconds of yellow in which no more of those who turn, or of bicycles, cross the stop line."""
 
@@ -84,6 +90,8 @@ class LightLinks(NamedTuple):
         Right of way of all links.
     side
         1 where traffic keeps right, -1 where it keeps left.
+    waiting
+        Movements that wait inside the junction for those whom they give way to.
     """
 
     movements: Sequence[Movement]
@@ -94,6 +102,7 @@ class LightLinks(NamedTuple):
     conflicts: Conflicts
     rights: Sequence[Request]
     side: float
+    waiting: AbstractSet[int] = frozenset()
 
 
 def light_stages(links: LightLinks, rows: dict[int, int]) -> Stages:
@@ -215,7 +224,7 @@ class _Sharing:
             if (i, j) in self._never and a != b:
                 apart.add((min(a, b), max(a, b)))
             for (one, link), (other, link2) in (((a, i), (b, j)), ((b, j), (a, i))):
-                seconds = self._clearing(link, link2)
+                seconds = max(self._clearing(link, link2), self._released(link, link2))
                 clearing[one, other] = max(clearing.get((one, other), 0.0), seconds)
         yielding = frozenset(
             (rows[i], rows[j])
@@ -249,9 +258,12 @@ class _Sharing:
         if {movements[n].source for n in (i, j) if self._across(n)} & self._protected:
             return False
         if not self._lines[i].intersects(self._lines[j]) and self._across(i) and self._across(j):
-            # SUMO sees no vehicle inside on a path that only passes beside: both would go.
-            return False
+            return self._sees_until_out(i, j) or self._sees_until_out(j, i)
         return bool(turning)
+
+    def _sees_until_out(self, i: int, j: int) -> bool:
+        """Whether who makes the first movement waits inside until the other has left."""
+        return i in self._links.waiting and j in self._links.rights[i].yields_to
 
     def _at_far_end(self, link: int, crossing: int) -> bool:
         line, area = self._lines[link], self._areas[crossing - self._count]
@@ -308,12 +320,30 @@ class _Sharing:
             seconds = self._left(ending, last) - min(ways) / ENTERING_WALKER
         return min(max(float(math.ceil(seconds)), 1.0), MOST_RED)
 
+    def _released(self, ending: int, beginning: int) -> float:
+        """Whole seconds from yellow's end until who waits inside has oncoming traffic behind it.
+
+        In SUMO neither of two vehicles that enter their paths at one instant brakes for the other.
+        """
+        if ending not in self._links.waiting or beginning >= self._count:
+            return 0.0
+        seconds = [
+            self._left(other, self._lines[other].project(place)) - LAST_IN
+            for other in self._links.rights[ending].yields_to
+            if other < self._count and self._goes_on(other) and self._may_share(ending, other)
+            for place in _meeting_places(self._lines[other], self._lines[ending])
+        ]
+        return min(float(math.ceil(max(seconds, default=0.0))), MOST_RED)
+
+    def _goes_on(self, link: int) -> bool:
+        return abs(self._links.movements[link].turn) < TURN
+
     def _left(self, ending: int, way: float) -> float:
         """Seconds from the end of yellow until the last vehicle has left a place on its path."""
         if self._links.bicycles[ending]:
             return way / BICYCLE_SPEED - BICYCLE_HEAD_START
         movement = self._links.movements[ending]
-        straight = abs(movement.turn) < TURN
+        straight = self._goes_on(ending)
         pace = STRAIGHT_SPEED if straight else TURNING_SPEED
         start = 0.0 if straight else TURNING_HEAD_START
         return (way + VEHICLE) / min(max(movement.speed, 3.0), pace) - start
