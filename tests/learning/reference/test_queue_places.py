@@ -7,6 +7,7 @@ import numpy as np
 from odscen.learning.reference.gap_states import gap_states
 from odscen.learning.reference.queue_places import (
     AT_LINE,
+    LONG,
     OCCUPIED_MORE,
     PLACES,
     STOPPED_MORE,
@@ -28,11 +29,11 @@ def light(state: SignalAhead) -> LightView:
     return lights
 
 
-def kinds(state: SignalAhead, speed: float | None = None) -> list[int]:
-    """Of the nodes of the approach, with or without a car on its last node."""
-    some = np.array([ON_IT[-1]] if speed is not None else [], dtype=np.int64)
-    none = np.zeros(len(some), dtype=np.int64)
-    states = gap_states(SITE.strips, node=some, category=none, speed=np.full(len(some), speed or 0))
+def kinds(state: SignalAhead, *, speed: float = 0.0, cars: int = 0) -> list[int]:
+    """Of the nodes of the approach, with so many cars behind each other from its last node on."""
+    some = ON_IT[::-1][: 3 * cars : 3]
+    none = np.zeros(cars, dtype=np.int64)
+    states = gap_states(SITE.strips, node=some, category=none, speed=np.full(cars, speed))
     return queue_places(SITE, light(state), states, ON_IT).tolist()
 
 
@@ -43,12 +44,18 @@ def test_the_first_of_a_queue_stands_at_the_stop_line() -> None:
 
 
 def test_a_queue_grows_right_behind_a_stopped_vehicle_alone() -> None:
-    behind = np.array(kinds(SignalAhead.RED, speed=0.0))[:-1]
+    behind = np.array(kinds(SignalAhead.RED, cars=1))[:-1]
     assert behind[-1] == 6
     assert 3 <= (behind == 6).sum() <= 6  # nodes every two metres, nine metres and half a car
     assert set(behind.tolist()) == {0, 6}
-    assert 4 <= kinds(SignalAhead.NONE, speed=0.0)[-2] < 5
-    assert set(kinds(SignalAhead.RED, speed=5.0)[:-1]) == {0}
+    assert kinds(SignalAhead.NONE, cars=1)[-2] == 4
+    assert set(kinds(SignalAhead.RED, cars=1, speed=5.0)[:-1]) == {0}
+
+
+def test_a_long_queue_is_another_kind_of_place_than_a_short_one() -> None:
+    for cars, kind in ((LONG - 1, 6), (LONG, 9)):
+        last = len(ON_IT) - 1 - 3 * (cars - 1)  # of the node of the last car
+        assert kinds(SignalAhead.RED, cars=cars)[last - 1] == kind
 
 
 def test_there_is_a_correction_for_each_kind_and_none_elsewhere() -> None:
