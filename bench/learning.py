@@ -59,6 +59,7 @@ def main() -> None:
     options.add_argument("--first", type=int, default=0, help="seed to begin with")
     options.add_argument("--fold", type=int, help="only this one")
     options.add_argument("--most", type=int, default=12, help="fills of each map")
+    options.add_argument("--draws", type=int, default=40, help="of the bootstrap, for intervals")
     options.add_argument("--varied", action="store_true", help="hold out varied towns instead")
     options.add_argument("--least", type=float, default=0.0, help="mean vehicles of a map")
     options.add_argument("--no-run", action="store_true", help="without hard braking")
@@ -127,7 +128,7 @@ def _measure(workspace: Workspace, data: Path, given: argparse.Namespace) -> Non
                 model=model,
                 seed=seed,
                 most=given.most,
-                draws=0,
+                draws=given.draws,
                 run=not given.no_run,
                 baselines=seed == 0,
             ):

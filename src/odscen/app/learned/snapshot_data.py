@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from odscen.app.learned.steady_traffic import most_stopped, stopped_growth
 from odscen.app.maps import load_map
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
@@ -25,7 +26,6 @@ from odscen.base.version import __version__
 from odscen.learning.reference.gap_states import seen_ahead
 from odscen.learning.reference.road_strips import road_strips
 from odscen.learning.traffic_snapshots import (
-    STOPPED,
     Shard,
     Snapshot,
     shard_bytes,
@@ -61,8 +61,6 @@ SKIPPED = ".skipped.json"
 OFF_NODE = 2.5
 """Metres from the centre of a body to a node; vehicles farther from any are left out."""
 BRAKING_SECONDS = 2.0
-_FEW = 30
-"""Vehicles."""
 ATTEMPTS = 3
 """Runs that are tried until one does not gridlock, each with half the traffic of the last."""
 _HEADING = 4.0
@@ -86,8 +84,12 @@ class DataSettings:
     snapshots
         Of each run.
     stopped_most
-        Share of stopped vehicles in a snapshot above which its run counts as gridlocked; a jam
-        that grows is none of traffic's ordinary states.
+        Share of stopped vehicles in a snapshot above which its run counts as gridlocked.
+    growth_most
+        Traffic to learn from is in a steady state: from the first half of the time after the
+        warm-up to the second the share of stopped vehicles rises by this at most, as else a
+        snapshot tells more of when it was taken than of the traffic. As much as generated
+        traffic may differ from SUMO's in this share.
     """
 
     runs: int = 6
@@ -97,6 +99,7 @@ class DataSettings:
     duration: float = 300.0
     snapshots: int = 4
     stopped_most: float = 0.5
+    growth_most: float = 0.1
 
     def __post_init__(self) -> None:
         low, high = self.density
@@ -272,23 +275,20 @@ def _judged(
         return f"gridlocked: {bad[0]}", ()
     if run.counts["teleported"] > 0.02 * max(run.counts["inserted"], 1):
         return f"{run.counts['teleported']} vehicles were teleported", ()
+    growth = stopped_growth(
+        _vehicles_of(run), start=settings.warm_up, middle=(settings.warm_up + settings.duration) / 2
+    )
+    if growth > settings.growth_most:
+        return f"a jam grows: {growth:.0%} more of the vehicles are stopped in the second half", ()
     rng = stream(seed, "snapshot times")
     span = settings.duration - settings.warm_up - BRAKING_SECONDS - 0.5
     each = span / settings.snapshots
     times = settings.warm_up + each * (np.arange(settings.snapshots) + rng.random())
     snapshots = snapshots_of(run, loaded, [round(float(2 * one)) / 2 for one in times])
-    stopped = _stopped(snapshots)
+    stopped = most_stopped(snapshots)
     if stopped > settings.stopped_most:
         return f"gridlocked: {stopped:.0%} of the vehicles are stopped", ()
     return None, snapshots
-
-
-def _stopped(snapshots: Sequence[Snapshot]) -> float:
-    """Largest share of stopped vehicles; snapshots of few count together: a light stops them."""
-    few = [one.speed for one in snapshots if len(one.speed) < _FEW]
-    many = [one.speed for one in snapshots if len(one.speed) >= _FEW]
-    groups = [*many, np.concatenate([np.empty(0), *few])]
-    return max((float(np.mean(one < STOPPED)) for one in groups if len(one)), default=0.0)
 
 
 def snapshots_of(run: Run, loaded: LoadedMap, times: Sequence[float]) -> tuple[Snapshot, ...]:
@@ -304,12 +304,17 @@ def snapshots_of(run: Run, loaded: LoadedMap, times: Sequence[float]) -> tuple[S
     InputError
         If no trajectories were recorded.
     """
-    import polars as pl
-
-    rows = run.trajectories().filter(pl.col("category") != str(Category.PEDESTRIAN))
+    rows = _vehicles_of(run)
     logs = _light_logs(run)
     tree = _tree(loaded)
     return tuple(_snapshot(rows, one, tree, lights_at(loaded.sumo, logs, one)) for one in times)
+
+
+def _vehicles_of(run: Run) -> pl.DataFrame:
+    """Trajectories without pedestrians."""
+    import polars as pl
+
+    return run.trajectories().filter(pl.col("category") != str(Category.PEDESTRIAN))
 
 
 def _tree(loaded: LoadedMap) -> Any:

@@ -12,6 +12,7 @@ from odscen.base.categories import Category
 from odscen.learning.fill import VEHICLES, Fill
 from odscen.learning.reference.gap_states import GapStates
 from odscen.learning.reference.onward_goals import NO_GOAL, onward_goals
+from odscen.learning.reference.queue_places import OCCUPIED_MORE, STOPPED_MORE, queue_places
 from odscen.learning.reference.site_features import (
     junction_columns,
     light_columns,
@@ -196,7 +197,8 @@ class _Draw(NamedTuple):
             if not len(free):
                 continue
             x = np.column_stack([fixed[free], traffic_columns(site, states, free)])
-            chance = logistic(self.model.occupied(x)[:, 0] + bias)
+            place = queue_places(site, self.lights, states, free)
+            chance = logistic(self.model.occupied(x)[:, 0] + bias + OCCUPIED_MORE[place])
             hit = np.flatnonzero(rng.random(len(free)) < chance)
             if len(hit):
                 placed = self._vehicles(free[hit], x[hit], states, rng)
@@ -218,7 +220,9 @@ class _Draw(NamedTuple):
         nodes, x, limit, shares = nodes[some], x[some], limit[some], shares[some]
         category = _drawn(shares, rng)
         most = np.minimum(self._stoppable(nodes, category), self._safe(nodes, category, states))
-        odds = _sharpened(softmax(self.model.speed(with_category(x, category))))
+        logits = self.model.speed(with_category(x, category)).astype(np.float64)
+        logits[:, 0] += STOPPED_MORE[queue_places(self.site, self.lights, states, nodes)]
+        odds = _sharpened(softmax(logits))
         # Those who would be too fast are none of the slower ones at the limit of what is safe.
         odds = np.where(least_speeds(limit) < most[:, None], odds, 0.0)
         odds[:, 0] = np.maximum(odds[:, 0], 1e-9)

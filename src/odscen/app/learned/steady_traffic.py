@@ -1,0 +1,40 @@
+"""Whether the traffic of a run is in a steady state: what is learned from has to be."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.learning.traffic_snapshots import STOPPED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import polars as pl
+
+    from odscen.learning.traffic_snapshots import Snapshot
+
+FEW = 30
+"""Vehicles, of which one light may stop most."""
+
+
+def stopped_growth(rows: pl.DataFrame, *, start: float, middle: float) -> float:
+    """How much the share of stopped vehicles rises: after ``middle``, from ``start`` until then.
+
+    ``rows`` are trajectories of vehicles. 0 for fewer vehicles than :data:`FEW` in the mean.
+    """
+    rows = rows.filter(rows["time"] >= start)
+    late = rows["time"].to_numpy() >= middle
+    stands = rows["speed"].to_numpy() < STOPPED
+    if late.all() or not late.any() or len(rows) < FEW * rows["time"].n_unique():
+        return 0.0
+    return float(stands[late].mean() - stands[~late].mean())
+
+
+def most_stopped(snapshots: Sequence[Snapshot]) -> float:
+    """Largest share of stopped vehicles; snapshots of few count together."""
+    few = [one.speed for one in snapshots if len(one.speed) < FEW]
+    many = [one.speed for one in snapshots if len(one.speed) >= FEW]
+    groups = [*many, np.concatenate([np.empty(0), *few])]
+    return max((float(np.mean(one < STOPPED)) for one in groups if len(one)), default=0.0)
