@@ -61,7 +61,9 @@ const panel = (light: LightProgram, editing: SignalEditing, junctions: readonly 
 const turn = { approach: "r1", turn: "left", treatment: "permissive", alone: true } as const;
 
 test("a green is changed in the plan that is shown, and may be taken from the next stage", async () => {
-  const editing = editable({ timing: timing({ plans: [{ id: "day", times: ["06:00"], offset: 5 }] as Timing["plans"] }) });
+  const editing = editable({
+    timing: timing({ plans: [{ id: "day", times: ["06:00"], offset: 5 }] as Timing["plans"] }),
+  });
   const { user } = show(panel(program(), editing));
   (await screen.findByRole("slider", { name: "Green of stage 1" })).focus();
   await user.keyboard("{ArrowUp}{Enter}");
