@@ -52,8 +52,8 @@ def test_a_template_is_placed_by_keyboard_and_says_why_it_has_no_room(
     page.keyboard.press("Enter")
     alert = dialog.get_by_role("alert")
     expect(alert).to_contain_text("has no room for a cut-in", timeout=PATIENCE)
-    for name, value in (("ego speed", "8"), ("speed", "4")):
-        number = dialog.get_by_role("textbox", name=f"{name} (m/s)", exact=True)
+    for name, value in (("ego speed", "28.8"), ("speed", "14.4")):
+        number = dialog.get_by_role("textbox", name=f"{name} (km/h)", exact=True)
         number.focus()
         page.keyboard.press("Control+a")
         page.keyboard.type(value)

@@ -2,7 +2,7 @@ import { i18n, type Messages } from "@lingui/core";
 import { compileMessage } from "@lingui/message-utils/compileMessage";
 
 import { type Language, LANGUAGES, usePreferences } from "./preferences";
-import { serveSentences } from "./served";
+import { serveSentences, whenServed } from "./served";
 
 /** The catalogues, each loaded when its language is first chosen; English texts come with the code. */
 const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
@@ -10,7 +10,7 @@ const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
   de: () => import("../locales/de.po"),
 };
 
-/** Those of the sentences of the server, which are loaded after the page; as it sends them, they are English. */
+/** Those of the sentences of the server, which are loaded when the first is shown; as it sends them, they are English. */
 const SENTENCES: Record<Language, (() => Promise<{ messages: Messages }>) | null> = {
   en: null,
   de: () => import("../locales/server/de.po"),
@@ -31,10 +31,10 @@ async function speak(language: Language): Promise<void> {
   // Another may have been chosen meanwhile.
   if (usePreferences.getState().language !== language) return;
   serveSentences(null);
+  // Where it cannot be had, sentences stay as the server says them.
+  whenServed(SENTENCES[language] && (() => void speakForServer(language).catch(() => undefined)));
   i18n.loadAndActivate({ locale: language, messages });
   document.documentElement.lang = language;
-  // Where it cannot be had, sentences stay as the server says them.
-  speakForServer(language).catch(() => undefined);
 }
 
 /** Has what the server says in a language, too. */

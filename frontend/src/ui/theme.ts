@@ -1,4 +1,4 @@
-import { createTheme, type CSSVariablesResolver, Modal, ModalHeader, NumberInput } from "@mantine/core";
+import { createTheme, type CSSVariablesResolver, Loader, Modal, ModalHeader, NumberInput } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 
 import { localized } from "../language/localized";
@@ -15,6 +15,8 @@ export const theme = localized(() =>
     // Folds and dialogues of the library move by script, which the style sheet cannot stop.
     respectReducedMotion: true,
     components: {
+      // Without a role its label is not read.
+      Loader: Loader.extend({ defaultProps: { role: "status" } }),
       Modal: Modal.extend({ defaultProps: { closeButtonProps: { "aria-label": t`Close` } } }),
       // A window's head is not a second head of the page.
       ModalHeader: ModalHeader.extend({ defaultProps: { role: "presentation" } }),
