@@ -30,6 +30,7 @@ SCENES: dict[str, Scene] = {
         task_scenes.measures,
         task_scenes.rules,
         task_scenes.signals,
+        task_scenes.signal_parts,
         run_scenes.results,
         run_scenes.time_of_a_run,
         run_scenes.interrupted,

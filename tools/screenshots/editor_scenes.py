@@ -13,8 +13,8 @@ from tools.screenshots.camera import Studio
 
 PATIENCE = 300_000
 """Milliseconds that something that is computed may take on a busy machine."""
-CROSSING = (0.0, 0.0)
-"""Middle of the crossing, metres."""
+CROSSING = (0.0, 30.0)
+"""North of the middle of the crossing, metres."""
 NARROW, TALL = 390, 844
 """Pixels of a telephone."""
 
@@ -45,12 +45,12 @@ def placing(studio: Studio) -> None:
         user.step("Weather and time").click()
         camera.take("weather", page.get_by_role("region", name="Weather and time", exact=True))
         user.step("Road users").click()
-        page.get_by_role("button", name="Fill the region at random").click()
+        page.get_by_role("button", name="Fill the whole region").click()
         user.choose("Placed by", "Generator reference")
         form = page.locator(".fold").filter(has=page.get_by_label("Placed by")).last
         form.evaluate("one => one.scrollIntoView({block: 'end'})")
         camera.take("fill", form)
-        page.get_by_role("button", name="Hide random fill").click()
+        page.get_by_role("button", name="Hide the filling").click()
         user.names.first.click()
         expect(user.ego).to_be_visible()
         page.get_by_role("button", name="Choose on the map").click()
@@ -70,7 +70,7 @@ def planned_time(studio: Studio) -> None:
         moment = user.time_bar.get_by_role("slider", name="Planned moment")
         for _ in range(2):
             moment.press("PageUp")
-        camera.look_at(CROSSING, closer=2)
+        camera.look_at(CROSSING, closer=1)
         expect(user.page.get_by_text("each alone on the road")).to_be_visible()
         camera.take("time")
 

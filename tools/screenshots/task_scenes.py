@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from playwright.sync_api import expect
+from playwright.sync_api import Locator, expect
 
 from tools.screenshots import scenarios
-from tools.screenshots.camera import Studio
-from tools.screenshots.run_scenes import JUNCTION, run_at_once, watch_again
+from tools.screenshots.camera import Camera, Studio
+from tools.screenshots.run_scenes import run_at_once, watch_again
+
+TALL = 1300
+"""Pixels of a window in which a whole form is seen."""
+DETECTOR = (60.0, 5.0)
+"""Near the detector of the program, metres."""
+BESIDE_TOWN = (160.0, 240.0)
+"""In the middle, it leaves the town beside the legend, metres."""
+TO_TOP = "one => one.scrollIntoView({block: 'start'})"
 
 
 def demand(studio: Studio) -> None:
@@ -17,14 +25,14 @@ def demand(studio: Studio) -> None:
         user.step("Traffic").click()
         card = page.get_by_role("region", name="Vehicles from outside west", exact=True)
         card.get_by_role("button", name="Change the mix").click()
-        card.evaluate("one => one.scrollIntoView({block: 'start'})")
+        card.evaluate(TO_TOP)
         camera.take("traffic", card)
         user.open_editor(scenarios.COUNTED)
         run_at_once(camera)
         page.get_by_role("tab", name="Counts").click()
         expect(page.get_by_role("heading", name="counts met")).to_be_visible()
         page.get_by_role("button", name="Hide the time bar").click()
-        camera.look_at(user.graph.middle(JUNCTION), closer=1)
+        camera.look_at(BESIDE_TOWN, closer=0)
         camera.take("counts")
 
 
@@ -45,7 +53,7 @@ def measures(studio: Studio) -> None:
                 closure.get_by_label(label, exact=True).fill(minutes)
                 page.keyboard.press("Enter")
         camera.look_at(r25, closer=2)
-        user.step("Measures").evaluate("one => one.scrollIntoView({block: 'start'})")
+        user.step("Measures").evaluate(TO_TOP)
         camera.take("measures")
 
 
@@ -74,11 +82,7 @@ def signals(studio: Studio) -> None:
     """The program of a light in the editor, and where it is in its cycle in a recording."""
     with studio.visit() as camera:
         user, page = camera.user, camera.user.page
-        user.open_editor(scenarios.LIT)
-        user.step("Run").click()
-        page.get_by_role("button", name="Hide the table").click()
-        page.get_by_role("button", name="Show the signal programs").click()
-        light = page.get_by_role("region", name="Traffic light of junction")
+        light = _program(camera)
         light.get_by_role("slider", name="Green of stage 1").focus()
         page.keyboard.press("PageUp")
         page.keyboard.press("Enter")
@@ -99,3 +103,48 @@ def signals(studio: Studio) -> None:
         for _ in range(3):
             page.keyboard.press("+")
         camera.take("signals")
+
+
+def signal_parts(studio: Studio) -> None:
+    """What a program is made of: a signal group, intergreens, detectors, plans of the day."""
+    with studio.visit(height=TALL) as camera:
+        light = _program(camera)
+        groups = _unfolded(light, "Change signal groups and stages")
+        groups.get_by_role("button", name="Change K1L").click()
+        group = groups.get_by_role("region", name="Signal group K1L")
+        group.evaluate(TO_TOP)
+        camera.take("signal-group", group)
+        _folded(groups)
+        matrix = _unfolded(light, "Change intergreens")
+        camera.take("signal-intergreens", matrix)
+        _folded(matrix)
+        day = _unfolded(light, "Change the plans of the day")
+        camera.take("signal-day", day)
+    with studio.visit() as camera:
+        light = _program(camera)
+        camera.look_at(DETECTOR, closer=0)
+        _unfolded(light, "Change detectors")
+        camera.take("signal-detectors")
+
+
+def _program(camera: Camera) -> Locator:
+    """Open the program of the light of the crossing."""
+    user, page = camera.user, camera.user.page
+    user.open_editor(scenarios.LIT)
+    user.step("Run").click()
+    page.get_by_role("button", name="Hide the table").click()
+    page.get_by_role("button", name="Show the signal programs").click()
+    light = page.get_by_role("region", name="Traffic light of junction")
+    expect(light.get_by_role("slider", name="Cycle")).to_be_visible()
+    return light
+
+
+def _unfolded(light: Locator, title: str) -> Locator:
+    fold = light.locator("details", has=light.page.get_by_text(title, exact=True))
+    fold.locator("summary").first.press("Enter")
+    fold.evaluate(TO_TOP)
+    return fold
+
+
+def _folded(fold: Locator) -> None:
+    fold.locator("summary").first.press("Enter")
