@@ -59,7 +59,7 @@ class Camera:
     scheme: str
     folder: Path
 
-    def take(self, view: str, *shown: Locator) -> None:
+    def take(self, view: str, *shown: Locator, margin: int = 0) -> None:
         """Keep what is seen now, once nothing moves, under the view's name.
 
         Parameters
@@ -68,6 +68,8 @@ class Camera:
             Name of the picture: ``page-VIEW-SCHEME.png``.
         *shown
             What it is cropped to; without any it is the whole window.
+        margin
+            Pixels around that.
 
         Raises
         ------
@@ -79,7 +81,9 @@ class Camera:
         page.evaluate("document.activeElement?.blur()")
         settle(page)
         raw = Image.open(io.BytesIO(page.screenshot(animations="disabled", caret="hide")))
-        few = in_few_colours(raw.convert("RGB").crop(_around(shown, raw.size) if shown else None))
+        few = in_few_colours(
+            raw.convert("RGB").crop(_around(shown, raw.size, margin) if shown else None)
+        )
         path = self.folder / f"page-{view}-{self.scheme}.png"
         few.save(path, optimize=True)
         size = path.stat().st_size
@@ -127,12 +131,14 @@ def _distances(colours: np.ndarray, one: int) -> np.ndarray:
     return np.square(colours - colours[one]).sum(axis=1)
 
 
-def _around(shown: Sequence[Locator], size: tuple[int, int]) -> tuple[int, int, int, int]:
+def _around(
+    shown: Sequence[Locator], size: tuple[int, int], margin: int
+) -> tuple[int, int, int, int]:
     """Left, top, right and bottom of all that is to be seen, inside the window."""
     boxes = [box for one in shown if (box := one.bounding_box()) is not None]
     return (
-        max(0, round(min(box["x"] for box in boxes))),
-        max(0, round(min(box["y"] for box in boxes))),
-        min(size[0], round(max(box["x"] + box["width"] for box in boxes))),
-        min(size[1], round(max(box["y"] + box["height"] for box in boxes))),
+        max(0, round(min(box["x"] for box in boxes)) - margin),
+        max(0, round(min(box["y"] for box in boxes)) - margin),
+        min(size[0], round(max(box["x"] + box["width"] for box in boxes)) + margin),
+        min(size[1], round(max(box["y"] + box["height"] for box in boxes)) + margin),
     )

@@ -54,6 +54,7 @@ def results(studio: Studio) -> None:
         expect(user.result.get_by_role("link", name="Full report")).to_be_visible()
         page.get_by_role("button", name="Hide the time bar").click()
         camera.take("result", page.get_by_role("complementary"))
+        _report(studio, user.result.get_by_role("link", name="Full report").get_attribute("href"))
         page.get_by_role("tab", name="Charts").click()
         expect(page.get_by_text("Arrivals", exact=True)).to_be_visible()
         page.wait_for_load_state("networkidle")
@@ -66,6 +67,19 @@ def results(studio: Studio) -> None:
         camera.take("lanes")
         page.get_by_role("button", name="Share").click()
         camera.take("share", page.get_by_role("menu"), page.get_by_role("button", name="Share"))
+
+
+def _report(studio: Studio, address: str | None) -> None:
+    """The level of service in the report of a run."""
+    assert address is not None
+    with studio.visit(width=1080, height=1400) as camera:
+        page = camera.user.page
+        page.goto(address)
+        part = page.locator("section").filter(
+            has=page.get_by_role("heading", name="Level of service", exact=True)
+        )
+        part.evaluate("one => one.scrollIntoView({block: 'start'})")
+        camera.take("report", part.last)
 
 
 def time_of_a_run(studio: Studio) -> None:
@@ -91,4 +105,4 @@ def interrupted(studio: Studio) -> None:
         expect(parts).to_be_visible(timeout=PATIENCE)
         user.control("Resume later").click()
         expect(user.result).to_contain_text("interrupted", timeout=PATIENCE)
-        camera.take("interrupted", user.result)
+        camera.take("interrupted", user.result, margin=16)

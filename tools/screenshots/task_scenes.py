@@ -12,7 +12,7 @@ TALL = 1300
 """Pixels of a window in which a whole form is seen."""
 DETECTOR = (60.0, 5.0)
 """Near the detector of the program, metres."""
-BESIDE_TOWN = (160.0, 240.0)
+BESIDE_TOWN = (90.0, 220.0)
 """In the middle, it leaves the town beside the legend, metres."""
 TO_TOP = "one => one.scrollIntoView({block: 'start'})"
 
