@@ -65,21 +65,15 @@ def results(studio: Studio) -> None:
         legend = page.get_by_role("list", name="What is shown")
         expect(legend.get_by_text(re.compile(r"s/km and more$"))).to_be_visible()
         camera.take("lanes")
-        page.get_by_role("button", name="Share").click()
-        camera.take("share", page.get_by_role("menu"), page.get_by_role("button", name="Share"))
 
 
 def _report(studio: Studio, address: str | None) -> None:
-    """The level of service in the report of a run."""
+    """The beginning of the report of a run: its verdict and the level of service on the map."""
     assert address is not None
-    with studio.visit(width=1080, height=1400) as camera:
-        page = camera.user.page
-        page.goto(address)
-        part = page.locator("section").filter(
-            has=page.get_by_role("heading", name="Level of service", exact=True)
-        )
-        part.evaluate("one => one.scrollIntoView({block: 'start'})")
-        camera.take("report", part.last)
+    with studio.visit(width=1080, height=1240) as camera:
+        camera.user.page.goto(address)
+        expect(camera.user.page.get_by_role("heading", level=1)).to_be_visible()
+        camera.take("report")
 
 
 def time_of_a_run(studio: Studio) -> None:
@@ -105,4 +99,4 @@ def interrupted(studio: Studio) -> None:
         expect(parts).to_be_visible(timeout=PATIENCE)
         user.control("Resume later").click()
         expect(user.result).to_contain_text("interrupted", timeout=PATIENCE)
-        camera.take("interrupted", user.result, margin=16)
+        camera.take("interrupted", user.result, margin=8)
