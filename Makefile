@@ -89,8 +89,10 @@ fuzz: $(READY) $(PAGE)
 check-wheel: $(READY)
 	$(BIN)/python -m tools.check_wheel
 
-# Pictures of every view for docs/, light and dark.
+# Pictures of every view for docs/, light and dark, and those of measures and templates.
 screenshots: $(READY) $(PAGE) chromium
+	$(BIN)/python -m tools.measure_pictures
+	$(BIN)/python -m tools.template_pictures
 	$(BIN)/python -m tools.screenshots
 
 # Rewrites golden files and the published schema from what the code does now; read the diff.

@@ -8,11 +8,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 import odscen
 from odscen.app import generators
 from odscen.scenario.story import own_kinds
 from odscen.sumo.worker.behaviour import behaviour_doors
+from tools.docs_site import switched_pictures
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md"), ROOT / "maps/README.md"])
@@ -20,6 +22,7 @@ CURRENT = [path for path in DOCUMENTS if path.parent.name != "decisions"]
 """Decisions are history: they name what was there when they were made."""
 
 _LINK = re.compile(r'\]\(([^)\s]+)\)|\b(?:src|srcset)="([^"]+)"')
+_LIGHT = re.compile(r'src="([^"]+-light\.png)"')
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 _FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 _DIFF = re.compile(r"^```diff.*?^```$", re.MULTILINE | re.DOTALL)
@@ -73,6 +76,25 @@ def test_every_link_leads_to_a_file_and_a_heading_that_are_there(path: Path) -> 
         if not found:
             broken.append(link)
     assert broken == []
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=name_of)
+def test_pictures_have_a_light_and_a_dark_form_between_which_the_site_switches(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    shown = switched_pictures(text)
+    for light in _LIGHT.findall(text):
+        dark = light.replace("-light.png", "-dark.png")
+        with Image.open(path.parent / light) as one, Image.open(path.parent / dark) as other:
+            assert one.size == other.size, light
+        assert f'src="{light}#only-light"' in shown
+        assert f'src="{dark}#only-dark"' in shown
+    assert "<picture>" not in shown
+
+
+def test_every_picture_of_the_page_is_in_a_document() -> None:
+    texts = "".join(path.read_text(encoding="utf-8") for path in DOCUMENTS)
+    pictures = sorted(path.name for path in (ROOT / "docs/images").glob("page-*.png"))
+    assert [name for name in pictures if name not in texts] == []
 
 
 @pytest.mark.parametrize("path", CURRENT, ids=name_of)

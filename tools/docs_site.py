@@ -1,4 +1,4 @@
-"""Hooks of ``make docs``: pages from outside ``docs/``, the command line, and links between them.
+"""Hooks of ``make docs``: pages from outside ``docs/``, the command line, links and pictures.
 
 README.md, CONTRIBUTING.md, CHANGELOG.md and maps/README.md are pages of the site as they stand in
 the repository; the page of the command line is what ``odscen --help`` says.
@@ -35,6 +35,10 @@ COMMAND_LINE = "command-line.md"
 _LINK = re.compile(
     r'\[(?P<text>[^\]]*)\]\((?P<to>[^)\s]+)\)|(?P<attribute>src|srcset)="(?P<file>[^"]+)"'
 )
+_PICTURE = re.compile(
+    r'<picture>\s*<source[^>]*srcset="(?P<dark>[^"]+)">\s*'
+    r'<img src="(?P<light>[^"]+)"(?P<more>[^>]*)>\s*</picture>'
+)
 _ROLE = re.compile(r":(?:class|func|meth|mod|data|attr|exc):<code>~?([^<]+)</code>")
 
 
@@ -48,8 +52,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
-    """Lead links of the repository to the pages of the site."""
-    return site_links(markdown, page.file.src_uri)
+    """Lead links of the repository to the pages of the site, and pictures to its switch."""
+    return switched_pictures(site_links(markdown, page.file.src_uri))
 
 
 def on_page_content(html: str, **_: object) -> str:
@@ -86,6 +90,19 @@ def site_links(markdown: str, page: str) -> str:
         return f"[{link['text']}]({to})" if link["file"] is None else f'{link["attribute"]}="{to}"'
 
     return _LINK.sub(led, markdown)
+
+
+def switched_pictures(markdown: str) -> str:
+    """The text of a page with both forms of each picture, one of which the site shows.
+
+    In the repository a picture follows the system (``prefers-color-scheme``). On the site it
+    follows the switch at the top, which the theme does for images marked so.
+    """
+    both = (
+        r'<span class="picture"><img src="\g<light>#only-light" loading="lazy"\g<more>>'
+        r'<img src="\g<dark>#only-dark" loading="lazy"\g<more>></span>'
+    )
+    return _PICTURE.sub(both, markdown)
 
 
 def _place_on_site(source: str) -> str | None:

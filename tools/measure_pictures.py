@@ -20,17 +20,16 @@ from odscen.results.report.report_measures import measure_layer
 from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.sumo.realize.traffic_measures.measure_actions import measure_actions
 from odscen.workspace.store import Workspace
+from tools import map_style
 
 ROOT = Path(__file__).parents[1]
 DOCUMENT = ROOT / "docs" / "measures.md"
 MAP = ROOT / "maps" / "town_5x5.xodr"
 MARGIN = 60.0
 """Metres of map around a measure."""
-STYLE = (
+STYLE = map_style.STYLE + (
     ".measures path{fill:none;stroke:#b45309;stroke-linecap:round;stroke-linejoin:round;"
-    "opacity:.75}.measures text{fill:#b45309;stroke:#fff;stroke-width:.18em;paint-order:stroke;"
-    "font-weight:700;font-family:sans-serif;dominant-baseline:middle}"
-    ".scale path{fill:none;stroke:#333}.scale text{fill:#333;font-family:sans-serif}"
+    "opacity:.75}.measures text{fill:#b45309;dominant-baseline:middle}"
 )
 
 
@@ -71,7 +70,6 @@ def picture(loaded: LoadedMap, measure: dict[str, object]) -> str:
         xmlns="http://www.w3.org/2000/svg",
         viewBox=view_box(bounds),
         width="720",
-        style="background:#f2efe8",
         role="img",
     )
     return str(svg) + "\n"

@@ -27,6 +27,7 @@ from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.workspace.store import Workspace
+from tools import map_style
 
 if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
@@ -48,12 +49,7 @@ SECONDS = 5.0
 """Of the lines."""
 MARGIN = 10.0
 EGO, OTHER = "#1d4ed8", "#b45309"
-STYLE = (
-    ".way{fill:none;stroke-linecap:round;stroke-linejoin:round;opacity:.55}"
-    ".names text{stroke:#fff;stroke-width:.18em;paint-order:stroke;font-weight:700;"
-    "font-family:sans-serif}.scale path{fill:none;stroke:#333}"
-    ".scale text{fill:#333;font-family:sans-serif}"
-)
+STYLE = map_style.STYLE + (".way{fill:none;stroke-linecap:round;stroke-linejoin:round;opacity:.55}")
 
 
 def _run(loaded: LoadedMap, scenario: Scenario, folder: Path) -> tuple[pl.DataFrame, Plan, float]:
@@ -118,7 +114,6 @@ def picture(loaded: LoadedMap, scenario: Scenario, folder: Path) -> str:
         viewBox=view_box(bounds),
         width="720",
         height="405",
-        style="background:#f2efe8",
         role="img",
     )
     return str(svg) + "\n"

@@ -261,6 +261,8 @@ export function RunBar({
   );
 }
 
+/** Behind the states of lights, light or dark. */
+const BACK = "#1b1f24";
 const levelOf = (ttc: number): number => 3 + CURVE - (ttc / SEEN) * CURVE;
 
 /** One row of the bar; a click in it chooses an instant, for which there is the slider by keyboard. */
@@ -314,8 +316,13 @@ const THICK: Record<Shown, number> = { green: 0.9, permissive: 0.5, yellow: 0.7,
 
 function Signals({ bands, sight }: { bands: readonly Band[]; sight: Sight }) {
   const high = BANDS / bands.length;
+  const spans = bands.flatMap((band) => band.spans);
+  // Dark only where something was shown, not for the rest of a live run.
+  const begin = toX(sight, Math.min(...spans.map((span) => span.begin)));
+  const end = toX(sight, Math.max(...spans.map((span) => span.end)));
   return (
     <svg className="time-signal" width={sight.width} height={BANDS} aria-hidden="true">
+      {spans.length > 0 && <rect x={begin} width={end - begin} height={BANDS} rx={3} fill={BACK} />}
       {(Object.keys(THICK) as Shown[]).map((shown) => (
         <path
           key={shown}
@@ -353,7 +360,7 @@ function Legend({ kinds, signals }: { kinds: ReadonlySet<ReturnType<typeof markK
       {signals && (
         <li>
           <Trans>
-            <svg width={34} height={14} aria-hidden="true" style={{ background: "#1b1f24", borderRadius: 3 }}>
+            <svg width={34} height={14} aria-hidden="true" style={{ background: BACK, borderRadius: 3 }}>
               <path d="M2 7H11" stroke={SIGNAL_COLOR.green} strokeWidth={10} />
               <path d="M12 7H21" stroke={SIGNAL_COLOR.yellow} strokeWidth={7} />
               <path d="M22 7H32" stroke={SIGNAL_COLOR.red} strokeWidth={2.5} />
