@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from mkdocs.structure.files import File
 from typer.cli import get_docs_for_click
 
 from odscen.cli.commands import command_line
@@ -44,6 +43,8 @@ _ROLE = re.compile(r":(?:class|func|meth|mod|data|attr|exc):<code>~?([^<]+)</cod
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are not files below ``docs/``."""
+    from mkdocs.structure.files import File  # tests read pages on machines without it
+
     for source, uri in ROOT_PAGES.items():
         text = (ROOT / source).read_text(encoding="utf-8")
         files.append(File.generated(config, uri, content=text))

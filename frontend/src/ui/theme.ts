@@ -1,4 +1,11 @@
-import { createTheme, type CSSVariablesResolver, Loader, Modal, ModalHeader, NumberInput } from "@mantine/core";
+import {
+  createTheme,
+  type CSSVariablesResolver,
+  Loader,
+  Modal,
+  ModalHeader,
+  NumberInput,
+} from "@mantine/core";
 import { t } from "@lingui/core/macro";
 
 import { localized } from "../language/localized";
