@@ -32,6 +32,8 @@ ACTORS = 2000
 CHANGES = 10
 FILLS = 3
 STEPS = 90
+DENSITY, SLIDER_STEP = 75, 5
+"""Percent of the most that fit the region, some 2,000, and of a step of the slider."""
 
 _PROBE = """
 window.odscenFrames = [];
@@ -251,10 +253,12 @@ def _filled(user: OdscenPage) -> None:
     page.get_by_role("button", name="Fill the whole region").click()
     density = page.get_by_role("slider", name="Density, percent of the maximum")
     density.press("End")
+    for _ in range((100 - DENSITY) // SLIDER_STEP):
+        density.press("ArrowLeft")
     page.evaluate("window.odscenShown = 'table[aria-rowcount]'")
     button = page.get_by_role("button", name="Fill the region", exact=True)
     for seed in range(FILLS):
-        page.get_by_label("Random seed").fill(str(seed))
+        page.get_by_role("textbox", name="Random seed").fill(str(seed))
         page.evaluate("window.odscenChange = {}")
         button.click()
         page.wait_for_function("odscenChange.shown && odscenChange.saved")

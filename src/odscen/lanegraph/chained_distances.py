@@ -88,7 +88,7 @@ class ChainedDistances:
 def _chains(
     matrix: sparse.csr_matrix[np.float64],
 ) -> tuple[list[int], list[int], list[float], list[_Chain]]:
-    """Hubs; nodes between them in the order of their chains, with metres from the fork; chains."""
+    """Forks; nodes between them in the order of their chains, with metres from the fork; chains."""
     out = np.diff(matrix.indptr)
     between = (out == 1) & (np.bincount(matrix.indices, minlength=len(out)) == 1)
     is_fork = (~between).tolist()
