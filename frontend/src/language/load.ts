@@ -10,7 +10,7 @@ const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
   de: () => import("../locales/de.po"),
 };
 
-/** Those of the sentences of the server, which are loaded when the first is shown; as it sends them, they are English. */
+/** Those of the sentences of the server, loaded when the first is shown; as it sends them, they are English. */
 const SENTENCES: Record<Language, (() => Promise<{ messages: Messages }>) | null> = {
   en: null,
   de: () => import("../locales/server/de.po"),
