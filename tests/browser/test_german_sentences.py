@@ -76,6 +76,8 @@ def test_findings_and_a_refused_edit_are_in_german(
 def test_a_failed_upload_and_the_report_of_a_conversion_are_in_german(german: OdscenPage) -> None:
     page = german.page
     page.goto("/")
+    page.wait_for_load_state("networkidle")  # nobody is as quick as a test
+    page.wait_for_timeout(1500)
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Datei wählen").click()
     text = b"<OpenDRIVE><header revMajor='1' revMinor='4'/></OpenDRIVE>"

@@ -163,7 +163,8 @@ def test_a_change_of_traffic_is_caught_by_every_scenario_with_its_cause_and_plac
         assert outcome == "failure"
         assert re.match(rf"{cause}: .*({place}|{NOWHERE}$)", words), words
         somewhere += bool(re.search(place, words))
-    assert somewhere > len(NAMES) / 2
+    # A setting acts everywhere alike: in one scenario no place may stand out.
+    assert somewhere > len(NAMES) / 2 - (cause == "settings")
 
 
 def test_reruns_without_a_change_pass(store, suite):

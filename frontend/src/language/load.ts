@@ -10,7 +10,10 @@ const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
   de: () => import("../locales/de.po"),
 };
 
-/** Those of the sentences of the server, loaded when the first is shown; as it sends them, they are English. */
+/** Milliseconds after which sentences of the server are loaded, so that the page comes first. */
+const AFTER_PAGE = 800;
+
+/** Those sentences, loaded sooner if one is to be shown sooner; as the server sends them, they are English. */
 const SENTENCES: Record<Language, (() => Promise<{ messages: Messages }>) | null> = {
   en: null,
   de: () => import("../locales/server/de.po"),
@@ -32,7 +35,9 @@ async function speak(language: Language): Promise<void> {
   if (usePreferences.getState().language !== language) return;
   serveSentences(null);
   // Where it cannot be had, sentences stay as the server says them.
-  whenServed(SENTENCES[language] && (() => void speakForServer(language).catch(() => undefined)));
+  const load = SENTENCES[language] && (() => void speakForServer(language).catch(() => undefined));
+  whenServed(load);
+  if (load) setTimeout(load, AFTER_PAGE);
   i18n.loadAndActivate({ locale: language, messages });
   document.documentElement.lang = language;
 }
