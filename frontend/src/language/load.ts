@@ -2,7 +2,7 @@ import { i18n, type Messages } from "@lingui/core";
 import { compileMessage } from "@lingui/message-utils/compileMessage";
 
 import { type Language, LANGUAGES, usePreferences } from "./preferences";
-import { serveSentences, whenServed } from "./served";
+import { serveSentences } from "./served";
 
 /** The catalogues, each loaded when its language is first chosen; English texts come with the code. */
 const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
@@ -13,7 +13,7 @@ const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
 /** Milliseconds after which sentences of the server are loaded, so that the page comes first. */
 const AFTER_PAGE = 800;
 
-/** Those sentences, loaded sooner if one is to be shown sooner; as the server sends them, they are English. */
+/** Catalogues of these sentences; as the server sends them, they are English. */
 const SENTENCES: Record<Language, (() => Promise<{ messages: Messages }>) | null> = {
   en: null,
   de: () => import("../locales/server/de.po"),
@@ -34,12 +34,10 @@ async function speak(language: Language): Promise<void> {
   // Another may have been chosen meanwhile.
   if (usePreferences.getState().language !== language) return;
   serveSentences(null);
-  // Where it cannot be had, sentences stay as the server says them.
-  const load = SENTENCES[language] && (() => void speakForServer(language).catch(() => undefined));
-  whenServed(load);
-  if (load) setTimeout(load, AFTER_PAGE);
   i18n.loadAndActivate({ locale: language, messages });
   document.documentElement.lang = language;
+  // Where it cannot be had, sentences stay as the server says them.
+  setTimeout(() => void speakForServer(language).catch(() => undefined), AFTER_PAGE);
 }
 
 /** Has what the server says in a language, too. */

@@ -10,19 +10,8 @@ export const serveSentences = (translated: ((text: string) => string) | null): v
   sentences = translated;
 };
 
-/** What loads their catalogue when the first of them is to be shown. */
-let wanted: (() => void) | null = null;
-
-/** Sets, or with null takes away, what is called with the first text that no list has. */
-export const whenServed = (load: (() => void) | null): void => {
-  wanted = load;
-};
-
 /** A text of the server in the language of the reader; one that is not known stays as it is. */
 export function served(text: string): string {
   const known = SERVER_TEXTS[text];
-  if (known) return i18n._(known);
-  wanted?.();
-  wanted = null;
-  return sentences?.(text) ?? text;
+  return known ? i18n._(known) : (sentences?.(text) ?? text);
 }

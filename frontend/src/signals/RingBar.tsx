@@ -1,13 +1,11 @@
 import { t } from "@lingui/core/macro";
-import { type KeyboardEvent, type PointerEvent, useCallback, useEffect, useRef, useState } from "react";
 
 import type { DayPlan } from "../api/signals";
 import { beginOf, dragged, type Grip, LEAST, type Ring, ringOf, sameGrip, secondsOf } from "./ring";
+import { useHandles } from "./useHandles";
 
 /** Seconds of the bar beyond the cycle, as a share of it: room for a longer green. */
 const ROOM = 0.25;
-/** Milliseconds after the last key until what was pressed is asked for. */
-const PAUSE = 700;
 
 const STEP: Record<string, number> = {
   ArrowRight: 1,
@@ -17,11 +15,6 @@ const STEP: Record<string, number> = {
   PageUp: 5,
   PageDown: -5,
 };
-
-interface Draft {
-  grip: Grip;
-  seconds: number;
-}
 
 /** Asks for a change; false if it was refused. */
 export type Retime = (grip: Grip, seconds: number) => Promise<boolean>;
@@ -35,89 +28,23 @@ interface Props {
 
 /** The cycle as a bar of greens, whose ends, as the cycle and the offset, can be dragged or moved by keys. */
 export function RingBar({ plan, keepCycle, onChange }: Props) {
-  const [draft, setDraft] = useState<Draft | null>(null);
-  const timer = useRef(0);
-  const waiting = useRef<Draft | null>(null);
-  const held = useRef<{ x: number; from: number; perPixel: number } | null>(null);
-  const bar = useRef<HTMLDivElement>(null);
   const ring = ringOf(plan);
-  const shown = draft ? dragged(ring, draft.grip, draft.seconds, keepCycle) : ring;
   const span = ring.cycle * (1 + ROOM);
-  // The plan with the change has come.
-  useEffect(() => {
-    if (!waiting.current && !held.current) setDraft(null);
-  }, [plan]);
-
-  const commit = useCallback(
-    (wish: Draft) => {
-      clearTimeout(timer.current);
-      waiting.current = null;
-      if (wish.seconds === secondsOf(ringOf(plan), wish.grip)) {
-        setDraft(null);
-        return;
-      }
-      void onChange(wish.grip, wish.seconds).then((made) => {
-        if (!made && !waiting.current) setDraft(null);
-      });
+  const { draft, bar, value, handlers } = useHandles<Grip>({
+    span,
+    keys: STEP,
+    saved: (grip) => secondsOf(ring, grip),
+    bounded: (grip, seconds) => {
+      const most = grip.is === "offset" ? ring.cycle - 1 : Math.floor(span);
+      return Math.min(Math.max(Math.round(seconds), grip.is === "offset" ? 0 : LEAST), most);
     },
-    [plan, onChange],
-  );
-  useEffect(() => () => clearTimeout(timer.current), []);
-
-  const bounded = (grip: Grip, seconds: number): number => {
-    const most = grip.is === "offset" ? ring.cycle - 1 : Math.floor(span);
-    return Math.min(Math.max(Math.round(seconds), grip.is === "offset" ? 0 : LEAST), most);
-  };
-  const valueOf = (grip: Grip): number =>
-    draft && sameGrip(draft.grip, grip) ? draft.seconds : secondsOf(ring, grip);
-
-  const handlers = (grip: Grip) => ({
-    onPointerDown: (event: PointerEvent<HTMLElement>): void => {
-      const width = bar.current?.getBoundingClientRect().width ?? 0;
-      if (event.button !== 0 || width === 0) return;
-      event.preventDefault();
-      event.currentTarget.focus();
-      event.currentTarget.setPointerCapture(event.pointerId);
-      held.current = { x: event.clientX, from: valueOf(grip), perPixel: span / width };
-    },
-    onPointerMove: (event: PointerEvent<HTMLElement>): void => {
-      if (!held.current) return;
-      const { x, from, perPixel } = held.current;
-      setDraft({ grip, seconds: bounded(grip, from + (event.clientX - x) * perPixel) });
-    },
-    onPointerUp: (): void => {
-      if (!held.current) return;
-      held.current = null;
-      if (draft) commit(draft);
-    },
-    onPointerCancel: (): void => {
-      held.current = null;
-      setDraft(null);
-    },
-    onKeyDown: (event: KeyboardEvent<HTMLElement>): void => {
-      const step = STEP[event.key];
-      if (step !== undefined) {
-        event.preventDefault();
-        const next = { grip, seconds: bounded(grip, valueOf(grip) + step) };
-        waiting.current = next;
-        setDraft(next);
-        clearTimeout(timer.current);
-        timer.current = window.setTimeout(() => commit(next), PAUSE);
-      } else if (event.key === "Enter" && waiting.current) commit(waiting.current);
-      else if (event.key === "Escape" && draft) {
-        // The panel stays open.
-        event.stopPropagation();
-        clearTimeout(timer.current);
-        waiting.current = held.current = null;
-        setDraft(null);
-      }
-    },
-    onBlur: (): void => {
-      if (waiting.current) commit(waiting.current);
-    },
+    same: sameGrip,
+    onChange,
+    source: plan,
   });
+  const shown = draft ? dragged(ring, draft.grip, draft.value, keepCycle) : ring;
   const share = (seconds: number): string => `${((100 * seconds) / span).toFixed(3)}%`;
-  const grips = { handlers, value: valueOf, share, ring: shown };
+  const grips = { handlers, value, share, ring: shown };
   return (
     <div className="ring" ref={bar}>
       <div className="ring-track">
@@ -164,7 +91,7 @@ export function RingBar({ plan, keepCycle, onChange }: Props) {
       />
       <p className="ring-words" aria-live="polite">
         {draft
-          ? t`${gripWords(draft.grip)} ${draft.seconds} s`
+          ? t`${gripWords(draft.grip)} ${draft.value} s`
           : t`Drag an end, or choose one and use the arrow keys.`}
       </p>
     </div>

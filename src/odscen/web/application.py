@@ -202,9 +202,10 @@ class _BuiltPage(StaticFiles):
         taken = Headers(scope=scope).get("accept-encoding", "")
         if "br" not in [one.partition(";")[0].strip() for one in taken.split(",")]:
             return None
-        if not self.lookup_path(f"{path}.br")[1]:
+        try:
+            response = await super().get_response(f"{path}.br", scope)
+        except HTTPException:
             return None
-        response = await super().get_response(f"{path}.br", scope)
         response.headers["Content-Type"] = mimetypes.guess_type(path)[0] or "text/plain"
         response.headers["Content-Encoding"] = "br"
         response.headers.add_vary_header("Accept-Encoding")

@@ -22,7 +22,17 @@ FEW = 30
 def stopped_growth(rows: pl.DataFrame, *, start: float, middle: float) -> float:
     """How much the share of stopped vehicles rises: after ``middle``, from ``start`` until then.
 
-    ``rows`` are trajectories of vehicles. 0 for fewer vehicles than :data:`FEW` in the mean.
+    Parameters
+    ----------
+    rows
+        Trajectories of vehicles: ``time`` (s) and ``speed`` (m/s).
+    start, middle
+        Seconds of the run.
+
+    Returns
+    -------
+    float
+        Difference of two shares, -1 to 1; 0 for fewer vehicles than :data:`FEW` in the mean.
     """
     rows = rows.filter(rows["time"] >= start)
     late = rows["time"].to_numpy() >= middle
