@@ -89,7 +89,7 @@ export function createEditorStore(name: string): EditorStore {
   let known: ScenarioState | null = null;
   let pending: readonly Pending[] = [];
   /** What was not made for want of a server or of the newest state, in order; it waits for its user. */
-  let unsent: readonly Again[] = [];
+  let unsent: readonly { again: Again; lost: boolean }[] = [];
   let check: ReturnType<typeof setTimeout> | undefined;
   const timeline = new Timeline();
   return create<EditorState>((set, get) => {
@@ -134,7 +134,7 @@ export function createEditorStore(name: string): EditorStore {
       else if (version !== known.version) timeline.grow(document);
       const problems = whole ? answer.problems : known.problems;
       known = { ...known, name: answer.name, document, problems, version, label, undo, redo };
-      show({ saving: unsent.length > 0 ? "failed" : "saved", ...(whole && { checked: document }) });
+      show({ saving: stateOf(), ...(whole && { checked: document }) });
       if (!whole) checkSoon();
       return known;
     };
@@ -189,7 +189,7 @@ export function createEditorStore(name: string): EditorStore {
     const ask: Ask<ScenarioState> = (call) => send({ ...UNKNOWN }, call);
     const take: EditorState["take"] = async (call) => {
       const found = await turn<never>({ ...UNKNOWN }, call, async (error) => {
-        set({ saving: unsent.length > 0 ? "failed" : "saved" });
+        set({ saving: stateOf() });
         if (!(error instanceof ApiError) || error.status !== 409) throw error;
         await get().load();
         throw new Error(t`The scenario was changed in another tab. You now see its newest state; try again.`);
@@ -197,15 +197,17 @@ export function createEditorStore(name: string): EditorStore {
       if (!found) throw new Error(t`The scenario is not loaded yet.`);
       return found;
     };
+    /** Whether the server has all that its user made; one who lost to another tab has seen that. */
+    const stateOf = (): Saving => (unsent.some((one) => one.lost) ? "failed" : "saved");
     /** What is said stays as long as something waits to be made again. */
     const calm = (): { refusal?: null } => (unsent.length > 0 ? {} : { refusal: null });
     /** Keeps a change for later; what is returned makes all that are kept, in their order. */
-    const later = (again: Again): Again => {
-      unsent = [...unsent, again];
+    const later = (again: Again, { lost }: { lost: boolean }): Again => {
+      unsent = [...unsent, { again, lost }];
       return async () => {
         const all = unsent;
         unsent = [];
-        return (await Promise.all(all.map((one) => one()))).at(-1) ?? null;
+        return (await Promise.all(all.map((one) => one.again()))).at(-1) ?? null;
       };
     };
     const refused = async (error: unknown, again: Again): Promise<void> => {
@@ -220,7 +222,7 @@ export function createEditorStore(name: string): EditorStore {
             refusal: {
               title: t`The scenario cannot be read`,
               message: reasonOf(failure),
-              again: later(again),
+              again: later(again, { lost: true }),
             },
           });
           return;
@@ -230,17 +232,17 @@ export function createEditorStore(name: string): EditorStore {
           refusal: {
             title,
             message: t`You now see the newest state without your last change, which you can apply again.`,
-            again: later(again),
+            again: later(again, { lost: false }),
           },
         });
         return;
       }
       // What was removed can be brought back.
       const failed = status <= 0 || status >= 500 || status === 404;
-      const all = failed ? later(again) : null;
+      const all = failed ? later(again, { lost: true }) : null;
       // One that can never be made does not push out those that wait.
       if (unsent.length > 0 && !failed) {
-        set({ saving: "failed" });
+        set({ saving: stateOf() });
         return tell(t`That is not possible: ${message}`);
       }
       const title =
@@ -263,7 +265,7 @@ export function createEditorStore(name: string): EditorStore {
         const shown = get().scenario?.document ?? answer.document;
         known = { ...answer, document: reused(shown, answer.document) };
         timeline.begin(known.document);
-        show({ saving: unsent.length > 0 ? "failed" : "saved", checked: known.document });
+        show({ saving: stateOf(), checked: known.document });
       },
       edit: (edit, label) => {
         const edits = Array.isArray(edit) ? (edit as readonly Edit[]) : [edit as Edit];
