@@ -173,7 +173,7 @@ def test_candidates_of_many_are_those_of_each(
     monkeypatch.setattr(shortest_paths, "_MANY", 0)
     router = kind(graph)
     spawns = range(0, len(router.mask), 7)
-    found = [goals.tolist() for goals in router.each_candidates(spawns)]
+    found = [goals.tolist() for goals in router.each_candidates([*spawns])]
     assert found == [router.goal_candidates(spawn).tolist() for spawn in spawns]
     assert any(found) or not spawns  # not every toy map has walks
 
@@ -182,13 +182,18 @@ def test_of_many_one_outside_the_region_is_refused_by_name(monkeypatch: pytest.M
     monkeypatch.setattr(shortest_paths, "_MANY", 0)
     router = Router(FORK, induced(FORK, ["r2"]).nodes)
     with pytest.raises(InputError, match=r"node 1\.0\.-1\.0 is outside the region"):
-        list(router.each_candidates([0]))
+        router.each_candidates([0])
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(2, 40), st.integers(0, 1000), st.sampled_from([0.3, 1.0, 3.0]))
+@given(
+    st.integers(2, 40),
+    st.integers(0, 1000),
+    st.sampled_from([0.3, 1.0, 3.0]),
+    st.sampled_from([1, 3, 40]),
+)
 def test_distances_along_chains_are_those_over_all_nodes(
-    count: int, seed: int, density: float
+    count: int, seed: int, density: float, blocks: int
 ) -> None:
     """On any graph: with loops, parallel edges, rings that no fork leads to, and dead ends."""
     rng = np.random.default_rng(seed)
@@ -196,10 +201,14 @@ def test_distances_along_chains_are_those_over_all_nodes(
     rows = np.r_[ring_of, rng.integers(0, count, int(count * density))]
     columns = np.r_[np.roll(ring_of, 1), rng.integers(0, count, int(count * density))]
     matrix = shortest_edges(count, rows, columns, rng.uniform(0.0, 9.0, len(rows)))
-    chained = ChainedDistances(matrix)
-    for source in range(count):
+    block = rng.integers(0, blocks, count).astype(np.int32)
+    chained = ChainedDistances(matrix, block)
+    sources = [*rng.permutation(count).tolist(), 0]
+    found = dict(chained.each(sources))
+    assert sorted(found) == list(range(count + 1))
+    for place, source in enumerate(sources):
         distances = csgraph.dijkstra(matrix, indices=source)
-        assert chained.of(source) == pytest.approx(distances, rel=chained.rounding)
+        assert found[place] == pytest.approx(distances, rel=chained.rounding)
 
 
 def test_paths_to_a_node_are_as_long_as_those_from_each_source() -> None:

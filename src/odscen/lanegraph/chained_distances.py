@@ -11,14 +11,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.sparse import csgraph
 
+from odscen.lanegraph.block_distances import BlockDistances
 from odscen.lanegraph.edge_matrix import shortest_edges
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from scipy import sparse
 
-    from odscen.base.arrays import FloatArray
+    from odscen.base.arrays import FloatArray, Int32Array
 
 
 class _Chain(NamedTuple):
@@ -37,6 +39,9 @@ class ChainedDistances:
     ----------
     matrix
         Length of the edge from row to column, above 0; shape ``(N, N)``.
+    block
+        Number of a part of the graph with few ways out, such as a road, that each node is in;
+        shape ``(N,)``.
 
     Attributes
     ----------
@@ -44,7 +49,7 @@ class ChainedDistances:
         Bound of the relative error: lengths are not added up in the order of the path.
     """
 
-    def __init__(self, matrix: sparse.csr_matrix[np.float64]) -> None:
+    def __init__(self, matrix: sparse.csr_matrix[np.float64], block: Int32Array) -> None:
         self._count = matrix.shape[0]
         self.rounding = 2.0 * self._count * float(np.finfo(np.float64).eps)
         forks, nodes, metres, chains = _chains(matrix)
@@ -63,26 +68,38 @@ class ChainedDistances:
         self._head = np.repeat(heads, sizes)
         ends = self._number[[chain.end for chain in chains]]
         lengths = np.array([chain.metres for chain in chains], dtype=np.float64)
-        self._matrix = shortest_edges(len(forks), heads, ends, lengths)
+        between_forks = shortest_edges(len(forks), heads, ends, lengths)
+        self._from_forks = BlockDistances(between_forks, block[self._forks])
 
-    def of(self, source: int) -> FloatArray:
-        """Metres from ``source`` to every node, shape ``(N,)``; inf where none leads."""
-        place = int(self._place[source])
-        if place < 0:
-            return self._from_fork(source)
-        chain = self._chains[self._chain[place]]
-        result = self._from_fork(chain.end)
-        result += chain.metres - self._metres[place]
-        ahead = slice(place, chain.stop)
-        result[self._nodes[ahead]] = self._metres[ahead] - self._metres[place]
-        return result
+    def each(self, sources: Sequence[int]) -> Iterator[tuple[int, FloatArray]]:
+        """Yield place in ``sources`` and metres from there to every node, shape ``(N,)``.
 
-    def _from_fork(self, fork: int) -> FloatArray:
-        found = csgraph.dijkstra(self._matrix, indices=np.asarray(self._number[fork]))
+        Not in the order of ``sources``; inf where no path leads.
+        """
+        places = self._place[list(sources)].tolist()
+        forks = [
+            source if place < 0 else self._chains[self._chain[place]].end
+            for source, place in zip(sources, places, strict=True)
+        ]
+        for number, found in self._from_forks.each(self._number[forks].tolist()):
+            distances = self._unfolded(found)
+            if (place := places[number]) >= 0:
+                self._begin(distances, place)
+            yield number, distances
+
+    def _unfolded(self, of_forks: FloatArray) -> FloatArray:
+        """Distances of all nodes from those of the forks."""
         result: FloatArray = np.empty(self._count, dtype=np.float64)
-        result[self._forks] = found
-        result[self._nodes] = found[self._head] + self._metres
+        result[self._forks] = of_forks
+        result[self._nodes] = of_forks[self._head] + self._metres
         return result
+
+    def _begin(self, distances: FloatArray, place: int) -> None:
+        """Make distances from the end of a chain those from a node on it."""
+        chain = self._chains[self._chain[place]]
+        distances += chain.metres - self._metres[place]
+        ahead = slice(place, chain.stop)
+        distances[self._nodes[ahead]] = self._metres[ahead] - self._metres[place]
 
 
 def _chains(

@@ -26,7 +26,7 @@ from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo  # noqa: E402
 from odscen.lanegraph.query import node_id, walk_node_id  # noqa: E402
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from scipy import sparse
 
@@ -199,21 +199,32 @@ class _PathFinder:
         ends[self._local[spawn]] = False
         return self.nodes[ends].astype(np.int32)
 
-    def each_candidates(self, spawns: Sequence[int]) -> Iterator[Int32Array]:
-        """Yield the goal candidates of many spawns in turn; the same, sooner on a large map."""
-        if not self._directed or len(spawns) * len(self.nodes) < _MANY:
-            yield from map(self.goal_candidates, spawns)
-            return
-        chained = ChainedDistances(self._matrix)
-        for spawn in spawns:
-            if not self._holds(spawn) or not self.has_goals(spawn) or self._reaches_end(spawn):
-                yield self.goal_candidates(spawn)
-                continue
-            distances = chained.of(int(self._local[spawn]))
-            rounding = chained.rounding * float(distances[np.isfinite(distances)].max())
-            rows = self._farthest(spawn, distances, within=rounding)
-            sure = len(np.unique(self._lane[rows])) == len(rows)
-            yield self._one_per_lane(rows) if sure else self.goal_candidates(spawn)
+    def each_candidates(self, spawns: Sequence[int]) -> list[Int32Array]:
+        """Goal candidates of many spawns, each in its place; the same, sooner on a large map."""
+        found: dict[int, Int32Array] = {}
+        if len(spawns) * len(self.nodes) >= _MANY:
+            inside = [one for one in dict.fromkeys(spawns) if self._holds(one)]
+            found |= self._ends_from([one for one in inside if self._reaches_end(one)])
+            found |= self._farthest_from([one for one in inside if self._is_closed(one)])
+        return [found[one] if one in found else self.goal_candidates(one) for one in spawns]
+
+    def _ends_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
+        """Candidates of each spawn that reaches an end."""
+        ends = self.nodes[self._is_end].astype(np.int32)
+        row, table = self.reach(np.array(spawns, dtype=np.int32), ends)
+        reached = [ends[ahead] for ahead in table]
+        return {
+            spawn: reached[number][reached[number] != spawn]
+            for spawn, number in zip(spawns, row.tolist(), strict=True)
+        }
+
+    def _farthest_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:  # noqa: ARG002
+        """Candidates of each spawn that reaches no end, of those for which it goes sooner."""
+        return {}
+
+    def _is_closed(self, spawn: int) -> bool:
+        """Whether no end can be reached from a node of the region, but other nodes."""
+        return self.has_goals(spawn) and not self._reaches_end(spawn)
 
     def is_candidate(self, spawn: int, goal: int) -> bool:
         """Whether ``goal``, which can be reached, is among the candidates of ``spawn``."""
@@ -355,13 +366,28 @@ class Router(_PathFinder):
         """Router of the same region by another cost of each edge, shape ``(E,)``."""
         return Router(self._graph, self.mask, costs=costs)
 
+    def _farthest_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
+        found: dict[int, Int32Array] = {}
+        if not spawns:
+            return found
+        chained = ChainedDistances(self._matrix, self._graph.lanes.segment[self.nodes])
+        for place, distances in chained.each(self._local[list(spawns)].tolist()):
+            spawn = spawns[place]
+            rounding = chained.rounding * float(distances[np.isfinite(distances)].max())
+            rows = self._farthest(spawn, distances, within=rounding)
+            if (np.diff(self._lane[rows]) > 0).all():  # else it is rounding that decides
+                found[spawn] = self._on_roads(self.nodes[rows].astype(np.int32))
+        return found
+
     def is_terminal(self, node: int) -> bool:
         """Whether no edge leaves ``node`` inside the region."""
         return bool(self._is_end[self._local[node]])
 
     def _one_per_lane(self, rows: Int32Array) -> Int32Array:
         """Leave lanes inside junctions out if others remain."""
-        nodes = super()._one_per_lane(rows)
+        return self._on_roads(super()._one_per_lane(rows))
+
+    def _on_roads(self, nodes: Int32Array) -> Int32Array:
         on_roads = nodes[~self._in_junction[nodes]]
         return on_roads if len(on_roads) else nodes
 

@@ -6,6 +6,7 @@ a road) do not touch.
 
 from __future__ import annotations
 
+from itertools import product
 from math import cos, floor, hypot, sin
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -22,6 +23,8 @@ TOUCH = 1e-6
 """Boxes that overlap by less than this (m) only touch; rounding would decide otherwise."""
 SIDE_GAP = 0.2
 """Free width kept between two sampled bodies side by side, metres."""
+_AROUND = sorted(product((-1, 0, 1), repeat=2), key=lambda step: abs(step[0]) + abs(step[1]))
+"""A cell of the grid and those around it, as steps from it: the likeliest first."""
 
 
 class Box(NamedTuple):
@@ -109,11 +112,10 @@ class Crowd:
     def touching(self, box: Box) -> Iterator[int]:
         """Numbers of the boxes that overlap ``box``."""
         column, row = self._key(box)
-        for i in (column - 1, column, column + 1):
-            for j in (row - 1, row, row + 1):
-                for label, other in self._cells.get((i, j), ()):
-                    if overlap(box, other):
-                        yield label
+        for i, j in _AROUND:
+            for label, other in self._cells.get((column + i, row + j), ()):
+                if overlap(box, other):
+                    yield label
 
     def is_free(self, box: Box) -> bool:
         """Whether nothing overlaps ``box``."""
