@@ -20,7 +20,7 @@ from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Demand
 from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from odscen.scenario.signals.light import Light
-from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.runner.prepare import prepare

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,6 +60,7 @@ def _address(log: Path, process: subprocess.Popen[str]) -> str:
     ):
         if process.poll() is not None:
             raise RuntimeError(log.read_text(encoding="utf-8"))
+        time.sleep(0.02)
     return found[1]
 
 

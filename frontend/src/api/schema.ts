@@ -5276,7 +5276,7 @@ export interface components {
          *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
          *     meet. ``green`` is what the stage lasts with fixed-time control; actuated control keeps it
          *     between ``min_green`` and ``max_green`` (``None``: ``green``). A stage ``on_call`` comes only
-         *     if somebody waits at one of its crossings.
+         *     if somebody waits at one of its crossings, or a vehicle for a green of it.
          */
         "ProgramStage-Input": {
             /** Id */
@@ -5310,7 +5310,7 @@ export interface components {
          *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
          *     meet. ``green`` is what the stage lasts with fixed-time control; actuated control keeps it
          *     between ``min_green`` and ``max_green`` (``None``: ``green``). A stage ``on_call`` comes only
-         *     if somebody waits at one of its crossings.
+         *     if somebody waits at one of its crossings, or a vehicle for a green of it.
          */
         "ProgramStage-Output": {
             /** Id */
@@ -10205,7 +10205,7 @@ export interface components {
          *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
          *     meet. ``green`` is what the stage lasts with fixed-time control; actuated control keeps it
          *     between ``min_green`` and ``max_green`` (``None``: ``green``). A stage ``on_call`` comes only
-         *     if somebody waits at one of its crossings.
+         *     if somebody waits at one of its crossings, or a vehicle for a green of it.
          */
         "ProgramStage-File": {
             /** Id */

@@ -866,7 +866,6 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "speeds at the points are left out" }),
   msg({ message: "spreading trips over the map" }),
   msg({ message: "stage of the light of junction {junction}" }),
-  msg({ message: "stage {id} cannot be called: it has no crossing" }),
   msg({ message: "stage {id} gives green to {one} and {other}, which meet" }),
   msg({ message: "stage {id} gives no green" }),
   msg({ message: "stage {id} has {green} s of green, which is not between its min_green of {least} s and its max_green of {most} s" }),

@@ -134,19 +134,18 @@ function Treatment({ light, junction, editing, turn }: Editable & { turn: Crossi
   );
 }
 
-/** Whether a stage with a crossing waits for a call. */
+/** Whether a stage waits for a call. */
 export function StageCall({ light, junction, editing, stage }: Editable & { stage: string }) {
   const one = light.plans[0]?.stages.find(({ id }) => id === stage);
   const first = light.plans[0]?.stages[0]?.id === stage;
-  const walks = new Set(light.groups.filter(({ walk }) => walk).map(({ id }) => id));
   const [called, ask] = useAsked(one?.on_call ?? false, light);
-  if (!one || first || light.origin !== "scenario" || !one.groups.some((id) => walks.has(id))) return null;
+  if (!one || first || light.origin !== "scenario") return null;
   const change = (on_call: boolean): Edit => ({ kind: "set_stage", junction, stage, on_call });
   return (
     <Switch
       size="xs"
       label={t`only when called`}
-      aria-label={t`Stage ${stage} only when a pedestrian calls`}
+      aria-label={t`Stage ${stage} only when called`}
       checked={called}
       onChange={({ currentTarget: { checked } }) => ask(checked, editing.edit(change(checked)))}
     />

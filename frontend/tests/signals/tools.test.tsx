@@ -13,7 +13,7 @@ import { SignalPanel } from "../../src/signals/SignalPanel";
 import { Graph } from "../../src/map/graph";
 import type { GraphColumns, MapDetails } from "../../src/api/types";
 import { rowsOf, show } from "../page";
-import { detector, plan, program } from "./program";
+import { detector, program } from "./program";
 
 const timing = (more: Partial<Timing> = {}): Timing => ({
   junction: "10",
@@ -74,12 +74,9 @@ test("a green is changed in the plan that is shown, and may be taken from the ne
   expect(editing.retime).toHaveBeenLastCalledWith({ is: "green", stage: "1" }, 17, "day", true);
 });
 
-test("a turn gets an arrow, a stage with a crossing a call, the light another control", async () => {
-  const groups = [...program().groups, { id: "F1", movements: ["walk r1"], links: [2], walk: true }];
-  const [one, two] = plan.stages;
-  const stages = [one, { ...two, groups: ["K2", "F1"] }] as typeof plan.stages;
+test("a turn gets an arrow, a stage a call, the light another control", async () => {
   const editing = editable();
-  const { user } = show(panel(program({ turns: [turn], groups, plans: [{ ...plan, stages }] }), editing));
+  const { user } = show(panel(program({ turns: [turn] }), editing));
   await user.click(await screen.findByRole("radio", { name: "Gaps and arrow" }));
   expect(editing.edit).toHaveBeenLastCalledWith({
     kind: "set_turn",
@@ -89,7 +86,7 @@ test("a turn gets an arrow, a stage with a crossing a call, the light another co
     treatment: "both",
   });
   // Stage 1 is the first and waits for nobody; stage 2 is on call already.
-  const [call, ...more] = screen.getAllByRole("switch", { name: /when a pedestrian calls/ });
+  const [call, ...more] = screen.getAllByRole("switch", { name: /only when called/ });
   expect(more).toEqual([]);
   await user.click(call as HTMLElement);
   expect(editing.edit).toHaveBeenLastCalledWith({

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from odscen.lanegraph.parking_areas import map_parking
-from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.realize.usable import usable_places
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import InputError
 from odscen.base.xml_reading import read_xml
-from odscen.sumo.realize.program_files import DETECTOR_PARAM
+from odscen.sumo.realize.lights.program_files import DETECTOR_PARAM
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

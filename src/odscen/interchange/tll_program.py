@@ -30,7 +30,7 @@ from odscen.scenario.signals.stage_sequence import (
     change_steps,
     stage_state,
 )
-from odscen.sumo.realize.light_realization import (
+from odscen.sumo.realize.lights.light_realization import (
     CONTROL_PARAM,
     GROUP_PARAM,
     MAP_STAGES,

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 STAGE_NAME = re.compile(r"stage\s+([A-Za-z0-9][A-Za-z0-9_.-]*)$")
 """Name of the phase of a stage; its id."""
 
+SEEN = re.compile(r"\b[aw]:")
+"""What a condition asks of a detector: vehicles that are on it, or how long one waits there."""
+
 GAP = re.compile(r"z:(\S+) > ([0-9.]+)")
 """A loop of a condition, and the seconds without vehicles that it asks for."""
 
@@ -171,7 +174,8 @@ def _called(program: FileProgram, order: Sequence[int], n: int) -> bool:
     return any(
         len(program.phases[at].following) > 1
         and any(
-            "w:" in program.conditions.get(word, "") for word in _condition(program, at).split()
+            SEEN.search(program.conditions.get(word, ""))
+            for word in _condition(program, at).split()
         )
         for at in order
         if _leads_to(program, order, at, order[n])

@@ -100,10 +100,12 @@ def plain_sumo(workspace: Workspace, one: Scenario, folder: Path) -> None:
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("called", [("4",), ("2", "3", "4")], ids=["people", "vehicles too"])
 def test_groups_stages_calls_detectors_and_plans_come_back_as_they_were(
-    workspace: Workspace, tmp_path: Path
+    workspace: Workspace, tmp_path: Path, called: tuple[str, ...]
 ) -> None:
-    one = placed(workspace, scenario(program(), control="actuated", clock=EVENING))
+    stages = [{**one, "on_call": one["id"] in called} for one in program()["stages"]]
+    one = placed(workspace, scenario(program(stages=stages), control="actuated", clock=EVENING))
     (timing,) = taken(workspace, one, tmp_path).signals.junctions
     (own,) = one.signals.junctions
     assert timing.control == "actuated"

@@ -101,7 +101,6 @@ def test_greens_and_intergreens_have_to_be_the_cycle() -> None:
     ("change", "code"),
     [
         ({"s1": {"max_green": 10}}, "green_out_of_bounds"),
-        ({"s2": {"on_call": True}}, "call_without_crossing"),
         ({"s1": {"on_call": True}}, "first_stage_on_call"),
     ],
 )

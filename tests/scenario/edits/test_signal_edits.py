@@ -115,12 +115,14 @@ def test_an_offset_of_the_maps_program_is_an_entry_of_its_own() -> None:
         edits.set_offset(one, [light()], "99", offset=12)
 
 
-def test_a_stage_can_be_called_only_where_it_has_a_crossing_and_keeps_its_id() -> None:
+def test_a_stage_can_wait_for_a_call_but_not_the_first_one_and_keeps_its_id() -> None:
     one = empty(one_plan())
     always = edits.set_stage(one, [light()], JUNCTION, "4", on_call=False)
     assert [stage.on_call for stage in timing(always).stages] == [False] * 4
-    with pytest.raises(ScenarioError, match="'2' cannot be called: it has no crossing"):
-        edits.set_stage(one, [light()], JUNCTION, "2", on_call=True)
+    arrows = edits.set_stage(one, [light()], JUNCTION, "2", on_call=True)
+    assert [stage.on_call for stage in timing(arrows).stages] == [False, True, False, True]
+    with pytest.raises(ScenarioError, match="'1' is the first and cannot wait for a call"):
+        edits.set_stage(one, [light()], JUNCTION, "1", on_call=True)
     with pytest.raises(InputError, match="keeps its id"):
         edits.set_stage(one, [light()], JUNCTION, "2", id="5")
     with pytest.raises(InputError, match="take over that of the map first"):

@@ -23,7 +23,7 @@ from odscen.sumo.calibrate.light_timing import (
     with_greens,
     with_timings,
 )
-from odscen.sumo.realize.light_realization import realized_lights
+from odscen.sumo.realize.lights.light_realization import realized_lights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -18,7 +18,7 @@ from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.signals_document import JunctionTiming, ProgramGroup, ProgramStage
 from odscen.sumo.calibrate.light_timing import retimed, stretched, timing_of, with_timings
-from odscen.sumo.realize.light_realization import realized_lights
+from odscen.sumo.realize.lights.light_realization import realized_lights
 
 if TYPE_CHECKING:
     from pathlib import Path

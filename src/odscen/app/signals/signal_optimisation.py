@@ -19,7 +19,7 @@ from odscen.sumo.calibrate.light_timing import (
     with_timings,
 )
 from odscen.sumo.calibrate.turning_volumes import planned_vehicles, turning_volumes
-from odscen.sumo.realize.light_realization import realized_lights
+from odscen.sumo.realize.lights.light_realization import realized_lights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

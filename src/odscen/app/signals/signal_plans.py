@@ -42,7 +42,7 @@ def lights_of(
     NotFoundError
         If the workspace has no such map.
     """
-    from odscen.sumo.realize.light_realization import realized_lights
+    from odscen.sumo.realize.lights.light_realization import realized_lights
 
     scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
@@ -62,8 +62,8 @@ def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:
         If the scenario leaves all lights as they are in the map.
     """
     from odscen.sumo.folder.layout import SIGNALS_FILE
-    from odscen.sumo.realize.light_realization import realized_lights
-    from odscen.sumo.realize.program_files import signals_xml
+    from odscen.sumo.realize.lights.light_realization import realized_lights
+    from odscen.sumo.realize.lights.program_files import signals_xml
     from odscen.sumo.realize.realization import realize
 
     scenario = given_scenario(scenario)

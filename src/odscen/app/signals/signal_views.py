@@ -10,7 +10,7 @@ from odscen.app.scenarios import given_scenario
 from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError, NotFoundError
 from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.sumo.realize.actuated.detector_places import lane_lines
+from odscen.sumo.realize.lights.actuated.detector_places import lane_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -8,8 +8,8 @@ from odscen.convert.lane_table.light_heads import Heads
 from odscen.interchange.openscenario.dialect import xml
 from odscen.scenario.signals.light import find_light
 from odscen.scenario.signals.movement_names import find_movements
-from odscen.sumo.realize.light_realization import realized_lights
-from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.lights.light_realization import realized_lights
+from odscen.sumo.realize.lights.light_views import scenario_lights
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -194,10 +194,6 @@ def _plan_problems(program: DesignedProgram, plan: TimedPlan, where: str) -> Ite
                 f"min_green of {stage.least:g} s and its max_green of {stage.most:g} s"
             )
             yield error("green_out_of_bounds", where, message)
-        crossing = any(program.groups[name].walk for name in stage.groups)
-        if stage.on_call and not crossing:
-            message = f"stage {stage.id!r} cannot be called: it has no crossing"
-            yield error("call_without_crossing", where, message)
         if "G" not in (state := stage_state(program, stage)) and "g" not in state:
             yield error("empty_stage", where, f"stage {stage.id!r} gives no green")
     if plan.stages[0].on_call:

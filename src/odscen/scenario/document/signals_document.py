@@ -42,7 +42,7 @@ class ProgramStage(Part):
     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
     meet. ``green`` is what the stage lasts with fixed-time control; actuated control keeps it
     between ``min_green`` and ``max_green`` (``None``: ``green``). A stage ``on_call`` comes only
-    if somebody waits at one of its crossings.
+    if somebody waits at one of its crossings, or a vehicle for a green of it.
     """
 
     id: Identifier

@@ -18,7 +18,7 @@ from odscen.scenario.demand.count_stations import Passing, transitions
 from odscen.scenario.demand.day_profiles import DAY, Curve, known_profiles
 from odscen.scenario.document.scenario_document import Background, Demand
 from odscen.scenario.placing.region import Region
-from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.passages import each_passing
 from odscen.sumo.realize.realization import all_road_users
 

@@ -33,10 +33,10 @@ from odscen.sumo.folder.layout import (
     STOPS_FILE,
     STORY_FILE,
 )
-from odscen.sumo.realize.light_realization import realized_lights
-from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.lights.light_realization import realized_lights
+from odscen.sumo.realize.lights.light_views import scenario_lights
+from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
-from odscen.sumo.realize.program_files import signals_xml
 from odscen.sumo.realize.recording import region_xml
 from odscen.sumo.realize.road_users.departures import demand_users, road_users
 from odscen.sumo.realize.road_users.free_flow import environment_effect
@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import Int32Array
     from odscen.results.records.light_programs import LightProgram
     from odscen.scenario.document.scenario_document import Scenario, Simulation
-    from odscen.sumo.realize.light_realization import RealizedLight
+    from odscen.sumo.realize.lights.light_realization import RealizedLight
     from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.road_users.free_flow import ModelSizes
     from odscen.sumo.realize.run_settings import RunSettings, SliceLength

@@ -19,7 +19,7 @@ from odscen.results.report.signals.signal_charts import phase_spans, plan_chart,
 from odscen.results.report.signals.signal_sheet import signal_sheet
 from odscen.results.report.signals.signal_tables import detector_rows, split_rows
 from odscen.results.report.signals.stage_diagrams import JunctionPictures
-from odscen.sumo.realize.light_realization import realized_lights
+from odscen.sumo.realize.lights.light_realization import realized_lights
 from tests.signal_case import MAP, crossing, program, scenario
 
 if TYPE_CHECKING:

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 from odscen.convert.model.net import CROSSED
 from odscen.scenario.document.measures_document import SignalOutage
-from odscen.sumo.realize.light_realization import SumoProgram
-from odscen.sumo.realize.program_files import FLASHING
-from odscen.sumo.realize.stage_phases import PhasePlan, SumoPhase
+from odscen.sumo.realize.lights.light_realization import SumoProgram
+from odscen.sumo.realize.lights.program_files import FLASHING
+from odscen.sumo.realize.lights.stage_phases import PhasePlan, SumoPhase
 from odscen.sumo.realize.traffic_measures.measure_actions import end_of
 
 if TYPE_CHECKING:
     from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.realize.light_realization import RealizedLight
+    from odscen.sumo.realize.lights.light_realization import RealizedLight
     from odscen.sumo.realize.sumo_map import SumoMap
 
 NET_PROGRAM = "0"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from odscen.sumo.realize.actuated.call_areas import Callers, call_areas
-from odscen.sumo.realize.actuated.called_phases import called_phases
-from odscen.sumo.realize.actuated.stage_variants import StageVariants, shorter
-from odscen.sumo.realize.light_detectors import (
+from odscen.sumo.realize.lights.actuated.call_areas import Callers, call_areas
+from odscen.sumo.realize.lights.actuated.called_phases import called_phases
+from odscen.sumo.realize.lights.actuated.stage_variants import StageVariants, shorter
+from odscen.sumo.realize.lights.light_detectors import (
     ended_with_buses,
     may_end,
     vehicle_loops,
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.document.signals_document import SignalDetector
     from odscen.scenario.signals.light import Light
-    from odscen.sumo.realize.actuated.call_areas import CallArea
-    from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
+    from odscen.sumo.realize.lights.actuated.call_areas import CallArea
+    from odscen.sumo.realize.lights.light_detectors import BusArea, PlacedLoop
+    from odscen.sumo.realize.lights.stage_phases import PhasePlan, SumoPhase
     from odscen.sumo.realize.road_net import RoadNet
-    from odscen.sumo.realize.stage_phases import PhasePlan, SumoPhase
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,15 +6,27 @@ import subprocess
 from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import polars as pl
+import pytest
 from lxml import etree
 
 from odscen.results.records.light_programs import programs_from_json, programs_to_json
 from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.sumo.realize.light_realization import realized_lights
-from odscen.sumo.realize.program_files import signals_xml
+from odscen.scenario.signals.stage_sequence import cycle_length
+from odscen.sumo.realize.lights.light_realization import realized_lights
+from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import write_sumo_files
-from tests.signal_case import crossing, light, one_plan, program, scenario, timing
+from tests.signal_case import (
+    carried_out,
+    crossing,
+    entries,
+    light,
+    one_plan,
+    program,
+    scenario,
+    timing,
+)
 from tests.sumo.conftest import BIN
 
 if TYPE_CHECKING:
@@ -121,6 +133,62 @@ def test_a_stage_on_call_comes_only_if_somebody_waits(tmp_path: Path) -> None:
         assert {round(b - a, 3) for a, b in pairwise(firsts)} == {84.0}
     assert {one.seconds for one in quiet if one.name == "stage 3"} == {12.0}
     assert any(one.name == "hold 3" for one in quiet)
+
+
+def called_by_vehicles() -> dict[str, Any]:
+    """The arrows of the main street and the green of the side street come on call."""
+    own = {s["id"]: s for s in program()["stages"]}
+    called = [
+        own["1"],
+        {**own["2"], "on_call": True},
+        {**own["3"], "on_call": True, "min_green": 5},
+        own["4"],
+    ]
+    return one_plan(stages=called, detectors=None)
+
+
+def only_from(leg: int, to: str, *, control: str) -> Scenario:
+    """Some cars from one leg to the end of another, and nobody else."""
+    one = scenario(called_by_vehicles(), control=control, walkers=0.0, vehicles=120.0)
+    flows = (flow for flow in one.flows if flow.spawn == entries()[leg])
+    kept = [flow.model_copy(update={"goal": to}) for flow in flows]
+    return one.model_copy(update={"flows": tuple(kept)})
+
+
+@pytest.mark.parametrize("control", ["fixed", "actuated"])
+@pytest.mark.parametrize(
+    ("leg", "to", "wanted"),
+    [(0, "3.0.1.64", set()), (1, "4.0.1.64", {"3"})],
+    ids=["main street", "side street"],
+)
+def test_a_vehicle_calls_the_stage_that_it_needs_and_others_are_left_out(
+    tmp_path: Path, control: str, leg: int, to: str, wanted: set[str]
+) -> None:
+    one = only_from(leg, to, control=control)
+    seen = shown(tmp_path, one)
+    assert set(stages(seen)) == {"1"} | wanted
+    for name in wanted:
+        # Of eight cycles or more some are without a car.
+        assert 4 <= stages(seen).count(name) < stages(seen).count("1")
+
+
+def test_an_arrow_comes_on_call_for_who_found_no_gap_in_oncoming_traffic(tmp_path: Path) -> None:
+    lefts = only_from(0, "4.0.1.64", control="fixed")
+    assert "2" not in stages(shown(tmp_path / "alone", lefts))
+    oncoming = only_from(2, "1.0.1.64", control="fixed").flows[0]
+    busy = oncoming.model_copy(update={"per_hour": 900.0})
+    seen = shown(tmp_path / "busy", lefts.model_copy(update={"flows": (*lefts.flows, busy)}))
+    assert 2 <= stages(seen).count("2") < stages(seen).count("1")
+
+
+def test_whoever_calls_a_stage_gets_it_in_the_next_cycle(tmp_path: Path) -> None:
+    one = only_from(1, "4.0.1.64", control="fixed")
+    trips = pl.read_parquet(carried_out(one, tmp_path).folder / "trips.parquet")
+    design = DesignedProgram(timing(**called_by_vehicles()), light(), "fixed")
+    cycle = cycle_length(design, design.plans()[0].stages)
+    assert len(trips) >= 8
+    assert trips["waiting_time"].to_list()[0] > 0.0
+    assert max(trips["waiting_time"].to_list()) <= cycle
 
 
 def test_a_detector_prolongs_its_stage_up_to_the_bound_and_no_other(tmp_path: Path) -> None:

@@ -19,14 +19,14 @@ from odscen.scenario.signals.stage_sequence import (
     cycle_length,
     stage_state,
 )
-from odscen.sumo.realize.light_detectors import BUS_GREEN, bus_in
+from odscen.sumo.realize.lights.light_detectors import BUS_GREEN, bus_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.signals.program_design import DesignedProgram, PlannedStage, TimedPlan
-    from odscen.sumo.realize.light_detectors import BusArea
+    from odscen.sumo.realize.lights.light_detectors import BusArea
 
 HOLD = "hold "
 """How the names of phases begin that hold a stage for one that was not called."""
@@ -128,18 +128,20 @@ def started_offset(plan: PhasePlan, offset: float) -> float:
     return offset if total == cycle else (total - (-offset % cycle)) % total
 
 
-def calling_crossings(program: DesignedProgram) -> dict[str, set[int]]:
-    """Crossings that call each stage on call: those that have no green otherwise, if any."""
+def calling_movements(program: DesignedProgram) -> dict[str, set[int]]:
+    """Movements whose road users call each stage on call.
+
+    Those that have no green otherwise; if all have, those on foot, or without any all of them.
+    """
     stages = program.timing.stages
     walks = {name for name, group in program.groups.items() if group.walk}
     served = {name for stage in stages if not stage.on_call for name in stage.groups}
     found = {}
     for stage in stages:
         if stage.on_call:
-            own = walks & set(stage.groups)
-            found[stage.id] = {
-                n for name in own - served or own for n in program.groups[name].movements
-            }
+            own = set(stage.groups)
+            calling = own - served or own & walks or own
+            found[stage.id] = {n for name in calling for n in program.groups[name].movements}
     return found
 
 

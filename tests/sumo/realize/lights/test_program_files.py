@@ -24,9 +24,9 @@ from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.scenario import edits
 from odscen.scenario.document.signals_document import Signals
-from odscen.sumo.realize.light_realization import realized_lights
-from odscen.sumo.realize.light_views import scenario_lights
-from odscen.sumo.realize.program_files import signals_xml
+from odscen.sumo.realize.lights.light_realization import realized_lights
+from odscen.sumo.realize.lights.light_views import scenario_lights
+from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap
@@ -37,7 +37,7 @@ from tests.sumo.conftest import BIN
 if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
-MAP = Path(__file__).parents[3] / "maps" / "signal_crossing.xodr"
+MAP = Path(__file__).parents[4] / "maps" / "signal_crossing.xodr"
 JUNCTION = "10001"
 
 

@@ -255,12 +255,6 @@ def may_end(loops: Iterable[PlacedLoop], stage: str, green: set[int]) -> str:
     return " and ".join(parts)
 
 
-def called(loops: Iterable[PlacedLoop], stage: str) -> str:
-    """SUMO's expression for: somebody waits to cross in the stage."""
-    waiting = [f"(w:{loop.id} > 0)" for loop in loops if loop.walk and stage in loop.stages]
-    return " or ".join(waiting)
-
-
 def _by_lane(light: SumoLight, movements: Iterable[int]) -> dict[str, tuple[int, ...]]:
     found: dict[str, list[int]] = {}
     for n in movements:

@@ -9,24 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import count
 from typing import TYPE_CHECKING
 
-from odscen.results.records.light_programs import (
-    LightProgram,
-    ProgramPhase,
-    ShownGroup,
-    ShownPlan,
-)
 from odscen.scenario.document.signals_document import JunctionTiming
-from odscen.scenario.signals.movement_names import shortest_names
 from odscen.scenario.signals.plan_times import active_plans
 from odscen.scenario.signals.program_design import ONLY_PLAN, DesignedProgram, TimedPlan
-from odscen.sumo.realize.actuated.called_light import called_light
-from odscen.sumo.realize.actuated.detector_places import shown_bus_areas, shown_detectors
-from odscen.sumo.realize.light_detectors import (
+from odscen.sumo.realize.lights.actuated.call_areas import call_areas, called
+from odscen.sumo.realize.lights.actuated.called_light import called_light
+from odscen.sumo.realize.lights.light_detectors import (
     bus_areas,
-    called,
     ended_with_buses,
     idle_loop,
     idle_loops,
@@ -34,12 +25,13 @@ from odscen.sumo.realize.light_detectors import (
     vehicle_loops,
     waiting_places,
 )
-from odscen.sumo.realize.light_views import scenario_lights
-from odscen.sumo.realize.stage_phases import (
+from odscen.sumo.realize.lights.light_views import scenario_lights
+from odscen.sumo.realize.lights.shown_light import ShownLight
+from odscen.sumo.realize.lights.stage_phases import (
     PhasePlan,
     SumoPhase,
     bus_phases,
-    calling_crossings,
+    calling_movements,
     kept_cycle,
     kept_phases,
     plan_phases,
@@ -50,12 +42,13 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
+    from odscen.results.records.light_programs import LightProgram, ShownPlan
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import Control
     from odscen.scenario.signals.light import Light
-    from odscen.sumo.realize.actuated.call_areas import CallArea
-    from odscen.sumo.realize.actuated.called_light import CalledLight
-    from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
+    from odscen.sumo.realize.lights.actuated.call_areas import CallArea
+    from odscen.sumo.realize.lights.actuated.called_light import CalledLight
+    from odscen.sumo.realize.lights.light_detectors import BusArea, PlacedLoop
     from odscen.sumo.realize.sumo_map import SumoMap
 
 TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
@@ -165,6 +158,7 @@ class _Realizing:
         self._control = control
         self._map = sumo_map
         self._net = sumo_map.net
+        self._picture = ShownLight(light, view, control, sumo_map)
 
     def kept(self) -> RealizedLight:
         """The network's stages, perhaps with other greens, offset or control."""
@@ -186,8 +180,9 @@ class _Realizing:
             plan = bus_phases(plan, {p.stage: _green(p.state) for p in phases}, self._buses,
                               conditions)  # fmt: skip
             loops = idle_loops(light, self._net, self._buses)
-        shown = self._shown(
-            self._own_groups(), (self._shown_plan(ONLY_PLAN, offset, plan),), loops, own=False
+        plans = (self._picture.plan(ONLY_PLAN, offset, plan),)
+        shown = self._picture.program(
+            self._picture.own_groups(), plans, loops, self._buses, own=False
         )
         if not self._buses and self._control == "fixed" and not changed and offset == light.offset:
             return RealizedLight(shown)
@@ -227,9 +222,12 @@ class _Realizing:
         program = DesignedProgram(self._timing, self._view, self._control)
         plans = program.plans()
         active = active_plans(plans, clock=clock, until=until)
-        calling = calling_crossings(program)
-        loops = waiting_places(self._light, self._net, calling)
-        if loops and self._control == "fixed":
+        calling = calling_movements(program)
+        walks = {n for n, one in enumerate(self._view.movements) if one.walk}
+        loops = waiting_places(
+            self._light, self._net, {name: own & walks for name, own in calling.items()}
+        )
+        if calling and self._control == "fixed":
             first = program.plans()[0].stages[0]
             shown = [n for g in sorted(first.groups) for n in program.groups[g].movements]
             cars = [n for n in shown if not self._view.movements[n].walk]
@@ -249,23 +247,31 @@ class _Realizing:
                 ),
                 *loops,
             )
+        every = call_areas(self._light, self._view, self._net, loops)
+        wanted = {n for own in calling.values() for n in own}
+        areas = tuple(area for area in every if wanted & set(area.movements))
         made: list[SumoProgram] = []
         shown_plans: list[ShownPlan] = []
         for plan in plans:
             if plan.id in {name for _, name in active}:
-                one = self._program(program, plan, loops)
+                one = self._program(program, plan, loops, areas)
                 made.append(one)
                 begins = tuple(time for time, name in active if name == plan.id)
-                shown_plans.append(self._shown_plan(plan.id, plan.offset, one.plan, begins))
+                shown_plans.append(self._picture.plan(plan.id, plan.offset, one.plan, begins))
         groups = tuple(
-            self._shown_group(group.id, group.movements) for group in program.groups.values()
+            self._picture.group(group.id, group.movements) for group in program.groups.values()
         )
-        told = self._shown(groups, tuple(shown_plans), loops, own=True)
-        return RealizedLight(told, tuple(made), loops, active, self._buses)
+        told = self._picture.program(groups, tuple(shown_plans), loops, self._buses, own=True)
+        return RealizedLight(told, tuple(made), loops, active, self._buses, areas)
 
     def _program(
-        self, program: DesignedProgram, plan: TimedPlan, loops: Sequence[PlacedLoop]
+        self,
+        program: DesignedProgram,
+        plan: TimedPlan,
+        loops: Sequence[PlacedLoop],
+        areas: Sequence[CallArea],
     ) -> SumoProgram:
+        calling = calling_movements(program)
         conditions, ends, calls = {}, {}, {}
         for stage in plan.stages:
             green = {n for g in stage.groups for n in program.groups[g].movements}
@@ -275,7 +281,7 @@ class _Realizing:
                 conditions[ends[stage.id]] = ended_with_buses(expression, self._buses, green)
             if stage.on_call:
                 calls[stage.id] = f"call{stage.id}"
-                conditions[calls[stage.id]] = called(loops, stage.id)
+                conditions[calls[stage.id]] = called(loops, areas, stage.id, calling[stage.id])
         switched = bool(program.timing.plans) and (bool(loops) or self._control == "actuated")
         phases = plan_phases(program, plan, ends=ends, calls=calls, switched=switched)
         free = self._control == "fixed" and not phases.chooses
@@ -338,76 +344,6 @@ class _Realizing:
         if extra:
             params["extra-detectors"] = " ".join(extra)
         return params
-
-    # What is shown
-
-    def _shown(
-        self,
-        groups: tuple[ShownGroup, ...],
-        plans: tuple[ShownPlan, ...],
-        loops: Sequence[PlacedLoop],
-        *,
-        own: bool,
-    ) -> LightProgram:
-        light = self._light
-        detectors = (
-            *shown_detectors(loops, light, self._map),
-            *shown_bus_areas(self._buses, plans, self._map),
-        )
-        return LightProgram(
-            light.id, self._view.names, self._control, own, groups, plans, detectors
-        )
-
-    def _shown_plan(
-        self, name: str, offset: float, plan: PhasePlan, begins: tuple[float, ...] = ()
-    ) -> ShownPlan:
-        phases = []
-        for p in plan.cycle:
-            free = self._control == "actuated" and p.prolonged and p.earliest_end is None
-            least, most = (p.least, p.most) if free else (0.0, 0.0)
-            phases.append(ProgramPhase(p.seconds, p.state, p.name, p.stage, least, most, p.on_call))
-        return ShownPlan(name, offset, tuple(phases), begins)
-
-    def _shown_group(self, name: str, links: tuple[int, ...]) -> ShownGroup:
-        movements = self._view.movements
-        walk = bool(movements) and all(movements[n].walk for n in links)
-        lanes = tuple(self._inside(n) for n in links)
-        names = shortest_names(links, movements) if movements else ()
-        paths = tuple(self._light.links[n].path for n in links)
-        return ShownGroup(name, links, names, walk, () if walk else lanes, paths)
-
-    def _inside(self, n: int) -> tuple[str, ...]:
-        """Lane before the light, and the lanes of a link inside the junction."""
-        link = self._light.links[n]
-        onto = next(
-            (
-                one.via
-                for one in self._net.links_from.get(link.source, ())
-                if one.target == link.target
-            ),
-            None,
-        )
-        if onto is None:
-            return link.source, link.target
-        return link.source, onto, *(lane.id for lane in self._net.leaving(onto)[:-1])
-
-    def _own_groups(self) -> tuple[ShownGroup, ...]:
-        """Groups of the network's program: links that always show the same, but for who yields."""
-        if not self._light.links:
-            return ()
-        columns: dict[tuple[str, ...], list[int]] = {}
-        for n, one in enumerate(self._view.movements):
-            if not one.turn:
-                continue
-            shown = tuple(phase.state[n].lower() for phase in self._light.phases)
-            columns.setdefault((one.approach, str(one.walk), *shown), []).append(n)
-        names = {True: count(1), False: count(1)}
-        groups = []
-        for links in columns.values():
-            walk = self._view.movements[links[0]].walk
-            name = f"{'F' if walk else 'K'}{next(names[walk])}"
-            groups.append(self._shown_group(name, tuple(links)))
-        return tuple(groups)
 
 
 def _green(state: str) -> set[int]:

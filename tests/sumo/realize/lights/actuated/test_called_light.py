@@ -12,8 +12,8 @@ import pytest
 from odscen.convert.model.net import Phase
 from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.sumo.folder.recorded import read_light_states
-from odscen.sumo.realize.actuated.stage_variants import LEAST_CALLED
-from odscen.sumo.realize.stage_phases import plan_phases
+from odscen.sumo.realize.lights.actuated.stage_variants import LEAST_CALLED
+from odscen.sumo.realize.lights.stage_phases import plan_phases
 from tests.signal_case import JUNCTION, carried_out, crossing, entries, light, scenario, timing
 
 if TYPE_CHECKING:

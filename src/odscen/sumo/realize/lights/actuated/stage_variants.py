@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from odscen.scenario.document.signals_document import JunctionTiming
 from odscen.scenario.signals.program_design import DesignedGroup, DesignedProgram, PlannedStage
 from odscen.scenario.signals.stage_sequence import change_steps, stage_state
-from odscen.sumo.realize.stage_phases import SumoPhase
+from odscen.sumo.realize.lights.stage_phases import SumoPhase
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.base.xml_text import quoteattr
-from odscen.sumo.realize.light_detectors import AREA_END
+from odscen.sumo.realize.lights.light_detectors import AREA_END
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from odscen.sumo.realize.actuated.call_areas import CallArea
-    from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
-    from odscen.sumo.realize.light_realization import RealizedLight, SumoProgram
-    from odscen.sumo.realize.stage_phases import SumoPhase
+    from odscen.sumo.realize.lights.actuated.call_areas import CallArea
+    from odscen.sumo.realize.lights.light_detectors import BusArea, PlacedLoop
+    from odscen.sumo.realize.lights.light_realization import RealizedLight, SumoProgram
+    from odscen.sumo.realize.lights.stage_phases import SumoPhase
 
 FLASHING = "flashing"
 """Program of a light that is out of order and flashes."""

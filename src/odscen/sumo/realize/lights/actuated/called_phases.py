@@ -11,14 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from odscen.sumo.realize.actuated.call_areas import all_of, any_of
-from odscen.sumo.realize.stage_phases import PhasePlan, SumoPhase
+from odscen.sumo.realize.lights.actuated.call_areas import all_of, any_of
+from odscen.sumo.realize.lights.stage_phases import PhasePlan, SumoPhase
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.sumo.realize.actuated.call_areas import Callers
-    from odscen.sumo.realize.actuated.stage_variants import StageVariant, StageVariants
+    from odscen.sumo.realize.lights.actuated.call_areas import Callers
+    from odscen.sumo.realize.lights.actuated.stage_variants import StageVariant, StageVariants
 
 RESTING = 3600.0
 """Seconds after which a resting light asks again; any call asks before."""

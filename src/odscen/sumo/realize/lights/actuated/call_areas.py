@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.sumo.realize.light_detectors import area_length
+from odscen.sumo.realize.lights.light_detectors import area_length
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.signals.light import Light
-    from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
+    from odscen.sumo.realize.lights.light_detectors import BusArea, PlacedLoop
     from odscen.sumo.realize.road_net import RoadNet
 
 STUCK = 20.0
@@ -63,6 +63,18 @@ def call_areas(
         )
         for number, (lane, own) in enumerate(lanes.items())
     )
+
+
+def called(
+    loops: Iterable[PlacedLoop], areas: Iterable[CallArea], stage: str, calling: set[int]
+) -> str:
+    """SUMO's expression for: somebody waits to cross in a stage, or a vehicle for its green.
+
+    ``calling`` are places in the light's states of the movements that may call it.
+    """
+    waiting = [f"w:{loop.id} > 0" for loop in loops if loop.walk and stage in loop.stages]
+    vehicles = [f"a:{area.id} > 0" for area in areas if calling & set(area.movements)]
+    return any_of((*waiting, *vehicles))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from odscen.convert.lane_table.table import SumoLight
 from odscen.convert.model.net import LightLink
 from odscen.scenario.document.signals_document import SignalDetector
 from odscen.scenario.signals.light import Light, SignalMovement
-from odscen.sumo.realize.light_detectors import area_length, may_end, vehicle_loops
+from odscen.sumo.realize.lights.light_detectors import area_length, may_end, vehicle_loops
 from odscen.sumo.realize.road_net import Link, RoadNet, RoadNetLane
 
 LIGHT = SumoLight(

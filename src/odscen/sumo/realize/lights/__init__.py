@@ -1,0 +1,1 @@
+"""Traffic lights of a run: programs, detectors and what calls their stages."""
