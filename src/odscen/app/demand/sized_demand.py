@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from odscen.results.records.run_plan import Plan
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.worker.protocol import OnProgress, Progress
     from odscen.workspace.store import Workspace
 
@@ -236,7 +237,11 @@ class _Trials:
             try:
                 run = run_prepared(prepared, checked.folder, progress=_limit(prepared.plan))
                 level, headline = (run.usability[key] for key in ("level", "headline"))
+                # Whether it was noticed in time is a matter of the machine, the words are not.
+                backlog = _most_waiting(run) > BACKLOG * len(prepared.plan.actors)
             except _BacklogError:
+                backlog = True
+            if backlog:
                 level = UsabilityLevel.NOT_USABLE
                 headline = (
                     f"{level}: more than {_percent(BACKLOG)} had no room to depart at one time"
@@ -264,6 +269,17 @@ def _limit(plan: Plan) -> OnProgress:
             raise _BacklogError
 
     return stop
+
+
+def _most_waiting(run: Run) -> int:
+    """Road users who were due and not inserted at one time, at most."""
+    table = run.actors()
+    depart, inserted = (table[name].to_numpy() for name in ("depart", "inserted"))
+    times = np.concatenate([depart, inserted])
+    change = np.repeat([1, -1], len(depart))
+    happened = np.isfinite(times)
+    order = np.lexsort((-change[happened], times[happened]))
+    return int(np.cumsum(change[happened][order]).max(initial=0))
 
 
 def _percent(share: float) -> str:
