@@ -10,20 +10,13 @@ from hypothesis import strategies as st
 from scipy.sparse import csgraph
 
 from odscen.base.errors import InputError
-from odscen.lanegraph import shortest_paths
+from odscen.lanegraph import path_finder
 from odscen.lanegraph.chained_distances import ChainedDistances
 from odscen.lanegraph.edge_matrix import shortest_edges
 from odscen.lanegraph.graph_files import to_networkx
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import induced, node_id, node_ids, node_index, walk_node_id
 from odscen.lanegraph.shortest_paths import Router, WalkRouter
-from odscen.lanegraph.single_paths import (
-    goal_candidates,
-    reachable,
-    shortest_path,
-    walk_goal_candidates,
-    walk_shortest_path,
-)
 from tests.graphs import fork, line_of_segments, ring, two_lane_road
 
 FORK = fork()
@@ -36,62 +29,62 @@ def names(graph, nodes) -> list[str]:
 
 
 def test_the_last_nodes_of_both_branches_are_the_goals() -> None:
-    assert names(FORK, goal_candidates(FORK, None, 0)) == ["2.0.-1.29", "3.0.-1.29"]
+    assert names(FORK, Router(FORK).goal_candidates(0)) == ["2.0.-1.29", "3.0.-1.29"]
 
 
 def test_goals_stay_inside_the_region() -> None:
     mask = induced(FORK, ["r1", "j9", "r2"]).nodes
-    goals = names(FORK, goal_candidates(FORK, mask, 0))
+    goals = names(FORK, Router(FORK, mask).goal_candidates(0))
     assert goals == ["91.0.-1.8", "2.0.-1.29"]
 
 
 def test_the_last_nodes_of_neighbouring_lanes_are_terminal() -> None:
     graph = two_lane_road()
-    assert names(graph, goal_candidates(graph, None, 0)) == ["1.0.-2.49", "1.0.-1.49"]
+    assert names(graph, Router(graph).goal_candidates(0)) == ["1.0.-2.49", "1.0.-1.49"]
 
 
 def test_a_terminal_spawn_has_no_goal() -> None:
     last = node_index(FORK, "2.0.-1.29")
     assert Router(FORK).is_terminal(last)
-    assert len(goal_candidates(FORK, None, last)) == 0
+    assert len(Router(FORK).goal_candidates(last)) == 0
 
 
 def test_in_a_ring_the_goal_is_the_node_behind_the_spawn() -> None:
     graph = ring()
-    assert names(graph, goal_candidates(graph, None, 10)) == ["1.0.-1.9"]
+    assert names(graph, Router(graph).goal_candidates(10)) == ["1.0.-1.9"]
 
 
 def test_a_spawn_outside_the_region_is_refused_by_name() -> None:
     mask = induced(FORK, ["r2"]).nodes
     with pytest.raises(InputError, match=r"node 1\.0\.-1\.0 is outside the region"):
-        goal_candidates(FORK, mask, 0)
+        Router(FORK, mask).goal_candidates(0)
 
 
 def test_a_path_outside_the_region_is_empty() -> None:
     mask = induced(FORK, ["r1", "j9"]).nodes
-    assert len(shortest_path(FORK, 0, node_index(FORK, "2.0.-1.0"), mask)) == 0
+    assert len(Router(FORK, mask).path(0, node_index(FORK, "2.0.-1.0"))) == 0
 
 
 def test_the_path_back_is_no_path() -> None:
-    assert not reachable(FORK, node_index(FORK, "2.0.-1.0"))[0]
+    assert not Router(FORK).reachable(node_index(FORK, "2.0.-1.0"))[0]
 
 
 def test_a_path_changes_lane_once() -> None:
     graph = two_lane_road()
-    path = shortest_path(graph, 0, node_index(graph, "1.0.-1.49"))
+    path = Router(graph).path(0, node_index(graph, "1.0.-1.49"))
     assert len(path) == 50
     lanes = graph.lanes.lane[path]
     assert np.count_nonzero(np.diff(lanes)) == 1
 
 
 def test_dead_ends_of_the_walks_are_the_goals_of_walkers() -> None:
-    goals = walk_goal_candidates(FORK, None, 10)
+    goals = WalkRouter(FORK).goal_candidates(10)
     assert [walk_node_id(FORK, int(i)) for i in goals] == ["ped.1.0.-2.0", "ped.2.0.-2.29"]
 
 
 def test_walkers_go_both_ways() -> None:
-    forth = walk_shortest_path(FORK, 3, 70)
-    back = walk_shortest_path(FORK, 70, 3)
+    forth = WalkRouter(FORK).path(3, 70)
+    back = WalkRouter(FORK).path(70, 3)
     np.testing.assert_array_equal(forth, back[::-1])
     assert len(forth) == 68
 
@@ -170,16 +163,24 @@ def test_a_candidate_is_what_the_list_of_candidates_holds(kind: type, graph: Map
 def test_candidates_of_many_are_those_of_each(
     kind: type, graph: MapGraph, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shortest_paths, "_MANY", 0)
+    monkeypatch.setattr(path_finder, "_MANY", 0)
     router = kind(graph)
     spawns = range(0, len(router.mask), 7)
     found = [goals.tolist() for goals in router.each_candidates([*spawns])]
     assert found == [router.goal_candidates(spawn).tolist() for spawn in spawns]
     assert any(found) or not spawns  # not every toy map has walks
+    pairs = [
+        (spawn, goal)
+        for spawn in spawns
+        for goal in np.flatnonzero(router.reachable(spawn)).tolist()
+        if goal != spawn
+    ]
+    are = router.are_candidates([spawn for spawn, _ in pairs], [goal for _, goal in pairs])
+    assert are == [goal in found[spawn // 7] for spawn, goal in pairs]
 
 
 def test_of_many_one_outside_the_region_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shortest_paths, "_MANY", 0)
+    monkeypatch.setattr(path_finder, "_MANY", 0)
     router = Router(FORK, induced(FORK, ["r2"]).nodes)
     with pytest.raises(InputError, match=r"node 1\.0\.-1\.0 is outside the region"):
         router.each_candidates([0])

@@ -11,7 +11,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csgraph
+
+from odscen.lanegraph.graph_searches import csgraph
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -1,338 +1,26 @@
 """Reachability, goal candidates and shortest paths, on the lane graph and on the pedestrian graph.
 
-All paths are shortest by length. A router is made once for a region and answers many queries;
-:mod:`odscen.lanegraph.single_paths` makes one for a single query.
+All paths are shortest by length. A router is made once for a region and answers many queries.
 """
 
 from __future__ import annotations
 
-import math
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.late_modules import function_when_used, import_when_used
-
-import_when_used("numpy.ctypeslib", "numpy.f2py", "numpy.ma", "numpy.polynomial", "numpy.testing")
-function_when_used("scipy.sparse.csgraph._laplacian", "laplacian")
-from scipy.sparse import csgraph  # noqa: E402 - which names these
-
-from odscen.base.errors import InputError  # noqa: E402
-from odscen.lanegraph.chained_distances import ChainedDistances  # noqa: E402
-from odscen.lanegraph.edge_matrix import shortest_edges  # noqa: E402
-from odscen.lanegraph.kept_trees import KEPT_TREES, ROUTERS, Tree  # noqa: E402
-from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo  # noqa: E402
-from odscen.lanegraph.query import node_id, walk_node_id  # noqa: E402
+from odscen.lanegraph.chained_distances import ChainedDistances
+from odscen.lanegraph.path_finder import PathFinder
+from odscen.lanegraph.query import node_id, walk_node_id
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from scipy import sparse
+    from collections.abc import Iterator, Sequence
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.lanegraph.graphs import MapGraph
 
-_FEW = 64
-"""Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
-_MANY = 1 << 20
-"""Nodes, times sources, from which chains are worth their making."""
 
-
-class _PathFinder:
-    """Shortest paths inside ``mask``; node numbers outside are the whole map's.
-
-    An *end* is a node that is left by at most ``end_degree`` edges. Trees of the last sources are
-    kept: a caller asks for goals of one or two first, and for the path to one of them next, and the
-    scenarios of a batch have their spawns in common.
-    """
-
-    end_degree = 0
-
-    def __init__(
-        self,
-        count: int,
-        source: Int32Array,
-        target: Int32Array,
-        length: FloatArray,
-        lane: Int32Array,
-        mask: BoolArray | None,
-        *,
-        directed: bool,
-    ) -> None:
-        self.mask = np.ones(count, dtype=np.bool_) if mask is None else mask
-        self.nodes = np.flatnonzero(self.mask)
-        self._local = np.cumsum(self.mask) - 1
-        inside = self.mask[source] & self.mask[target]
-        rows, columns = self._local[source[inside]], self._local[target[inside]]
-        self._directed = directed
-        self._lane = lane[self.nodes]
-        self._matrix = shortest_edges(len(self.nodes), rows, columns, length[inside])
-        self.out_degree = np.bincount(rows, minlength=len(self.nodes))
-        if not directed:
-            self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
-        self._number = next(ROUTERS)
-
-    def distances(self, source: int) -> FloatArray:
-        """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
-        result = np.full(len(self.mask), np.inf)
-        result[self.nodes] = self._from(source).distances
-        return result
-
-    def distance(self, source: int, target: int) -> float:
-        """Metres from one node to another one; inf if it cannot be reached."""
-        distances = self._from(source).distances
-        return float(distances[self._local[target]]) if self.mask[target] else math.inf
-
-    def reachable(self, source: int) -> BoolArray:
-        """Nodes that can be reached from ``source`` in the region, itself included; ``(N,)``."""
-        return np.isfinite(self.distances(source))
-
-    def path(self, source: int, target: int) -> Int32Array:
-        """Nodes of the shortest path, both ends included; empty if there is none."""
-        distances, predecessors = self._from(source)
-        if not self.mask[target] or not np.isfinite(distances[self._local[target]]):
-            return np.empty(0, dtype=np.int32)
-        step, item = int(self._local[target]), predecessors.item
-        steps = [step]
-        while (step := item(step)) != NO_PREDECESSOR:
-            steps.append(step)
-        return self.nodes[steps[::-1]].astype(np.int32)
-
-    def paths_to(self, target: int) -> PathsTo:
-        """Shortest paths from everywhere to one node, for many sources with the same target."""
-        distances, nexts = csgraph.dijkstra(
-            self._reversed,
-            directed=self._directed,
-            indices=np.asarray(self._local[target]),
-            return_predecessors=True,
-        )
-        return PathsTo(self.nodes, self._local, distances, nexts)
-
-    @cached_property
-    def _reversed(self) -> sparse.csr_matrix[np.float64]:
-        return self._matrix.T.tocsr()
-
-    def leads(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
-        """Whether a path leads from each source to the target in the same place; shape ``(K,)``.
-
-        One pass for all, if they are many. Sources and targets lie in the region.
-        """
-        if self._directed and len(sources) <= _FEW:
-            return self._lead_few(sources, targets)
-        starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
-        if not self._directed:
-            return np.asarray(starts == ends, dtype=np.bool_)
-        reached, columns = self._reached(ends)
-        pairs = zip(starts.tolist(), ends.tolist(), strict=True)
-        return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
-
-    def _lead_few(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
-        """The same, each source by itself."""
-        found = np.zeros(len(sources), dtype=np.bool_)
-        for source in np.unique(sources).tolist():
-            seen = np.zeros(len(self.nodes), dtype=np.bool_)
-            seen[
-                csgraph.breadth_first_order(
-                    self._matrix, int(self._local[source]), return_predecessors=False
-                )
-            ] = True
-            asked = sources == source
-            found[asked] = seen[self._local[targets[asked]]]
-        return found
-
-    def reach(self, sources: Int32Array, targets: Int32Array) -> tuple[Int32Array, BoolArray]:
-        """Which of the targets each source can get to.
-
-        Returns
-        -------
-        For each source, shape ``(S,)``, a row of the table, shape ``(R, T)``: sources from which
-        the same can be reached share one. A node counts as reached from itself.
-        """
-        starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
-        parts, rows = np.unique(starts, return_inverse=True)
-        row = rows.astype(np.int32)
-        if not self._directed:
-            return row, np.equal.outer(parts, ends)
-        reached, columns = self._reached(ends)
-        table = np.zeros((len(parts), len(columns)), dtype=np.bool_)
-        for index, part in enumerate(parts.tolist()):
-            bits = reached[part]
-            while bits:
-                low = bits & -bits
-                table[index, low.bit_length() - 1] = True
-                bits ^= low
-        return row, table[:, [columns[part] for part in ends.tolist()]]
-
-    def _reached(self, parts: Int32Array) -> tuple[dict[int, int], dict[int, int]]:
-        """For each part a bit for each of ``parts`` that it leads to; and which bit is whose."""
-        columns = {part: k for k, part in enumerate(np.unique(parts).tolist())}
-        reached: dict[int, int] = {}
-        for part in self._part_order:
-            bits = 1 << columns[part] if part in columns else 0
-            for after in self._part_successors[part]:
-                bits |= reached[after]
-            reached[part] = bits
-        return reached, columns
-
-    def has_goals(self, spawn: int) -> bool:
-        """Whether there is any goal candidate: whether anything can be reached."""
-        return bool(self.out_degree[self._local[spawn]] > 0)
-
-    def goal_candidates(self, spawn: int) -> Int32Array:
-        """Nodes that may be the goal of an actor that starts at ``spawn``, ascending (R38).
-
-        Ends that can be reached. Where there is none (a ring, a closed town), the farthest
-        reachable node of each lane. Empty if nothing can be reached.
-
-        Raises
-        ------
-        InputError
-            If ``spawn`` is outside the region.
-        """
-        distances = self._from(spawn).distances  # refuses a spawn outside
-        if not self.has_goals(spawn):
-            return np.empty(0, dtype=np.int32)
-        if not self._reaches_end(spawn):
-            return self._one_per_lane(self._farthest(spawn, distances))
-        ends = np.isfinite(distances) & self._is_end
-        ends[self._local[spawn]] = False
-        return self.nodes[ends].astype(np.int32)
-
-    def each_candidates(self, spawns: Sequence[int]) -> list[Int32Array]:
-        """Goal candidates of many spawns, each in its place; the same, sooner on a large map."""
-        found: dict[int, Int32Array] = {}
-        if len(spawns) * len(self.nodes) >= _MANY:
-            inside = [one for one in dict.fromkeys(spawns) if self._holds(one)]
-            found |= self._ends_from([one for one in inside if self._reaches_end(one)])
-            found |= self._farthest_from([one for one in inside if self._is_closed(one)])
-        return [found[one] if one in found else self.goal_candidates(one) for one in spawns]
-
-    def _ends_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
-        """Candidates of each spawn that reaches an end."""
-        ends = self.nodes[self._is_end].astype(np.int32)
-        row, table = self.reach(np.array(spawns, dtype=np.int32), ends)
-        reached = [ends[ahead] for ahead in table]
-        return {
-            spawn: reached[number][reached[number] != spawn]
-            for spawn, number in zip(spawns, row.tolist(), strict=True)
-        }
-
-    def _farthest_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:  # noqa: ARG002
-        """Candidates of each spawn that reaches no end, of those for which it goes sooner."""
-        return {}
-
-    def _is_closed(self, spawn: int) -> bool:
-        """Whether no end can be reached from a node of the region, but other nodes."""
-        return self.has_goals(spawn) and not self._reaches_end(spawn)
-
-    def is_candidate(self, spawn: int, goal: int) -> bool:
-        """Whether ``goal``, which can be reached, is among the candidates of ``spawn``."""
-        if self._reaches_end(spawn):
-            return bool(self._is_end[self._local[goal]])
-        return goal in self.goal_candidates(spawn)
-
-    @cached_property
-    def _is_end(self) -> BoolArray:
-        return np.asarray(self.out_degree <= self.end_degree, dtype=np.bool_)
-
-    @cached_property
-    def _parts(self) -> Int32Array:
-        """Number of the strongly connected part that each node of the region is in."""
-        labels: Int32Array = csgraph.connected_components(
-            self._matrix, directed=self._directed, connection="strong"
-        )[1]
-        return labels
-
-    @cached_property
-    def _part_successors(self) -> dict[int, set[int]]:
-        after: dict[int, set[int]] = {part: set() for part in np.unique(self._parts).tolist()}
-        edges = self._matrix.tocoo()
-        parts = np.stack([self._parts[edges.row], self._parts[edges.col]], axis=1)
-        for one, other in np.unique(parts[parts[:, 0] != parts[:, 1]], axis=0).tolist():
-            after[one].add(other)
-        return after
-
-    @cached_property
-    def _part_order(self) -> tuple[int, ...]:
-        """Parts, each behind those that it leads to."""
-        after = self._part_successors
-        order: list[int] = []
-        done: set[int] = set()
-        todo = list(after)
-        while todo:  # parts make no circles
-            ahead = [one for one in after[todo[-1]] if one not in done]
-            if ahead:
-                todo += ahead
-            elif (part := todo.pop()) not in done:
-                done.add(part)
-                order.append(part)
-        return tuple(order)
-
-    @cached_property
-    def _ends_ahead(self) -> Int32Array:
-        """At least how many ends, itself included, can be reached from each node of the region."""
-        ends = np.flatnonzero(self._is_end)
-        if not self._directed:
-            per_part = np.bincount(self._parts[ends], minlength=len(self.nodes))
-            return per_part[self._parts].astype(np.int32)
-        if not len(ends):
-            return np.zeros(len(self.nodes), dtype=np.int32)
-        back = csgraph.dijkstra(self._matrix.T.tocsr(), indices=ends, min_only=True)
-        return np.isfinite(back).astype(np.int32)
-
-    def _reaches_end(self, spawn: int) -> bool:
-        row = self._local[spawn]
-        return bool(self._ends_ahead[row] > int(self._is_end[row]))
-
-    def _from(self, source: int) -> Tree:
-        if not self._holds(source):
-            msg = f"{self._name(source)} is outside the region of interest"
-            raise InputError(msg)
-        tree = KEPT_TREES.get(self._number, source)
-        if tree is None:
-            distances, predecessors = csgraph.dijkstra(
-                self._matrix,
-                directed=self._directed,
-                indices=np.asarray(self._local[source]),
-                return_predecessors=True,
-            )
-            tree = Tree(distances, predecessors)
-            KEPT_TREES.add(self._number, source, tree)
-        return tree
-
-    def _holds(self, node: int) -> bool:
-        return 0 <= node < len(self.mask) and bool(self.mask[node])
-
-    def _name(self, node: int) -> str:
-        return f"node {node}"
-
-    def _farthest(self, spawn: int, distances: FloatArray, *, within: float = 0.0) -> Int32Array:
-        """Rows of the farthest reachable node of each lane, and of those at most that much less."""
-        away = np.where(np.isfinite(distances), distances, -1.0)
-        away[self._local[spawn]] = -1.0
-        farthest = np.maximum.reduceat(away, self._lane_starts)
-        least = np.repeat(farthest, self._lane_sizes) - within
-        return np.flatnonzero((away >= least) & (away >= 0)).astype(np.int32)
-
-    def _one_per_lane(self, rows: Int32Array) -> Int32Array:
-        """Return the first node of each lane among these, ascending."""
-        _, first = np.unique(self._lane[rows], return_index=True)
-        nodes: Int32Array = np.sort(self.nodes[rows[first]]).astype(np.int32)
-        return nodes
-
-    @cached_property
-    def _lane_starts(self) -> Int32Array:
-        """Where the nodes of each lane begin."""
-        starts: Int32Array = np.flatnonzero(np.diff(self._lane, prepend=-1)).astype(np.int32)
-        return starts
-
-    @cached_property
-    def _lane_sizes(self) -> Int32Array:
-        return np.diff(self._lane_starts, append=len(self._lane)).astype(np.int32)
-
-
-class Router(_PathFinder):
+class Router(PathFinder):
     """Paths and goals of vehicles inside a region; ends are nodes that no edge leaves.
 
     Parameters
@@ -366,18 +54,16 @@ class Router(_PathFinder):
         """Router of the same region by another cost of each edge, shape ``(E,)``."""
         return Router(self._graph, self.mask, costs=costs)
 
-    def _farthest_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
-        found: dict[int, Int32Array] = {}
+    def _farthest_from(self, spawns: Sequence[int]) -> Iterator[tuple[int, Int32Array]]:
         if not spawns:
-            return found
+            return
         chained = ChainedDistances(self._matrix, self._graph.lanes.segment[self.nodes])
         for place, distances in chained.each(self._local[list(spawns)].tolist()):
             spawn = spawns[place]
             rounding = chained.rounding * float(distances[np.isfinite(distances)].max())
             rows = self._farthest(spawn, distances, within=rounding)
             if (np.diff(self._lane[rows]) > 0).all():  # else it is rounding that decides
-                found[spawn] = self._on_roads(self.nodes[rows].astype(np.int32))
-        return found
+                yield spawn, self._on_roads(self.nodes[rows].astype(np.int32))
 
     def is_terminal(self, node: int) -> bool:
         """Whether no edge leaves ``node`` inside the region."""
@@ -396,7 +82,7 @@ class Router(_PathFinder):
         return f"node {node_id(self._graph, node) if inside_map else node}"
 
 
-class WalkRouter(_PathFinder):
+class WalkRouter(PathFinder):
     """Paths and goals of pedestrians inside a region; ends are dead ends.
 
     Parameters

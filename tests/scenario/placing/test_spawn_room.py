@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from odscen.base.categories import DEFAULT_BODY, Body, Category
-from odscen.lanegraph.single_paths import reachable
+from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.placing.bodies import Box, Crowd, box_at, overlap
 from odscen.scenario.placing.spawn_room import Reach, distance_to_end, max_fit, standing_room
 from tests.graphs import fork, ring, two_lane_road
@@ -145,5 +145,7 @@ def test_what_is_reached_is_told_for_each_node_and_inside_the_mask_only(graph) -
     mask = np.arange(len(graph.lanes.x)) % 50 != 49
     reach = Reach(graph.lanes, mask)
     for node in range(0, len(mask), 3):
-        within = reachable(graph, node, mask) if mask[node] else np.zeros(len(mask), np.bool_)
+        within = (
+            Router(graph, mask).reachable(node) if mask[node] else np.zeros(len(mask), np.bool_)
+        )
         assert reach.of(node).tolist() == within.tolist()

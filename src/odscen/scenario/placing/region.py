@@ -171,7 +171,7 @@ class Region:
         return np.concatenate([found[0], *(one[1:] for one in found[1:])])
 
     def look_up(self, pairs: Iterable[tuple[str, str | None]]) -> None:
-        """Find the paths between many spawns and goals at once, for :meth:`leads` to remember."""
+        """Find what :meth:`leads` and :meth:`is_candidate` say of many spawns and goals at once."""
         places = {(self.place(spawn), self.place(goal)) for spawn, goal in pairs if goal}
         if len(self._ways.leads) > _MOST:
             self._ways.leads.clear()
@@ -187,6 +187,14 @@ class Region:
                 nodes = np.array([(spawn.node, goal.node) for spawn, goal in asked])
                 found = router.leads(nodes[:, 0], nodes[:, 1]).tolist()
                 self._ways.leads.update(zip(asked, found, strict=True))
+                led = [
+                    pair
+                    for pair, leads in zip(asked, found, strict=True)
+                    if leads and pair not in self._ways.candidates
+                ]
+                spawns, goals = ([pair[side].node for pair in led] for side in (0, 1))
+                are = router.are_candidates(spawns, goals)
+                self._ways.candidates.update(zip(led, are, strict=True))
 
     def segment_of(self, place: NodePlace) -> SegmentId:
         """Return the segment that a place lies in."""

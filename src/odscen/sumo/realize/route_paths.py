@@ -234,7 +234,8 @@ def _from_spawn(
     chosen = {
         index: _best(
             goals[index],
-            [(lead, lead.cost + router.distance(lead.nodes[-1], goals[index])) for lead in mine],
+            mine,
+            [router.distance(lead.nodes[-1], goals[index]) for lead in mine[:-1]],
         )
         for index, mine in begun.items()
     }
@@ -247,18 +248,25 @@ def _from_spawn(
 
 def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: PathsTo) -> list[Int32Array]:
     """Ways of trips to one goal; empty where there is none."""
-    ends = np.array([lead.nodes[-1] for leads in begun for lead in leads], dtype=np.int32)
-    costs = iter(there.distance(ends).tolist())
-    chosen = [_best(goal, [(lead, lead.cost + next(costs)) for lead in leads]) for leads in begun]
+    ends = [lead.nodes[-1] for leads in begun for lead in leads[:-1]]
+    costs = iter(there.distance(np.array(ends, dtype=np.int32)).tolist())
+    chosen = [_best(goal, leads, [next(costs) for _ in leads[:-1]]) for leads in begun]
     paths = there.paths(np.array([lead.nodes[-1] for lead in chosen], dtype=np.int32))
     return [_joined(lead, path) for lead, path in zip(chosen, paths, strict=True)]
 
 
-def _best(goal: int, leads: Sequence[tuple[_Lead, float]]) -> _Lead:
-    """Lead with the best path in all; the last, which is no lead, where no other leads there."""
-    *ahead, (none, _) = leads
-    fit = [pair for pair in ahead if math.isfinite(pair[1]) and goal not in pair[0].nodes]
-    return min(fit, key=lambda pair: pair[1])[0] if fit else none
+def _best(goal: int, leads: Sequence[_Lead], onwards: Sequence[float]) -> _Lead:
+    """Lead with the best path in all; the last, which is no lead, where no other leads there.
+
+    ``onwards`` is the cost from the end of each but the last, for which nobody needs to search.
+    """
+    *ahead, none = leads
+    fit = [
+        (lead.cost + cost, number)
+        for number, (lead, cost) in enumerate(zip(ahead, onwards, strict=True))
+        if math.isfinite(cost) and goal not in lead.nodes
+    ]
+    return ahead[min(fit)[1]] if fit else none
 
 
 def _joined(lead: _Lead, path: Int32Array) -> Int32Array:

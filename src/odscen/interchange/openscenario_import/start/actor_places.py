@@ -11,7 +11,7 @@ from odscen.interchange.openscenario_import.places.map_points import MapPoint
 from odscen.interchange.openscenario_import.story.read_motions import put_there
 from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.query import node_id, walk_node_id
-from odscen.lanegraph.single_paths import reachable
+from odscen.lanegraph.shortest_paths import Router
 
 if TYPE_CHECKING:
     from odscen.interchange.openscenario_import.import_report import ImportReport
@@ -85,7 +85,7 @@ class ActorPlaces:
         spawn, there = (self._positions.of_node(one) for one in (made["spawn"], goal))
         if spawn is None or there is None or spawn.node is None or there.node is None:
             return goal
-        if bool(reachable(self._positions.graph, spawn.node)[there.node]):
+        if bool(Router(self._positions.graph).reachable(spawn.node)[there.node]):
             return goal
         words = "straight on: the goal of the file cannot be reached from its lane"
         self._report.mark(entity.element, "approximated", words)
