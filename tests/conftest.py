@@ -13,7 +13,7 @@ settings.register_profile("odscen", deadline=None)
 settings.load_profile("odscen")
 
 # Of the slow tests each commit runs one in so many, the next one others; see CONTRIBUTING.md.
-SLOW_PARTS = 8
+SLOW_PARTS = 16
 
 _DEFAULT_MAPS = Path(__file__).parents[2] / "shared" / "maps"
 
