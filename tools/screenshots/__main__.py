@@ -23,6 +23,7 @@ SCENES: dict[str, Scene] = {
     for one in (
         editor_scenes.catalogue,
         editor_scenes.placing,
+        editor_scenes.map_tools,
         editor_scenes.planned_time,
         editor_scenes.language,
         editor_scenes.narrow,

@@ -60,6 +60,23 @@ def placing(studio: Studio) -> None:
         camera.take("road-users")
 
 
+def map_tools(studio: Studio) -> None:
+    """A grid, names, and an area that is measured."""
+    with studio.visit() as camera:
+        user, page = camera.user, camera.user.page
+        user.open_editor(scenarios.SAMPLED)
+        page.get_by_role("button", name="Layers of the map").click()
+        for layer in ("Grid with coordinates", "Names of roads and junctions"):
+            page.get_by_role("checkbox", name=layer).check()
+        page.keyboard.press("Escape")
+        page.get_by_role("button", name="Measure lengths").click()
+        x, y, _ = user.map.view()
+        for dx, dy in ((-150, -48), (-78, -48), (-78, 42), (-150, 42), (-150, -48)):
+            user.map.click((x + dx, y + dy))
+        page.get_by_role("button", name="Layers of the map").click()
+        camera.take("map-tools")
+
+
 def planned_time(studio: Studio) -> None:
     """The time bar of the editor, with the plan at 20 s on the map."""
     with studio.visit() as camera:

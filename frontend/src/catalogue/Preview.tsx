@@ -5,6 +5,7 @@ import { useEffect, useRef, useState } from "react";
 import { BaseLayer } from "../map/baseLayer";
 import { DARK, LIGHT } from "../map/colors";
 import { loadDrawing } from "../map/loaded";
+import { FIRST_LAYERS } from "../map/mapLayers";
 import { fit } from "../map/view";
 
 /** A map drawn into its card, once the card is seen; the stored picture if that fails. */
@@ -41,7 +42,7 @@ export function Preview({ name, picture }: { name: string; picture: string }) {
     const size = { width: canvas.current.clientWidth, height: canvas.current.clientHeight };
     canvas.current.width = size.width * ratio;
     canvas.current.height = size.height * ratio;
-    layer.base.draw(context, fit(layer.bounds, size, 0.04), size, ratio, dark ? DARK : LIGHT, true);
+    layer.base.draw(context, fit(layer.bounds, size, 0.04), size, ratio, dark ? DARK : LIGHT, FIRST_LAYERS);
   }, [layer, dark]);
 
   if (failed) return <img className="card-picture" src={picture} alt={label} loading="lazy" />;

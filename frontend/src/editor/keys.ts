@@ -102,6 +102,7 @@ export const SHORTCUTS = localized((): readonly (readonly [keys: string, what: s
   ["+ / −", t`On the map: zoom`],
   ["0", t`On the map: show everything`],
   ["Enter", t`On the map: choose what is in the middle`],
+  ["R", t`On the map: measure (Backspace takes a point back, Escape ends)`],
   ["↑ / ↓", t`In the table: the row before or after`],
   ["← / →", t`In the time bar: move a block by 1 s (with Shift 10 s, with Alt 0.1 s)`],
   ["?", t`This help`],

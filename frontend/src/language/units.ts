@@ -14,6 +14,9 @@ export interface Unit {
 export const KMH = 1 / 3.6;
 const FOOT = 0.3048;
 const MILE = 1609.344;
+const ACRE = 4046.8564224;
+const KILOMETRE = { metres: 1000, sign: "km" };
+const ENGLISH_MILE = { metres: MILE, sign: "mi" };
 
 const SPEEDS: Record<Preferences["speed"], number> = { "km/h": 3.6, mph: 3600 / MILE, "m/s": 1 };
 const LENGTHS: Record<Preferences["length"], number> = { m: 1, ft: 1 / FOOT };
@@ -83,7 +86,7 @@ export const roadUnit = (): Unit =>
 /** The longest round length up to so many metres, for a bar that shows the scale of a map. */
 export function roundLength(most: number): { metres: number; text: string } {
   const feet = unitFor("length").sign === "ft";
-  const large = feet ? { metres: MILE, sign: "mi" } : { metres: 1000, sign: "km" };
+  const large = feet ? ENGLISH_MILE : KILOMETRE;
   const small = feet ? { metres: FOOT, sign: "ft" } : { metres: 1, sign: "m" };
   const { metres, sign } = most >= large.metres ? large : small;
   const n = below(most / metres);
@@ -94,6 +97,31 @@ export function roundLength(most: number): { metres: number; text: string } {
 function below(n: number): number {
   const power = 10 ** Math.floor(Math.log10(n));
   return power * (n >= 5 * power ? 5 : n >= 2 * power ? 2 : 1);
+}
+
+/** The shortest round length of at least so many metres, also in the unit in which it is round. */
+export function gridStep(least: number): { metres: number; shown: number; unit: string } {
+  const { sign, scale } = unitFor("length");
+  const wanted = least * scale;
+  const power = 10 ** Math.floor(Math.log10(wanted));
+  const step = power * (wanted <= power ? 1 : wanted <= 2 * power ? 2 : wanted <= 5 * power ? 5 : 10);
+  return { metres: step / scale, shown: step, unit: sign };
+}
+
+/** A length that was measured on a map: to a tenth where that can be seen, in km or miles where it is long. */
+export function measuredLength(metres: number): string {
+  const { metres: large, sign } = unitFor("length").sign === "m" ? KILOMETRE : ENGLISH_MILE;
+  if (metres >= large) return `${fixed(metres / large, 2)} ${sign}`;
+  return lengthText(metres, metres < 100 ? 1 : 0);
+}
+
+/** An area, m², in words: square metres and square kilometres, or square feet and acres. */
+export function areaText(squareMetres: number): string {
+  if (unitFor("length").sign === "m") {
+    return squareMetres >= 1e6 ? `${fixed(squareMetres / 1e6, 2)} km²` : `${fixed(squareMetres, 0)} m²`;
+  }
+  const acres = squareMetres / ACRE;
+  return acres >= 1 ? `${fixed(acres, 2)} ac` : `${fixed(squareMetres / FOOT ** 2, 0)} ft²`;
 }
 
 /** Hours and minutes of a time of the day in seconds: `17:05`, or `5:05 PM`. */

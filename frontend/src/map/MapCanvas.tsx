@@ -1,8 +1,7 @@
-import { ActionIcon, Tooltip, useComputedColorScheme } from "@mantine/core";
+import { useComputedColorScheme } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import {
   type KeyboardEvent,
-  memo,
   type PointerEvent,
   type ReactNode,
   type RefObject,
@@ -15,18 +14,22 @@ import {
 
 import { localized } from "../language/localized";
 import type { Bounds } from "../api/types";
-import { roundLength } from "../language/units";
 import type { Head } from "../signals/heads";
 import { type Area, inBounds, inRing } from "./areas";
+import { boundsOf, corners, type Drag, lineOf, type Pixels } from "./drags";
 import type { PackedDrawing } from "./drawing";
 import type { Graph } from "./graph";
+import { MapButtons } from "./MapButtons";
+import { useMapLayers } from "./mapLayers";
+import { MeasureLayer } from "./MeasureLayer";
 import { Minimap } from "./Minimap";
 import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
+import { ScaleBar } from "./ScaleBar";
 import type { Mark, Moving, Scene } from "./scene";
+import { useMeasure } from "./useMeasure";
 import { clampTo, fit, panBy, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { legendRows } from "./writtenLegend";
-import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 import { keep, parseKept } from "../ui/kept";
 
 /** Where the pointer is, in metres, and how far a touch reaches. */
@@ -74,20 +77,9 @@ interface Props {
   children?: ReactNode;
 }
 
-type Pixels = readonly [x: number, y: number];
-
-/** A button held down: where it was pressed, where the pointer was last, and what the drag does. */
-interface Drag {
-  from: [number, number];
-  last: [number, number];
-  moved: boolean;
-  does: "pan" | "carry" | "frame" | "lasso";
-  /** What it has drawn so far, pixels. */
-  line: readonly Pixels[];
-}
-
 const KEYS = localized(
-  () => t`Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`,
+  () =>
+    t`Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle, R measures.`,
 );
 const CLICK_SLACK = 4;
 const TOUCH = 14;
@@ -122,6 +114,9 @@ export function MapCanvas({
   const [ready, setReady] = useState<MapRenderer | null>(null);
   const dark = useComputedColorScheme("light") === "dark";
   const queued = useRef(0);
+  const shownLayers = useMapLayers();
+  const measure = useMeasure();
+  const measuring = measure.measured !== null;
 
   const apply = useCallback(
     (next: View) => {
@@ -173,6 +168,22 @@ export function MapCanvas({
 
   useEffect(() => ready?.setTheme(dark), [ready, dark]);
   useEffect(() => ready?.setScene(scene), [ready, scene]);
+  useEffect(() => ready?.setLayers(shownLayers), [ready, shownLayers]);
+
+  const { add, point, toggle } = measure;
+  const onMeasure = useCallback(() => {
+    toggle();
+    host.current?.focus();
+  }, [toggle]);
+  // While the map is measured, clicks belong to that alone.
+  const pick = useCallback(
+    (at: Pointed) => (measuring ? add([at.x, at.y], TOUCH / view.current.scale) : onPick?.(at)),
+    [measuring, add, onPick],
+  );
+  const pointAt = useCallback(
+    (at: Pointed | null) => (measuring ? point(at && [at.x, at.y]) : onPoint?.(at)),
+    [measuring, point, onPoint],
+  );
 
   useImperativeHandle(
     handle,
@@ -189,14 +200,14 @@ export function MapCanvas({
       vector: () => renderer.current?.vector(legendRows()) ?? null,
       seen: () => visible(view.current, size.current),
       pickMiddle: () =>
-        onPick?.({
+        pick({
           x: view.current.x,
           y: view.current.y,
           reach: Math.max(size.current.width, size.current.height) / 2 / view.current.scale,
           shift: false,
         }),
     }),
-    [apply, onPick],
+    [apply, pick],
   );
 
   // React's wheel listener is passive; the page must not scroll along.
@@ -253,22 +264,23 @@ export function MapCanvas({
     const move = moves[event.key];
     if (move) {
       apply(panBy(view.current, ...move));
-      onPoint?.(middle());
+      pointAt(middle());
     } else if (event.key === "+" || event.key === "=") zoom(1.4);
     else if (event.key === "-") zoom(1 / 1.4);
     else if (event.key === "0" || event.key === "Home") showAll();
-    else if (event.key === "Enter" || event.key === " ") onPick?.(middle());
+    else if (event.key === "Enter" || event.key === " ") pick(middle());
+    else if (event.key.toLowerCase() === "r") measure.toggle();
     else return;
     setCrosshair(true);
     event.preventDefault();
   };
 
-  const bar = roundLength(110 / shown.scale);
   return (
     <div
       ref={host}
       className="map"
-      data-aim={aim}
+      data-aim={aim || measuring}
+      data-measuring={measuring}
       data-view={`${shown.x} ${shown.y} ${shown.scale}`}
       role="application"
       tabIndex={0}
@@ -281,15 +293,16 @@ export function MapCanvas({
         event.currentTarget.setPointerCapture(event.pointerId);
         const [x, y] = local(event);
         const shift = event.shiftKey;
-        const draws = onFrame && (shift ? "frame" : event.ctrlKey || event.metaKey ? "lasso" : null);
-        const does = draws || (!shift && onGrab?.(pointed(x, y, false)) ? "carry" : "pan");
+        const draws =
+          onFrame && !measuring && (shift ? "frame" : event.ctrlKey || event.metaKey ? "lasso" : null);
+        const does = draws || (!shift && !measuring && onGrab?.(pointed(x, y, false)) ? "carry" : "pan");
         drag.current = { from: [x, y], last: [x, y], moved: false, does, line: [] };
       }}
       onPointerMove={(event) => {
         const [x, y] = local(event);
         const held = drag.current;
         if (!held) {
-          onPoint?.(pointed(x, y, event.shiftKey));
+          pointAt(pointed(x, y, event.shiftKey));
           return;
         }
         if (!held.moved && Math.hypot(x - held.from[0], y - held.from[1]) < CLICK_SLACK) return;
@@ -307,7 +320,7 @@ export function MapCanvas({
         const line = lineOf(held, local(event)).map(([x, y]) => toWorld(view.current, size.current, x, y));
         if (held.does === "carry" && (!held.moved || event.button !== 0)) onDrop?.(null);
         if (event.button !== 0) return;
-        if (!held.moved) onPick?.(pointed(...held.from, event.shiftKey));
+        if (!held.moved) pick(pointed(...held.from, event.shiftKey));
         else if (held.does === "carry") onDrop?.(pointed(...local(event), false));
         else if (held.does === "frame") onFrame?.(inBounds(boundsOf(line)));
         else if (held.does === "lasso") onFrame?.(inRing(line));
@@ -318,7 +331,7 @@ export function MapCanvas({
         setDrawn(null);
       }}
       onPointerLeave={() => {
-        if (!drag.current) onPoint?.(null);
+        if (!drag.current) pointAt(null);
       }}
     >
       <div ref={layers} className="map-layers" />
@@ -336,7 +349,7 @@ export function MapCanvas({
           event.stopPropagation();
         }}
       >
-        {ready && (
+        {ready && shownLayers.overview && (
           <Minimap
             renderer={ready}
             bounds={drawing.bounds}
@@ -346,68 +359,19 @@ export function MapCanvas({
             onMove={goTo}
           />
         )}
-        <MapButtons onZoom={zoom} onAll={showAll} />
+        <MapButtons onZoom={zoom} onAll={showAll} measuring={measuring} onMeasure={onMeasure} />
       </div>
-      <div className="map-scale" aria-hidden="true" style={{ width: bar.metres * shown.scale }}>
-        {bar.text}
-      </div>
+      {measure.measured && (
+        <MeasureLayer
+          measured={measure.measured}
+          pointer={measure.pointer}
+          view={shown}
+          size={size.current}
+          onEnd={measure.end}
+        />
+      )}
+      <ScaleBar scale={shown.scale} />
       {children}
     </div>
-  );
-}
-
-/** Two corners of a rectangle, or all points of a line. */
-const lineOf = ({ does, from, line }: Drag, to: Pixels): Pixels[] =>
-  does === "lasso" ? [from, ...line.slice(1), to] : [from, to];
-
-const boundsOf = (points: readonly Pixels[]): Bounds => {
-  const [xs, ys] = [points.map(([x]) => x), points.map(([, y]) => y)];
-  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
-};
-
-const corners = ([x0, y0, x1, y1]: Bounds): [number, number][] => [
-  [x0, y0],
-  [x1, y0],
-  [x1, y1],
-  [x0, y1],
-];
-
-const MapButtons = memo(function MapButtons({
-  onZoom,
-  onAll,
-}: {
-  onZoom: (factor: number) => void;
-  onAll: () => void;
-}) {
-  return (
-    <div className="map-buttons">
-      <MapButton label={t`Zoom in`} onClick={() => onZoom(1.5)}>
-        <IconPlus />
-      </MapButton>
-      <MapButton label={t`Zoom out`} onClick={() => onZoom(1 / 1.5)}>
-        <IconMinus />
-      </MapButton>
-      <MapButton label={t`Show the whole map`} onClick={onAll}>
-        <IconFit />
-      </MapButton>
-    </div>
-  );
-});
-
-function MapButton({
-  label,
-  onClick,
-  children,
-}: {
-  label: string;
-  onClick: () => void;
-  children: ReactNode;
-}) {
-  return (
-    <Tooltip label={label} position="left">
-      <ActionIcon variant="default" size="lg" aria-label={label} onClick={onClick}>
-        {children}
-      </ActionIcon>
-    </Tooltip>
   );
 }

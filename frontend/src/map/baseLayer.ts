@@ -2,6 +2,7 @@ import type { Bounds } from "../api/types";
 import { nth } from "../lists";
 import type { Palette } from "./colors";
 import { type Lines, type PackedDrawing, type PackedLines, tiles, unpack } from "./drawing";
+import type { MapLayers } from "./mapLayers";
 import { type PathMaker, screenPath } from "./svg";
 import { overlaps, type Size, type View, visible, worldTransform } from "./view";
 
@@ -51,7 +52,7 @@ export class BaseLayer {
     size: Size,
     ratio: number,
     palette: Palette,
-    symbols: boolean,
+    shown: Pick<MapLayers, "signs" | "buildings">,
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = palette.land;
@@ -60,13 +61,14 @@ export class BaseLayer {
     context.lineJoin = "round";
     const seen = visible(view, size);
     for (const one of this.items) {
+      if (one.look.what === "building" && !shown.buildings) continue;
       if (!style(context, one.look, view.scale, palette)) continue;
       for (const tile of one.tiles) {
         if (overlaps(tile.bounds, seen)) paint(context, one.look, tile.path);
       }
     }
     context.setLineDash([]);
-    if (symbols) this.drawSymbols(context, view, size, ratio);
+    if (shown.signs) this.drawSymbols(context, view, size, ratio);
   }
 
   private drawSymbols(context: CanvasRenderingContext2D, view: View, size: Size, ratio: number): void {

@@ -3,6 +3,7 @@ import { BaseLayer } from "./baseLayer";
 import { DARK, LIGHT, type Palette } from "./colors";
 import type { PackedDrawing } from "./drawing";
 import type { Graph } from "./graph";
+import { FIRST_LAYERS, type MapLayers } from "./mapLayers";
 import { MovingLayer } from "./movingLayer";
 import type { Picker } from "./picking";
 import { SceneLayer } from "./sceneLayer";
@@ -17,6 +18,7 @@ export interface MapRenderer {
   setSize(size: Size, pixelRatio: number): void;
   setView(view: View): void;
   setScene(scene: Scene): void;
+  setLayers(layers: MapLayers): void;
   setMoving(moving: Moving | null): void;
   setHeads(heads: readonly Head[]): void;
   setMarks(marks: readonly Mark[]): void;
@@ -34,6 +36,7 @@ const SLOW = 9;
 /** The base is drawn this much larger than the canvas, so that a pan finds it drawn already. */
 const MARGIN = 0.25;
 const REST = 90;
+const OVERVIEW = { signs: false, buildings: true };
 
 /** Three canvases on top of each other; each is drawn only when its own content has changed. */
 export class CanvasRenderer implements MapRenderer {
@@ -53,6 +56,7 @@ export class CanvasRenderer implements MapRenderer {
   private rest = 0;
   private currentScene: Scene = EMPTY_SCENE;
   private currentMoving: Moving | null = null;
+  private layers: MapLayers = FIRST_LAYERS;
   /** For the benchmark: how often something was drawn, and for how long. */
   readonly stats = { frames: 0, busy: 0 };
 
@@ -102,6 +106,16 @@ export class CanvasRenderer implements MapRenderer {
     this.mark("scene");
   }
 
+  setLayers(layers: MapLayers): void {
+    const { signs, buildings } = this.layers;
+    this.layers = layers;
+    if (layers.signs !== signs || layers.buildings !== buildings) {
+      this.cacheView = null;
+      this.mark("base");
+    }
+    this.mark("scene");
+  }
+
   setMoving(moving: Moving | null): void {
     this.currentMoving = moving;
     this.mark("moving");
@@ -121,7 +135,7 @@ export class CanvasRenderer implements MapRenderer {
     canvas.width = Math.round(size.width * pixelRatio);
     canvas.height = Math.round(size.height * pixelRatio);
     const context = canvas.getContext("2d");
-    if (context) this.base.draw(context, view, size, pixelRatio, dark ? DARK : LIGHT, false);
+    if (context) this.base.draw(context, view, size, pixelRatio, dark ? DARK : LIGHT, OVERVIEW);
   }
 
   picture(into = document.createElement("canvas")): HTMLCanvasElement {
@@ -145,8 +159,8 @@ export class CanvasRenderer implements MapRenderer {
     const base = new BaseLayer(this.drawing, writtenPath);
     const scene = new SceneLayer(this.graph, this.picker, writtenPath);
     return writtenPicture(size, (context) => {
-      base.draw(context, view, size, 1, palette, true);
-      scene.draw(context, view, size, 1, palette, this.currentScene);
+      base.draw(context, view, size, 1, palette, this.layers);
+      scene.draw(context, view, size, 1, palette, this.currentScene, this.layers);
       this.moving.draw(context, view, size, 1, palette, this.currentMoving);
       drawLegend(context, legend, palette, size.height);
     });
@@ -171,7 +185,7 @@ export class CanvasRenderer implements MapRenderer {
     const { dirty, view, size, ratio, palette } = this;
     this.dirty = { base: false, scene: false, moving: false };
     if (dirty.base) this.drawBase(base);
-    if (dirty.scene) this.scene.draw(scene, view, size, ratio, palette, this.currentScene);
+    if (dirty.scene) this.scene.draw(scene, view, size, ratio, palette, this.currentScene, this.layers);
     if (dirty.moving) this.moving.draw(moving, view, size, ratio, palette, this.currentMoving);
     this.stats.frames += 1;
     this.stats.busy += performance.now() - began;
@@ -205,7 +219,7 @@ export class CanvasRenderer implements MapRenderer {
     const context = this.cache.getContext("2d");
     if (!context) return;
     const began = performance.now();
-    this.base.draw(context, view, big, ratio, palette, true);
+    this.base.draw(context, view, big, ratio, palette, this.layers);
     this.cost = performance.now() - began;
     this.cacheView = view;
   }

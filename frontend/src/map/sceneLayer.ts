@@ -16,7 +16,10 @@ import { detectorNames, drawDetectors } from "./detectorMarks";
 import { nth } from "../lists";
 import { GLYPHS } from "./glyphs";
 import { type Graph, type Place, segmentBounds, strips } from "./graph";
+import { drawGrid } from "./gridLayer";
 import { addRing, ColoredLanes } from "./laneShapes";
+import type { MapLayers } from "./mapLayers";
+import { drawNames, type SegmentName, segmentNames } from "./namesLayer";
 import {
   badge,
   body,
@@ -72,6 +75,7 @@ export class SceneLayer {
   private readonly bounds: Bounds[] = [];
   private readonly glyphs: Record<Category, Path2D>;
   private readonly colored: ColoredLanes;
+  private names: SegmentName[] | null = null;
 
   constructor(
     private readonly graph: Graph | null,
@@ -95,13 +99,14 @@ export class SceneLayer {
     ratio: number,
     palette: Palette,
     scene: Scene,
+    layers: MapLayers,
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, context.canvas.width, context.canvas.height);
     worldTransform(context, view, size, ratio);
     this.colored.draw(context, view, scene.laneColors ?? null);
     this.drawSegments(context, view, size, scene);
-    if (this.graph && this.picker && view.scale >= NODES_FROM) {
+    if (layers.nodes && this.graph && this.picker && view.scale >= NODES_FROM) {
       this.drawGraph(context, view, size, scene, palette);
     }
     drawRoute(context, view, scene);
@@ -109,6 +114,11 @@ export class SceneLayer {
     drawDetectors(context, view, scene.detectors);
     if (scene.hover && this.graph) drawLane(context, this.graph, scene.hover);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    if (layers.grid) drawGrid(context, view, size, palette, this.newPath());
+    if (layers.names && this.graph) {
+      this.names ??= segmentNames(this.graph);
+      drawNames(context, view, size, palette, this.names);
+    }
     const at = (x: number, y: number): [number, number] => [
       (x - view.x) * view.scale + size.width / 2,
       (view.y - y) * view.scale + size.height / 2,

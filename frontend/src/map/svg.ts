@@ -197,10 +197,19 @@ class SvgContext implements Omit<Look, "dash" | "matrix"> {
   }
 
   fillText(text: string, x: number, y: number): void {
+    this.letter(text, x, y, `fill="${this.fillStyle}"`);
+  }
+
+  strokeText(text: string, x: number, y: number): void {
+    const line = `stroke="${this.strokeStyle}" stroke-width="${this.lineWidth}" stroke-linejoin="${this.lineJoin}"`;
+    this.letter(text, x, y, `fill="none" ${line}`);
+  }
+
+  private letter(text: string, x: number, y: number, look: string): void {
     const anchor = { center: "middle", right: "end" }[this.textAlign] ?? "start";
     const base = this.textBaseline === "middle" ? ' dominant-baseline="central"' : "";
     this.parts.push(
-      `<text x="${short(x)}" y="${short(y)}" fill="${this.fillStyle}" style="font:${escaped(this.font)}"` +
+      `<text x="${short(x)}" y="${short(y)}" ${look} style="font:${escaped(this.font)}"` +
         ` text-anchor="${anchor}"${base}${this.shared()}>${escaped(text)}</text>`,
     );
   }

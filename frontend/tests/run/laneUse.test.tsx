@@ -5,6 +5,7 @@ import { afterEach, expect, test, vi } from "vitest";
 import type { RunLanes } from "../../src/api/runs";
 import { prefer } from "../../src/language/preferences";
 import { LIGHT } from "../../src/map/colors";
+import { FIRST_LAYERS } from "../../src/map/mapLayers";
 import { Picker } from "../../src/map/picking";
 import { EMPTY_SCENE } from "../../src/map/scene";
 import { SceneLayer } from "../../src/map/sceneLayer";
@@ -118,7 +119,15 @@ test("a drawing has the lanes in their colours below everything else", () => {
   const scene = { ...EMPTY_SCENE, laneColors: { colors: ["#440154", "#fde725"], rings: [[], [ring]] } };
   const size = { width: 100, height: 100 };
   const drawn = writtenPicture(size, (context) =>
-    new SceneLayer(null, null, writtenPath).draw(context, { x: 0, y: 0, scale: 8 }, size, 1, LIGHT, scene),
+    new SceneLayer(null, null, writtenPath).draw(
+      context,
+      { x: 0, y: 0, scale: 8 },
+      size,
+      1,
+      LIGHT,
+      scene,
+      FIRST_LAYERS,
+    ),
   );
   expect(drawn).toContain('<path d="M0 0L4 0L4 3L0 3Z" fill="#fde725"');
   expect(drawn).not.toContain("#440154");
