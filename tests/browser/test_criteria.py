@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import re
+
+import pytest
 from playwright.sync_api import expect
 
+from odscen.app.scenarios import SUFFIX
+from odscen.scenario import edits
+from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.document.scenario_document import Scenario
+from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage
 from tests.browser.test_keyboard import press
 from tests.browser.test_measures import card, crossing, opened
+from tools.page import Served
 
 __all__ = ["crossing"]
 
@@ -43,3 +52,31 @@ def test_a_criterion_is_added_with_the_keyboard_alone(user: OdscenPage, crossing
     with user.changing():
         press(user, user.page.get_by_role("button", name="Add the criterion"))
     assert user.document()["criteria"] == ["collided == 2"]
+
+
+def test_a_finished_run_says_which_criteria_it_met_and_with_what_value(
+    user: OdscenPage, served: Served, sampled: str
+) -> None:
+    path = Workspace.open(served.workspace).scenarios / f"{sampled}{SUFFIX}"
+    document = loads(path.read_text(encoding="utf-8"))
+    assert isinstance(document, Scenario)
+    named = document.actors[0].id
+    asked = ["collided == 0", "mean_delay >= 1000 s", f"max_speed({named}) <= 0.5 m/s"]
+    path.write_text(dumps(edits.set_criteria(document, criteria=asked)), encoding="utf-8")
+    user.open_editor(sampled)
+    user.step("Run").click()
+    user.run.click()
+    user.wait_until_moving()
+    user.choose_speed("As fast")
+    expect(user.result).to_contain_text("finished")
+    judged = user.page.get_by_role("region", name="Criteria").filter(has_text="criteria not met")
+    expect(judged).to_contain_text("2 of 3 criteria not met")
+    rows = judged.get_by_role("listitem")
+    run = user.page.url.partition("?")[0].rsplit("/", 1)[1]
+    delay = user.get(f"/runs/{run}")["summary"]["figures"]["mean_delay"]
+    expect(rows.nth(0)).to_contain_text("Met: In collisions: exactly 0, is 0")
+    expect(rows.nth(1)).to_contain_text("Not met: Mean delay: at least 1000 s, is ")
+    shown = re.search(r", is ([\d.]+) s", rows.nth(1).inner_text())
+    assert shown
+    assert float(shown[1]) == pytest.approx(delay, abs=0.006)
+    expect(rows.nth(2)).to_contain_text(re.compile(rf"^Not met: .*{named}"))
