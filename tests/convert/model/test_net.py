@@ -24,6 +24,7 @@ from odscen.convert.model.net import (
     Request,
     TrafficLight,
 )
+from odscen.convert.model.net_xml import net_xml
 
 CARS = frozenset({"passenger", "bus"})
 
@@ -58,7 +59,7 @@ def net(
 
 
 def text(made: Net) -> ET.Element:
-    return ET.fromstring(made.to_xml())
+    return ET.fromstring(net_xml(made))
 
 
 def test_shapes_are_moved_by_the_offset_that_the_file_states() -> None:

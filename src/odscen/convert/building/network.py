@@ -26,6 +26,7 @@ from odscen.convert.model.edge_plan import plan_edges
 from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
 from odscen.convert.model.net_ids import lane_id
+from odscen.convert.model.net_xml import net_xml
 from odscen.convert.model.right_of_way import Movement
 from odscen.convert.model.road_gaps import merge_gaps, side_gaps
 from odscen.convert.pedestrian.crosswalks import place_crosswalks
@@ -82,7 +83,7 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     lanes = build_table(net, table, builder.laid(), on_foot, nodes.xodr)
     entries, figures = findings(odr, table, net, lanes, found, builder.control, crosswalks)
     report = ConversionReport.of([*parser_entries(odr.notes), *entries], figures)
-    return SumoNetwork(net.to_xml(), lanes, report)
+    return SumoNetwork(net_xml(net), lanes, report)
 
 
 def _keeps_left(table: RoadTable) -> bool:

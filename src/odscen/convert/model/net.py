@@ -11,12 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.base.xml_text import escape
-from odscen.convert.model.net_shapes import LinkPath, border
+from odscen.convert.model.net_shapes import LinkPath
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     from odscen.base.arrays import FloatArray
     from odscen.base.ids import SumoEdgeId, SumoLaneId
 
@@ -31,9 +28,6 @@ DIGITS = 4
 
 LEAST_LENGTH = 0.1
 """Metres of a lane, at least, as SUMO wants it."""
-
-VERSION = "1.20"
-"""Version of the network format."""
 
 CROSSED = "c"
 """The turn of a link that is a crossing."""
@@ -287,144 +281,3 @@ class Net:
                 shape = np.concatenate([first.shape, lanes[second].shape[1:]])
                 found[first.id] = LinkPath(shape, first.speed, first.length)
         return found
-
-    def to_xml(self) -> bytes:
-        """Text of ``net.net.xml``; the same network gives the same bytes."""
-        x0, y0, x1, y1 = self.boundary
-        offset = f"{self.offset[0]:.2f},{self.offset[1]:.2f}"
-        lines = [
-            '<?xml version="1.0" encoding="UTF-8"?>',
-            f'<net version="{VERSION}" junctionCornerDetail="5"'
-            + (' lefthand="true"' if self.lefthand else "")
-            + (' walkingareas="true"' if self.counts()["walking_areas"] else "")
-            + ' limitTurnSpeed="5.50">',
-            f'    <location netOffset="{offset}" convBoundary="{x0},{y0},{x1},{y1}"'
-            ' origBoundary="-10000000000.00,-10000000000.00,10000000000.00,10000000000.00"'
-            ' projParameter="!"/>',
-        ]
-        inner = [edge for edge in self.edges if edge.function != NORMAL]
-        outer = [edge for edge in self.edges if edge.function == NORMAL]
-        for edge in (*inner, *outer):
-            lines += self._edge(edge)
-        for light in self.lights:
-            lines += light_xml(light)
-        for junction in self.junctions:
-            lines += self._junction(junction)
-        for junction in self.inner_junctions:
-            lines += self._junction(junction)
-        paths = self.link_paths()
-        inside = {edge.id for edge in inner}
-        for link in self.links:
-            own = None if link.source in inside or link.via is None else paths[link.via]
-            lines.append(self._link(link, own))
-        for nodes, edges in self.roundabouts:
-            lines.append(f'    <roundabout nodes="{" ".join(nodes)}" edges="{" ".join(edges)}"/>')
-        lines += ["</net>", ""]
-        return "\n".join(lines).encode()
-
-    def _edge(self, edge: NetEdge) -> Iterator[str]:
-        ends = f' from="{edge.start}" to="{edge.end}"' if edge.function == NORMAL else ""
-        kind = f' function="{edge.function}"' if edge.function != NORMAL else ""
-        rank = f' priority="{edge.priority}"' if edge.function == NORMAL else ""
-        name = f' name="{_quoted(edge.name)}"' if edge.name else ""
-        crossed = f' crossingEdges="{" ".join(edge.crosses)}"' if edge.crosses else ""
-        shape, custom = "", ' customShape="1"'
-        if edge.function == NORMAL:
-            inmost, side = edge.lanes[-1], -0.5 if self.lefthand else 0.5
-            shape = f' shape="{self._shape(border(inmost.shape, side * inmost.width))}"'
-        elif edge.function == INTERNAL:
-            custom = ""
-        yield f'    <edge id="{edge.id}"{ends}{kind}{rank}{name}{crossed}{shape}>'
-        for lane in edge.lanes:
-            change = "" if lane.change_left else ' changeLeft="emergency"'
-            change += "" if lane.change_right else ' changeRight="emergency"'
-            kind = f' type="{lane.type}"' if lane.type else ""
-            text = (
-                f'        <lane id="{lane.id}" index="{lane.index}"'
-                f' allow="{" ".join(sorted(lane.allowed))}"{change} speed="{lane.speed:.2f}"'
-                f' length="{lane.length:.{DIGITS}f}" width="{lane.width:.2f}"{kind}{custom}'
-                f' shape="{self._shape(lane.shape)}"'
-            )
-            if lane.xodr:
-                yield text + ">"
-                yield f'            <param key="origId" value="{_quoted(" ".join(lane.xodr))}"/>'
-                yield "        </lane>"
-            else:
-                yield text + "/>"
-        yield "    </edge>"
-
-    def _junction(self, junction: NetJunction) -> Iterator[str]:
-        x, y = junction.place[0] + self.offset[0], junction.place[1] + self.offset[1]
-        z = "" if self.flat else f' z="{junction.place[2]:.{DIGITS}f}"'
-        custom = "" if junction.type == INTERNAL else ' customShape="1"'
-        text = (
-            f'    <junction id="{junction.id}" type="{junction.type}"{custom} x="{x:.{DIGITS}f}"'
-            f' y="{y:.{DIGITS}f}"{z} incLanes="{" ".join(junction.incoming)}"'
-            f' intLanes="{" ".join(junction.inner)}" shape="{self._shape(junction.outline)}"'
-        )
-        if not junction.requests and not junction.xodr:
-            yield text + "/>"
-            return
-        yield text + ">"
-        count = len(junction.requests)
-        for index, request in enumerate(junction.requests):
-            yield (
-                f'        <request index="{index}" response="{_bits(request.yields_to, count)}"'
-                f' foes="{_bits(request.foes, count)}" cont="{int(request.waits_inside)}"/>'
-            )
-        if junction.xodr:
-            yield f'        <param key="opendrive" value="{_quoted(junction.xodr)}"/>'
-        yield "    </junction>"
-
-    def _link(self, link: NetLink, path: LinkPath | None) -> str:
-        via = f' via="{link.via}"' if link.via else ""
-        light = f' tl="{link.light}" linkIndex="{link.light_index}"' if link.light else ""
-        kept = ""
-        if path is not None:
-            waits = "" if path.waits_at is None else f' contPos="{path.waits_at:.{DIGITS}f}"'
-            kept = f'{waits} speed="{path.speed:.2f}" shape="{self._shape(path.shape)}"'
-        sight = "" if link.visibility is None else f' visibility="{link.visibility:g}"'
-        return (
-            f'    <connection from="{link.source}" to="{link.target}" fromLane="{link.source_lane}"'
-            f' toLane="{link.target_lane}"{via}{light}{sight} dir="{link.direction}"'
-            f' state="{link.state}"{kept}/>'
-        )
-
-    def _shape(self, shape: FloatArray) -> str:
-        points = shape + np.array([*self.offset, 0.0])
-        if self.flat:
-            return " ".join([f"{x:.4f},{y:.4f}" for x, y, _ in points.tolist()])
-        return " ".join([f"{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()])
-
-
-def light_xml(light: TrafficLight) -> Iterator[str]:
-    """Lines of one ``<tlLogic>``."""
-    yield (
-        f'    <tlLogic id="{light.id}" type="{light.type}" programID="{light.program}"'
-        f' offset="{light.offset:g}">'
-    )
-    for phase in light.phases:
-        bounds = ""
-        if light.type == "actuated" and phase.most > phase.least:
-            bounds = f' minDur="{phase.least:g}" maxDur="{phase.most:g}"'
-        name = f' name="{_quoted(phase.name)}"' if phase.name else ""
-        yield f'        <phase duration="{phase.duration:g}" state="{phase.state}"{bounds}{name}/>'
-    for index, signals in enumerate(light.signals):
-        if signals:
-            value = _quoted(" ".join(signals))
-            yield f'        <param key="linkSignalID:{index}" value="{value}"/>'
-    yield "    </tlLogic>"
-
-
-def _bits(indices: Iterable[int], count: int) -> str:
-    """Indices as SUMO writes them: the last letter is link 0."""
-    letters = ["0"] * count
-    for index in indices:
-        letters[count - 1 - index] = "1"
-    return "".join(letters)
-
-
-def _quoted(text: str) -> str:
-    """Text of an attribute on one line."""
-    plain = "".join(c if c.isprintable() else " " for c in text)
-    return escape(plain, {'"': "&quot;"})
