@@ -191,6 +191,17 @@ def test_whoever_calls_a_stage_gets_it_in_the_next_cycle(tmp_path: Path) -> None
     assert max(trips["waiting_time"].to_list()) <= cycle
 
 
+def test_vehicles_call_in_a_run_in_slices_as_in_one_piece(tmp_path: Path) -> None:
+    one = only_from(1, "4.0.1.64", control="actuated")
+    runs = [
+        carried_out(one, tmp_path / name, slice_length=length)
+        for name, length in (("whole", None), ("slices", 150.0))
+    ]
+    whole, slices = (run.actors().select("id", "inserted", "arrived") for run in runs)
+    assert len(whole) >= 8
+    assert slices.equals(whole)
+
+
 def test_a_detector_prolongs_its_stage_up_to_the_bound_and_no_other(tmp_path: Path) -> None:
     busy = shown(tmp_path / "busy", scenario(one_plan(), control="actuated", vehicles=900.0))
     idle = shown(tmp_path / "idle", scenario(one_plan(), control="actuated", vehicles=40.0))
