@@ -17,6 +17,9 @@ from tests.browser.test_narrow import wrong
 from tests.browser.test_sharing import ALIKE, SVG, difference, taken
 from tools.page import Served
 
+PARTS = (".map-measured", ".map-legend", ".minimap", ".map-buttons", ".map-scale")
+"""What lies on the map."""
+
 
 def ruler(user: OdscenPage) -> Locator:
     return user.page.get_by_role("button", name=re.compile("^Measure lengths"))
@@ -178,14 +181,21 @@ def test_a_length_is_measured_by_touch(
 
 
 @pytest.mark.parametrize("width", [1360, 390])
+@pytest.mark.parametrize("language", ["en", "de"])
 def test_nothing_on_the_map_lies_on_something_else(
-    open_page: Callable[..., OdscenPage], served: Served, sampled: str, width: int
+    open_page: Callable[..., OdscenPage], served: Served, sampled: str, width: int, language: str
 ) -> None:
-    user = open_page(served.url, viewport={"width": width, "height": 844})
-    user.open_editor(sampled)
-    ruler(user).click()
+    size = {"width": width, "height": 844}
+    user = open_page(served.url, viewport=size, locale=language)
+    user.page.goto(f"/#/edit/{sampled}")
+    user.page.locator(".map-legend").wait_for()
+    user.map.area.press("r")
+    # The longest that is said.
+    x, y, scale = user.map.view()
+    for dx in (-40, 0, 40):
+        user.map.click((x + dx / scale, y))
     boxes = {}
-    for name in (".map-measured", ".map-legend", ".map-buttons", ".map-scale"):
+    for name in PARTS:
         box = user.page.locator(name).bounding_box()
         assert box is not None, f"{name} is not shown"
         boxes[name] = box
