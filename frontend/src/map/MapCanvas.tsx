@@ -21,7 +21,7 @@ import type { PackedDrawing } from "./drawing";
 import type { Graph } from "./graph";
 import { MapButtons } from "./MapButtons";
 import { useMapLayers } from "./mapLayers";
-import { MeasureLayer } from "./MeasureLayer";
+import { MeasureBar } from "./MeasureBar";
 import { Minimap } from "./Minimap";
 import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
@@ -115,7 +115,7 @@ export function MapCanvas({
   const dark = useComputedColorScheme("light") === "dark";
   const queued = useRef(0);
   const shownLayers = useMapLayers();
-  const measure = useMeasure();
+  const measure = useMeasure(host);
   const measuring = measure.measured !== null;
 
   const apply = useCallback(
@@ -169,12 +169,15 @@ export function MapCanvas({
   useEffect(() => ready?.setTheme(dark), [ready, dark]);
   useEffect(() => ready?.setScene(scene), [ready, scene]);
   useEffect(() => ready?.setLayers(shownLayers), [ready, shownLayers]);
+  useEffect(() => ready?.setMeasured(measure.marks), [ready, measure.marks]);
 
   const { add, point, toggle } = measure;
   const onMeasure = useCallback(() => {
+    // What would be placed or chosen at the pointer is out of hand now.
+    onPoint?.(null);
     toggle();
     host.current?.focus();
-  }, [toggle]);
+  }, [toggle, onPoint]);
   // While the map is measured, clicks belong to that alone.
   const pick = useCallback(
     (at: Pointed) => (measuring ? add([at.x, at.y], TOUCH / view.current.scale) : onPick?.(at)),
@@ -269,7 +272,7 @@ export function MapCanvas({
     else if (event.key === "-") zoom(1 / 1.4);
     else if (event.key === "0" || event.key === "Home") showAll();
     else if (event.key === "Enter" || event.key === " ") pick(middle());
-    else if (event.key.toLowerCase() === "r") measure.toggle();
+    else if (event.key.toLowerCase() === "r") onMeasure();
     else return;
     setCrosshair(true);
     event.preventDefault();
@@ -361,15 +364,7 @@ export function MapCanvas({
         )}
         <MapButtons onZoom={zoom} onAll={showAll} measuring={measuring} onMeasure={onMeasure} />
       </div>
-      {measure.measured && (
-        <MeasureLayer
-          measured={measure.measured}
-          pointer={measure.pointer}
-          view={shown}
-          size={size.current}
-          onEnd={measure.end}
-        />
-      )}
+      {measure.measured && <MeasureBar measured={measure.measured} onEnd={measure.end} />}
       <ScaleBar scale={shown.scale} />
       {children}
     </div>

@@ -29,6 +29,8 @@ export interface Palette {
   parking: string;
   ink: string;
   paper: string;
+  /** What is measured on the map. */
+  measured: string;
   successor: string;
 }
 
@@ -53,6 +55,7 @@ export const LIGHT: Palette = {
   parking: "#ffffff",
   ink: "#22282e",
   paper: "#ffffff",
+  measured: "#c2255c",
   successor: RELATION[0],
 };
 
@@ -77,6 +80,7 @@ export const DARK: Palette = {
   parking: "#cfd4d8",
   ink: "#e9ecef",
   paper: "#12161a",
+  measured: "#f06595",
   successor: RELATION[0],
 };
 

@@ -1,3 +1,4 @@
+import { short } from "../language/numbers";
 import { gridStep } from "../language/units";
 import type { Palette } from "./colors";
 import { type Size, toScreen, type View, visible } from "./view";
@@ -6,6 +7,9 @@ import { type Size, toScreen, type View, visible } from "./view";
 const APART = 70;
 /** Pixels that a label keeps from the corners. */
 const CORNER = 34;
+
+/** Digits after the point of a coordinate, at most: the map is never as near as a millimetre. */
+const DIGITS = 3;
 
 /** A line of the grid: its place, pixels from the left or the top, and its coordinate as written. */
 export interface GridLine {
@@ -20,7 +24,7 @@ export function gridLines(view: View, size: Size): { x: GridLine[]; y: GridLine[
   const lines = (from: number, to: number, place: (metres: number) => number): GridLine[] => {
     const found: GridLine[] = [];
     for (let n = Math.ceil(from / metres); n * metres <= to; n++) {
-      found.push({ at: place(n * metres), text: String(Number((n * shown).toPrecision(9))) });
+      found.push({ at: place(n * metres), text: short(n * shown || 0, DIGITS) });
     }
     return found;
   };

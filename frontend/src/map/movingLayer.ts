@@ -2,6 +2,7 @@ import { CATEGORIES } from "../api/types";
 import { nth } from "../lists";
 import type { Head } from "../signals/heads";
 import { CATEGORY_COLOR, EGO, MARK_COLOR, type Palette, SIGNAL_COLOR } from "./colors";
+import { drawMeasured, type MeasureMarks } from "./measureMarks";
 import type { Mark, MarkKind, Moving } from "./scene";
 import { type Size, type View, visible } from "./view";
 
@@ -22,6 +23,7 @@ const ON_FOOT = CATEGORIES.indexOf("pedestrian");
 export class MovingLayer {
   heads: readonly Head[] = [];
   marks: readonly Mark[] = [];
+  measured: MeasureMarks | null = null;
 
   draw(
     context: CanvasRenderingContext2D,
@@ -37,6 +39,7 @@ export class MovingLayer {
     for (const head of this.heads) drawHead(context, head, view, size);
     if (moving) this.drawMoving(context, view, size, palette, moving);
     for (const mark of this.marks) drawMark(context, mark, view, size);
+    if (this.measured) drawMeasured(context, view, size, palette, this.measured);
   }
 
   private drawMoving(

@@ -4,6 +4,7 @@ import { DARK, LIGHT, type Palette } from "./colors";
 import type { PackedDrawing } from "./drawing";
 import type { Graph } from "./graph";
 import { FIRST_LAYERS, type MapLayers } from "./mapLayers";
+import type { MeasureMarks } from "./measureMarks";
 import { MovingLayer } from "./movingLayer";
 import type { Picker } from "./picking";
 import { SceneLayer } from "./sceneLayer";
@@ -22,6 +23,7 @@ export interface MapRenderer {
   setMoving(moving: Moving | null): void;
   setHeads(heads: readonly Head[]): void;
   setMarks(marks: readonly Mark[]): void;
+  setMeasured(measured: MeasureMarks | null): void;
   /** What is seen now, in one canvas: the given one, or a new one. */
   picture(into?: HTMLCanvasElement): HTMLCanvasElement;
   /** The same as an SVG file, with a legend. */
@@ -128,6 +130,11 @@ export class CanvasRenderer implements MapRenderer {
 
   setMarks(marks: readonly Mark[]): void {
     this.moving.marks = marks;
+    this.mark("moving");
+  }
+
+  setMeasured(measured: MeasureMarks | null): void {
+    this.moving.measured = measured;
     this.mark("moving");
   }
 

@@ -1,12 +1,13 @@
-import { useCallback, useEffect, useState } from "react";
+import { type RefObject, useCallback, useEffect, useMemo, useState } from "react";
 
 import { type Measured, NOTHING, type Point, withoutLast, withPoint } from "./measure";
+import type { MeasureMarks } from "./measureMarks";
 
 /** The measure tool of one map: off, or what it has measured so far. Escape ends it, Backspace takes a point back. */
 export interface Measuring {
   measured: Measured | null;
-  /** Where the pointer is, to which a line leads that is not measured yet. */
-  pointer: Point | null;
+  /** What of it is drawn. */
+  marks: MeasureMarks | null;
   toggle: () => void;
   end: () => void;
   point: (at: Point | null) => void;
@@ -14,7 +15,11 @@ export interface Measuring {
   add: (at: Point, reach: number) => void;
 }
 
-export function useMeasure(): Measuring {
+/** Elements that have Escape and Backspace for themselves: fields, lists, dialogs. */
+const OWN_KEYS = "input, textarea, [role=dialog], [role=listbox], [role=menu]";
+
+/** `map` is the one that is measured: keys pressed in another one are not for this. */
+export function useMeasure(map: RefObject<HTMLElement | null>): Measuring {
   const [measured, setMeasured] = useState<Measured | null>(null);
   const [pointer, point] = useState<Point | null>(null);
   const end = useCallback(() => setMeasured(null), []);
@@ -31,7 +36,10 @@ export function useMeasure(): Measuring {
   useEffect(() => {
     if (!on) return;
     const onKey = (event: KeyboardEvent): void => {
-      if (event.target instanceof Element && event.target.closest("input, textarea")) return;
+      if (event.target instanceof Element) {
+        const within = event.target.closest("[role=application]");
+        if (event.target.closest(OWN_KEYS) || (within && within !== map.current)) return;
+      }
       if (event.key === "Escape") end();
       else if (event.key === "Backspace" || event.key === "Delete") {
         setMeasured((now) => now && withoutLast(now));
@@ -41,6 +49,7 @@ export function useMeasure(): Measuring {
     };
     addEventListener("keydown", onKey, true);
     return () => removeEventListener("keydown", onKey, true);
-  }, [on, end]);
-  return { measured, pointer, toggle, end, point, add };
+  }, [on, end, map]);
+  const marks = useMemo(() => measured && { measured, pointer }, [measured, pointer]);
+  return { measured, marks, toggle, end, point, add };
 }

@@ -1,4 +1,5 @@
 // @vitest-environment happy-dom
+import { i18n } from "@lingui/core";
 import { afterEach, expect, test } from "vitest";
 
 import { prefer } from "../../src/language/preferences";
@@ -13,6 +14,7 @@ import { toScreen } from "../../src/map/view";
 import { graph } from "../example";
 
 afterEach(() => {
+  i18n.loadAndActivate({ locale: "en", messages: {} });
   prefer({ length: "m" });
   useMapLayers.setState(FIRST_LAYERS);
   localStorage.clear();
@@ -43,6 +45,29 @@ test("a reader of feet has lines at round feet", () => {
   expect(x.map(({ text }) => Math.abs(Number(text) % 200))).toEqual(x.map(() => 0));
   const third = x[2];
   expect(third?.at).toBeCloseTo(toScreen(view, SIZE, Number(third?.text) * 0.3048, 0)[0], 6);
+});
+
+test("coordinates are written as the reader writes numbers, and the origin has no sign", () => {
+  const near = { x: 0, y: 0, scale: 80 };
+  expect(gridLines(near, SIZE).x.map(({ text }) => text)).toEqual([
+    "-5",
+    "-4",
+    "-3",
+    "-2",
+    "-1",
+    "0",
+    "1",
+    "2",
+    "3",
+    "4",
+    "5",
+  ]);
+  const tenths = gridLines({ ...near, scale: 200 }, SIZE).x.map(({ text }) => text);
+  expect(tenths).toContain("0.5");
+  i18n.loadAndActivate({ locale: "de", messages: {} });
+  expect(gridLines({ ...near, scale: 200 }, SIZE).x.map(({ text }) => text)).toEqual(
+    tenths.map((text) => text.replace(".", ",")),
+  );
 });
 
 test("each segment is named once, on one of its nodes, and no name lies on another", () => {
