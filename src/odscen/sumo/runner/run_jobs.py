@@ -117,7 +117,7 @@ def run_prepared(
                 finish(folder, summary)
                 summary["files"] = found_files(folder)
             (folder / layout.SUMMARY_FILE).write_text(summary_to_json(summary), encoding="utf-8")
-            seal_run(folder)
+            seal_run(folder, hidden=True)
         return Run(out, summary)
 
 
