@@ -195,7 +195,7 @@ def trips_in(file: Path) -> dict[str, Trip]:
 
     if not file.is_file():
         return {}
-    return _trips_of(pl.read_parquet(file, columns=_TRIP_COLUMNS))
+    return _trips_of(pl.read_parquet(file, columns=list(_TRIP_COLUMNS)))
 
 
 def _trips_of(table: pl.DataFrame) -> dict[str, Trip]:

@@ -47,8 +47,8 @@ class LastStop(NamedTuple):
     @classmethod
     def from_row(cls, row: Sequence[Any]) -> Self:
         """One from its JSON."""
-        *place, reason = row
-        return cls(*place, stop_reason(reason))
+        lane, x, y, since, reason = row
+        return cls(lane, x, y, since, stop_reason(reason))
 
 
 class JamWatch:
