@@ -52,15 +52,15 @@ def test_results_that_are_left_to_us_are_those_that_the_process_makes(
     prepare: Prepare, tmp_path: Path
 ) -> None:
     fresh = made(prepare, tmp_path / "fresh", forked=True)
-    folder, prepared = tmp_path / "raw", prepare()
+    folder = tmp_path / "raw"
     folder.mkdir()
-    write_run_folder(prepared, folder)
+    write_run_folder(prepare(), folder)
     asked = []
 
     def results(left: Left) -> None:
         asked.append((folder / layout.TRIPINFO_FILE).is_file())
         assert not (folder / layout.EVENTS_FILE).exists()
-        left_results(folder, prepared.plan, left)
+        left_results(folder, left)
 
     assert run_worker(folder, forked=True, results=results).error is None
     assert asked == [True]
@@ -70,12 +70,11 @@ def test_results_that_are_left_to_us_are_those_that_the_process_makes(
 def test_records_that_results_cannot_be_made_of_fail_their_run(
     prepare: Prepare, tmp_path: Path
 ) -> None:
-    prepared = prepare()
-    write_run_folder(prepared, tmp_path)
+    write_run_folder(prepare(), tmp_path)
 
     def torn(left: Left) -> None:
         (tmp_path / layout.TRIPINFO_FILE).write_text("<tripinfos><tripinfo", encoding="utf-8")
-        left_results(tmp_path, prepared.plan, left)
+        left_results(tmp_path, left)
 
     ended = run_worker(tmp_path, forked=True, results=torn)
     assert ended.done is None

@@ -106,7 +106,7 @@ def run_prepared(
                     live=live,
                     keep=(lock,),
                     forked=forked,
-                    results=partial(left_results, folder, prepared.plan) if forked else None,
+                    results=partial(left_results, folder) if forked else None,
                 )
             else:
                 ended = simulate(folder)
