@@ -80,10 +80,17 @@ def _names_in(folder: str, before: str) -> Iterator[str]:
                 yield before + entry.name
 
 
-def write_sums(folder: Path, sums: Mapping[str, str]) -> None:
-    """Write the list of a folder in one step."""
+def write_sums(folder: Path, sums: Mapping[str, str], *, hidden: bool = False) -> None:
+    """Write the list of a folder in one step.
+
+    Of a ``hidden`` folder, which appears when all of it is on the disk, the list does not go first.
+    """
     lines = "".join(f"{sums[name]}  {name}\n" for name in sorted(sums))
-    write_whole(folder / SUMS_FILE, f"{lines}# {digest(lines.encode())}\n")
+    text = f"{lines}# {digest(lines.encode())}\n"
+    if hidden:
+        (folder / SUMS_FILE).write_text(text, encoding="utf-8")
+    else:
+        write_whole(folder / SUMS_FILE, text)
 
 
 def read_sums(folder: Path) -> dict[str, str] | None:

@@ -4,18 +4,17 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
-from odscen.base.errors import SimulationError
 from odscen.sumo.folder import layout
-from odscen.sumo.outputs.output_tables import make_tables
 from odscen.sumo.runner import forked_worker
+from odscen.sumo.runner.left_results import left_results
 from odscen.sumo.runner.run_folder import write_run_folder
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.runner.worker_process import run_worker
+from odscen.sumo.worker.protocol import Left
 from tests.sumo.conftest import Prepare
 
 pytestmark = pytest.mark.skipif(
@@ -49,34 +48,35 @@ def test_a_forked_process_records_the_bytes_of_one_that_was_started(
     assert made(prepare, tmp_path / "second", forked=True) == fresh
 
 
-def test_tables_that_are_left_to_us_are_those_that_the_process_makes(
+def test_results_that_are_left_to_us_are_those_that_the_process_makes(
     prepare: Prepare, tmp_path: Path
 ) -> None:
     fresh = made(prepare, tmp_path / "fresh", forked=True)
-    folder, prepared = tmp_path / "raw", prepare()
+    folder = tmp_path / "raw"
     folder.mkdir()
-    write_run_folder(prepared, folder)
+    write_run_folder(prepare(), folder)
     asked = []
 
-    def tables(lengths: Mapping[str, Mapping[str, float]]) -> None:
+    def results(left: Left) -> None:
         asked.append((folder / layout.TRIPINFO_FILE).is_file())
-        make_tables(folder, prepared.plan, lengths)
+        assert not (folder / layout.EVENTS_FILE).exists()
+        left_results(folder, left)
 
-    assert run_worker(folder, forked=True, tables=tables).error is None
+    assert run_worker(folder, forked=True, results=results).error is None
     assert asked == [True]
     assert {name: (folder / name).read_bytes() for name in RECORDS} == fresh
 
 
-def test_records_that_cannot_be_made_into_tables_fail_their_run(
+def test_records_that_results_cannot_be_made_of_fail_their_run(
     prepare: Prepare, tmp_path: Path
 ) -> None:
     write_run_folder(prepare(), tmp_path)
 
-    def torn(_lengths: Mapping[str, Mapping[str, float]]) -> None:
-        msg = "SUMO has not written its measurements to the end"
-        raise SimulationError(msg)
+    def torn(left: Left) -> None:
+        (tmp_path / layout.TRIPINFO_FILE).write_text("<tripinfos><tripinfo", encoding="utf-8")
+        left_results(tmp_path, left)
 
-    ended = run_worker(tmp_path, forked=True, tables=torn)
+    ended = run_worker(tmp_path, forked=True, results=torn)
     assert ended.done is None
     assert ended.error is not None
     assert ended.error.startswith("SUMO has not written")

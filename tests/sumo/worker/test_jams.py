@@ -10,7 +10,10 @@ import pytest
 from odscen.results.records.outcomes import StopReason
 from odscen.results.records.run_events import EventKind, events_from_json
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
+from odscen.sumo.runner.forked_worker import expect_runs
+from odscen.sumo.runner.run_folder import write_run_folder
 from odscen.sumo.runner.run_jobs import run_prepared
+from odscen.sumo.runner.worker_process import run_worker
 from odscen.sumo.worker import jams
 from odscen.sumo.worker.simulation.observed import Ahead
 from tests.sumo.conftest import TYPES, Prepare
@@ -71,11 +74,17 @@ def test_a_light_that_never_turns_green_is_named_with_place_and_time(
     run = prepare(cars=1, walker=False, routes=f"<routes>{TYPES}\n{car}\n</routes>")
     settings = SumocfgSettings(until=until, step_length=0.5, seed=7, signals=True)
     files = {**run.sumo_files, "signals.add.xml": red, "scenario.sumocfg": sumo_config(settings)}
-    plan = replace(run.plan, until=until)
-    result = run_prepared(replace(run, plan=plan, sumo_files=files), tmp_path / "run")
+    run = replace(run, plan=replace(run.plan, until=until), sumo_files=files)
+    expect_runs(2)  # so that its process leaves the results to be made here
+    result = run_prepared(run, tmp_path / "run")
     assert result.status == "completed", result.summary["error"]
 
-    events = events_from_json((tmp_path / "run" / "events.json").read_text())
+    text = (tmp_path / "run" / "events.json").read_text()
+    (alone := tmp_path / "alone").mkdir()
+    write_run_folder(run, alone)
+    assert run_worker(alone).error is None
+    assert (alone / "events.json").read_text() == text
+    events = events_from_json(text)
     (jam,) = [event for event in events if event.kind is EventKind.JAM_BEGIN]
     assert (jam.actor, jam.lane, jam.detail) == ("car0", "A1B1_1", StopReason.RED)
     rows = pl.read_parquet(tmp_path / "run" / "trajectories.parquet")

@@ -54,8 +54,8 @@ def seal_start(run: Path) -> None:
     write_sums(run, {name: file_digest(run / name) for name in start})
 
 
-def seal_run(run: Path) -> None:
-    """Write down the checksums of a run that has ended.
+def seal_run(run: Path, *, hidden: bool = False) -> None:
+    """Write down the checksums of a run that has ended, perhaps in a folder that is still hidden.
 
     What has been written down before is not computed again: what was damaged meanwhile shows.
     """
@@ -64,7 +64,8 @@ def seal_run(run: Path) -> None:
         known.pop(name, None)
     sums = sums_of(run, leave=_INNER, known=known)
     slices = f"{layout.SLICES_FOLDER}/"
-    write_sums(run, {name: one for name, one in sums.items() if not name.startswith(slices)})
+    kept = {name: one for name, one in sums.items() if not name.startswith(slices)}
+    write_sums(run, kept, hidden=hidden)
 
 
 def seal_interrupted(run: Path) -> None:

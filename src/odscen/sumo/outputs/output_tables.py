@@ -9,8 +9,8 @@ import os
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import SimulationError
-from odscen.results.measures.summary import Trip, actors_text
-from odscen.results.records.run_events import events_text
+from odscen.results.measures.summary import Trip, actor_outcomes, actors_text, outcome_row
+from odscen.results.records.run_events import event_line, events_text
 from odscen.sumo.folder.layout import (
     ACTORS_FILE,
     EMISSIONS_FILE,
@@ -28,17 +28,19 @@ from odscen.sumo.outputs.conflict_files import tidy_conflicts
 from odscen.sumo.outputs.lane_measures import lane_table
 from odscen.sumo.outputs.signal_log import tidy_signals
 from odscen.sumo.outputs.stop_table import stay_table, stop_table
-from odscen.sumo.outputs.trip_table import ParkedCar, Stay, logged_trips, trip_table
+from odscen.sumo.outputs.trip_table import ParkedCar, Stay, trip_table
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping, Sequence
     from pathlib import Path
 
     import polars as pl
 
+    from odscen.results.records.run_events import Event
     from odscen.results.records.run_plan import Plan
 
 
+_TRIP_COLUMNS = ("id", "time_loss", "waiting_time", "waiting_count")
 _SMALL = 32 << 20
 """Bytes."""
 
@@ -62,7 +64,7 @@ def tidy_outputs(
     present: Mapping[str, int],
     parked: Collection[str] = (),
     last: bool,
-) -> None:
+) -> dict[str, Trip]:
     """Replace SUMO's lane data, emissions, tripinfo and stops by our tables.
 
     Parameters
@@ -75,6 +77,11 @@ def tidy_outputs(
         Those who have ended their trips parked before this slice, and were still there.
     last
         Whether the run has ended, so that trips without an arrival are trips.
+
+    Returns
+    -------
+    dict
+        What the table of trips says of each actor.
 
     Raises
     ------
@@ -99,11 +106,15 @@ def tidy_outputs(
             if trips.height:
                 trips.write_parquet(folder / TRIPS_FILE)
             tripinfo.unlink()
+            return _trips_of(trips)
     except (etree.XMLSyntaxError, PolarsError) as error:
         raise _torn(error) from error
+    return {}
 
 
-def make_tables(folder: Path, plan: Plan, lengths: Mapping[str, Mapping[str, float]]) -> None:
+def make_tables(
+    folder: Path, plan: Plan, lengths: Mapping[str, Mapping[str, float]]
+) -> dict[str, Trip]:
     """Make all that SUMO has written of a run in one piece into the tables that we keep.
 
     Parameters
@@ -111,15 +122,35 @@ def make_tables(folder: Path, plan: Plan, lengths: Mapping[str, Mapping[str, flo
     lengths
         As of :func:`tidy_outputs`.
 
+    Returns
+    -------
+    dict
+        What was measured on the trip of each actor.
+
     Raises
     ------
     SimulationError
         If SUMO has not written it to its end.
     """
     tidy_part(folder / TRAJECTORIES_FILE)
-    tidy_outputs(folder, lengths, plan, present={}, last=True)
+    trips = tidy_outputs(folder, lengths, plan, present={}, last=True)
     tidy_conflicts(folder, plan)
     tidy_signals(folder)
+    return trips
+
+
+def make_results(
+    folder: Path,
+    plan: Plan,
+    events: Sequence[Event],
+    lengths: Mapping[str, Mapping[str, float]],
+) -> None:
+    """Make all that a run in one piece leaves: tables, ``events.json`` and ``actors.json``.
+
+    Parameters and errors as of :func:`make_tables`.
+    """
+    outcomes = actor_outcomes(plan, events, make_tables(folder, plan, lengths))
+    write_results(folder, map(event_line, events), map(outcome_row, outcomes))
 
 
 def are_small(folder: Path) -> bool:
@@ -158,33 +189,18 @@ def _parked(
     }
 
 
-def trips_logged(tripinfo: Path) -> dict[str, Trip]:
-    """The same as :func:`trips_in` from SUMO's tripinfo, of a run in which nobody parks.
-
-    Raises
-    ------
-    SimulationError
-        If SUMO has not written it to its end.
-    """
-    from lxml import etree
-
-    if not tripinfo.is_file():
-        return {}
-    try:
-        rows = list(logged_trips(tripinfo, {}))
-    except etree.XMLSyntaxError as error:
-        raise _torn(error) from error
-    return {row[0]: Trip(row[8], row[6], row[7]) for row in rows}
-
-
 def trips_in(file: Path) -> dict[str, Trip]:
     """What a table of trips says of each actor; empty if there is none."""
     import polars as pl
 
     if not file.is_file():
         return {}
-    table = pl.read_parquet(file, columns=["id", "time_loss", "waiting_time", "waiting_count"])
-    return {name: Trip(*values) for name, *values in table.iter_rows()}
+    return _trips_of(pl.read_parquet(file, columns=list(_TRIP_COLUMNS)))
+
+
+def _trips_of(table: pl.DataFrame) -> dict[str, Trip]:
+    rows = zip(*(table[name].to_list() for name in _TRIP_COLUMNS), strict=True)
+    return {name: Trip(*values) for name, *values in rows}
 
 
 def _torn(error: Exception) -> SimulationError:

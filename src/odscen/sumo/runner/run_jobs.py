@@ -21,9 +21,9 @@ from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.found_files import found_files
 from odscen.sumo.folder.run_sums import seal_run
-from odscen.sumo.outputs.output_tables import make_tables
 from odscen.sumo.runner.forecast import refuse_without_room
 from odscen.sumo.runner.forked_worker import expect_runs, is_one_of_many, is_ready
+from odscen.sumo.runner.left_results import left_results
 from odscen.sumo.runner.long_runs import refuse_interrupted, run_lock, run_long
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
@@ -106,7 +106,7 @@ def run_prepared(
                     live=live,
                     keep=(lock,),
                     forked=forked,
-                    tables=partial(make_tables, folder, prepared.plan) if forked else None,
+                    results=partial(left_results, folder) if forked else None,
                 )
             else:
                 ended = simulate(folder)
@@ -117,7 +117,7 @@ def run_prepared(
                 finish(folder, summary)
                 summary["files"] = found_files(folder)
             (folder / layout.SUMMARY_FILE).write_text(summary_to_json(summary), encoding="utf-8")
-            seal_run(folder)
+            seal_run(folder, hidden=True)
         return Run(out, summary)
 
 

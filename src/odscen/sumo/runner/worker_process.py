@@ -34,10 +34,10 @@ from odscen.sumo.worker.protocol import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from odscen.sumo.worker.protocol import Lockstep, Message, OnProgress, Pace
+    from odscen.sumo.worker.protocol import Left, Lockstep, Message, OnProgress, Pace
 
 WORKER = "odscen.sumo.worker.simulate"
 
@@ -94,7 +94,7 @@ def run_worker(
     live: Companion | None = None,
     keep: tuple[int, ...] = (),
     forked: bool = False,
-    tables: Callable[[Mapping[str, Mapping[str, float]]], None] | None = None,
+    results: Callable[[Left], None] | None = None,
 ) -> Ended:
     """Run the simulation prepared in ``folder``.
 
@@ -116,9 +116,9 @@ def run_worker(
     forked
         Whether its process may be forked by one that has done the imports; not for a run that is
         live or in slices.
-    tables
-        Makes what SUMO has written into tables, from lengths of lanes. A forked process, to which
-        the first table costs as much as the simulation, then leaves those of a small run to it.
+    results
+        Makes the results of a small run from what a forked process has left: to that, all that
+        Python does is dear, and the first table costs as much as the simulation.
     """
     start = time.perf_counter()
     late = threading.Event()
@@ -131,12 +131,12 @@ def run_worker(
             live,
             keep,
             forked=forked and POSSIBLE,
-            raw=tables is not None,
+            raw=results is not None,
         ) as process,
     ):
         timer = _kill_after(process, time_limit, late)
         try:
-            if tables is not None:
+            if results is not None:
                 import polars as pl  # its import takes longer than a short simulation
 
                 del pl
@@ -150,8 +150,8 @@ def run_worker(
             if live is not None:
                 live.detach()
     seconds = time.perf_counter() - start
-    if isinstance(last, Done) and not process.returncode and tables is not None:
-        last = _with_tables(last, tables)
+    if isinstance(last, Done) and not process.returncode and results is not None:
+        last = _with_results(last, results)
     if isinstance(last, Done) and not process.returncode:
         return Ended(last, seconds, live.failure if live else None)
     if late.is_set():
@@ -162,14 +162,12 @@ def run_worker(
     return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
 
 
-def _with_tables(
-    done: Done, tables: Callable[[Mapping[str, Mapping[str, float]]], None]
-) -> Done | Failed:
-    """Make the tables that the worker has left."""
-    if done.lengths is None:
+def _with_results(done: Done, make: Callable[[Left], None]) -> Done | Failed:
+    """Make the results that the worker has left."""
+    if done.left is None:
         return done
     try:
-        tables(done.lengths)
+        make(done.left)
     except SimulationError as error:
         return Failed(str(error))
     except OSError as error:

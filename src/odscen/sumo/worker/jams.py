@@ -9,13 +9,13 @@ red, too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from odscen.results.records.outcomes import StopReason, stop_reason
 from odscen.results.records.run_events import Event, EventKind
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.sumo.worker.simulation.observed import Ahead, StoppedVehicle
     from odscen.sumo.worker.simulation.session import Session
@@ -44,6 +44,12 @@ class LastStop(NamedTuple):
     since: float
     reason: StopReason | str
 
+    @classmethod
+    def from_row(cls, row: Sequence[Any]) -> Self:
+        """One from its JSON."""
+        lane, x, y, since, reason = row
+        return cls(lane, x, y, since, stop_reason(reason))
+
 
 class JamWatch:
     """Finds jams and says why somebody was stop.
@@ -52,6 +58,8 @@ class JamWatch:
     ----------
     due
         When to look next, simulated seconds.
+    stops
+        Where and why vehicles were stopped at the last look, by their ids; a new one at each.
     """
 
     def __init__(self, net_offset: tuple[float, float]) -> None:
@@ -59,7 +67,7 @@ class JamWatch:
         self._offset = net_offset
         self._since: dict[str, float] = {}
         self._seen: dict[str, float] = {}
-        self._stops: dict[str, LastStop] = {}
+        self.stops: dict[str, LastStop] = {}
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
@@ -67,7 +75,7 @@ class JamWatch:
             "next": self.due,
             "since": dict(self._since),
             "seen": dict(self._seen),
-            "stuck": dict(self._stops),
+            "stuck": dict(self.stops),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -75,14 +83,7 @@ class JamWatch:
         self.due = state["next"]
         self._since = dict(state["since"])
         self._seen = dict(state["seen"])
-        stops = {name: LastStop(*row) for name, row in state["stuck"].items()}
-        self._stops = {
-            name: one._replace(reason=stop_reason(one.reason)) for name, one in stops.items()
-        }
-
-    def last_stop(self, vehicle: str) -> LastStop | None:
-        """Where and why a vehicle was stopped at the last look, if it was."""
-        return self._stops.get(vehicle)
+        self.stops = {name: LastStop.from_row(row) for name, row in state["stuck"].items()}
 
     def look(self, session: Session, time: float) -> list[Event]:
         """Jams that have begun or ended since the last look."""
@@ -94,7 +95,7 @@ class JamWatch:
         self._seen.update((lane, time) for lane in self._since.keys() & queues.keys())
         over = [lane for lane, seen in self._seen.items() if time - seen >= RELEASE]
         events = [self._end(time, lane) for lane in sorted(over)]
-        before, self._stops = self._stops, {}
+        before, self.stops = self.stops, {}
         for lane, queue in sorted(queues.items()):
             first = max(queue, key=lambda one: (one.pos, one.vehicle))
             reason: StopReason | str
@@ -102,7 +103,7 @@ class JamWatch:
             if reason in (StopReason.RED, StopReason.UNKNOWN) and first.vehicle in before:
                 reason = before[first.vehicle].reason
             for one in queue:
-                self._stops[one.vehicle] = self._place(session, one, time, reason)
+                self.stops[one.vehicle] = self._place(session, one, time, reason)
             if lane in jammed and lane not in self._since:
                 self._since[lane] = time - first.waited
                 self._seen[lane] = time
@@ -123,7 +124,7 @@ class JamWatch:
         return LastStop(one.lane, x, y, time - one.waited, reason)
 
     def _begin(self, time: float, first: StoppedVehicle, queue: int, head: str) -> Event:
-        stop = self._stops[first.vehicle]
+        stop = self.stops[first.vehicle]
         return Event(
             time,
             EventKind.JAM_BEGIN,

@@ -40,15 +40,26 @@ class Progress:
 class Done:
     """The run has ended without an error: simulated seconds, steps, wall seconds of the simulation.
 
-    ``stopped`` if a user who watched it has ended it before its time. With ``lengths`` of lanes, m,
-    by edge, what SUMO has written has not been made into tables yet.
+    ``stopped`` if a user who watched it has ended it before its time; ``left`` if the results have
+    not been made yet.
     """
 
     sim_seconds: float
     steps: int
     wall_seconds: float
     stopped: bool = False
-    lengths: dict[str, dict[str, float]] | None = None
+    left: Left | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What the results of a run are made of, beside the files that SUMO has written.
+
+    ``lengths`` are those of lanes, m, by edge; ``recorded`` is what the recorder hands over.
+    """
+
+    lengths: dict[str, dict[str, float]]
+    recorded: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,6 +268,8 @@ def decode(line: str | bytes) -> Message | Command | EgoPose | Outside | MoreRul
         kind = _KINDS[data.pop("kind")]
         if kind is Outside:
             data["users"] = [ForeignUser(*user) for user in data["users"]]
+        elif kind is Done and data.get("left") is not None:
+            data["left"] = Left(**data["left"])
         return kind(**data)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None

@@ -8,26 +8,36 @@ looked at for jams. Trajectories are SUMO's own business (FCD output).
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.frames import body_centre
 from odscen.results.records.run_events import Event, EventKind
-from odscen.sumo.worker.jams import JamWatch
+from odscen.sumo.worker.jams import JamWatch, LastStop
+from odscen.sumo.worker.simulation.observed import Collision, Front, StepLists
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.results.records.run_plan import Plan
-    from odscen.sumo.worker.simulation.observed import Collision, Front, StepLists
+    from odscen.results.records.run_plan import Plan, PlannedActor
     from odscen.sumo.worker.simulation.session import Session
 
 
+_NO_STOPS: dict[str, LastStop] = {}
+
+
 class _EventfulStep(NamedTuple):
-    """A step in which something happened; ``number`` counts all steps."""
+    """A step in which something happened, or after which a look for jams found something.
+
+    ``number`` counts all steps. ``stops`` are those of the look before, ``jams`` what was found
+    after the step.
+    """
 
     number: int
     time: float
-    lists: StepLists
+    lists: StepLists | None
+    stops: Mapping[str, LastStop]
+    jams: Sequence[Event] = ()
 
 
 class _ParkedTrips:
@@ -75,9 +85,10 @@ class _ParkedTrips:
 class Recorder:
     """Turns the session's lists into events.
 
-    Steps in which something happened are put by and gone through together, at every look for jams
-    and whenever they are asked for: after a step of SUMO nothing of Python is in the processor's
-    caches, and one event alone costs several times as much as one of many.
+    Steps in which something happened are put by and gone through together when they are asked for:
+    after a step of SUMO nothing of Python is in the processor's caches, and one event alone costs
+    several times as much as one of many. Another process may go through them, see
+    :meth:`hand_over`.
 
     Attributes
     ----------
@@ -94,8 +105,7 @@ class Recorder:
         self._events: list[Event] = []
         self._departed = 0
         self._arrived = 0
-        self._planned = {actor.id: actor for actor in plan.actors}
-        self._parks = _ParkedTrips(plan)
+        self._plan = plan
         self._offset = plan.net_offset
         self._departures: dict[str, float] = {}
         self._touching: set[tuple[str, str]] = set()
@@ -103,6 +113,14 @@ class Recorder:
         self._jams = JamWatch(plan.net_offset)
         self._number = self._settled = 0
         self._put_by: list[_EventfulStep] = []
+
+    @cached_property
+    def _planned(self) -> dict[str, PlannedActor]:
+        return {actor.id: actor for actor in self._plan.actors}
+
+    @cached_property
+    def _parks(self) -> _ParkedTrips:
+        return _ParkedTrips(self._plan)
 
     @property
     def events(self) -> list[Event]:
@@ -140,6 +158,9 @@ class Recorder:
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
         self._settle()
+        return self._state()
+
+    def _state(self) -> dict[str, Any]:
         return {
             "drained": self.drained,
             "departed": self._departed,
@@ -163,9 +184,28 @@ class Recorder:
         self._jams.restore(state["jams"])
         self._parks.left, self._parks.parked = set(state["left"]), set(state["parked"])
 
+    def hand_over(self) -> dict[str, Any]:
+        """What another process needs to go on as this one would, for JSON; nothing is gone through.
+
+        Events have to be as they were made: those that were drained are not among them.
+        """
+        return {
+            "events": self._events,
+            "state": self._state(),
+            "numbers": (self._number, self._settled),
+            "put_by": self._put_by,
+        }
+
+    def take_over(self, left: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`hand_over`."""
+        self.restore(left["state"])
+        self._events = list(map(_event, left["events"]))
+        self._number, self._settled = left["numbers"]
+        self._put_by = [_eventful_step(*row) for row in left["put_by"]]
+
     def road_is_empty(self, time: float) -> None:
         """Say that the run ends because the road is empty: every jam is over."""
-        self.events.extend(self._jams.road_is_empty(time))
+        self._look_found(time, self._jams.road_is_empty(time))
 
     def add(self, events: Sequence[Event]) -> None:
         """Add what measures did in the last step; who is stranded is not under way any more."""
@@ -190,19 +230,26 @@ class Recorder:
         self._number += 1
         lists = session.happened()
         if lists is not None:
-            self._put_by.append(_EventfulStep(self._number, time, lists))
+            stops = self._jams.stops if lists.teleports_started else _NO_STOPS
+            self._put_by.append(_EventfulStep(self._number, time, lists, stops))
             if lists.teleports_started or lists.teleports_ended or lists.collisions:
                 self.jumps += 1
         if time >= self._jams.due:
-            self.events.extend(self._jams.look(session, time))
+            self._look_found(time, self._jams.look(session, time))
+
+    def _look_found(self, time: float, jams: Sequence[Event]) -> None:
+        if jams:
+            self._put_by.append(_EventfulStep(self._number, time, None, _NO_STOPS, jams))
 
     def _settle(self) -> None:
         """Go through the steps that were put by."""
         steps, self._put_by = self._put_by, []
-        for number, time, lists in steps:
-            self._quiet_before(number)
-            self._record(time, lists)
-            self._settled = number
+        for number, time, lists, stops, jams in steps:
+            if lists is not None:
+                self._quiet_before(number)
+                self._record(time, lists, stops)
+                self._settled = number
+            self._events.extend(jams)
         self._quiet_before(self._number + 1)
 
     def _quiet_before(self, number: int) -> None:
@@ -210,11 +257,11 @@ class Recorder:
         if self._settled < number - 1:
             self._touching, self._stopping = set(), set()
 
-    def _record(self, time: float, lists: StepLists) -> None:
+    def _record(self, time: float, lists: StepLists, stops: Mapping[str, LastStop]) -> None:
         fronts = lists.fronts
         self._departures_of(time, lists)
         for vehicle in lists.teleports_started:
-            self._teleport(time, vehicle)
+            self._teleport(time, vehicle, stops.get(vehicle))
         for vehicle in lists.teleports_ended:
             self._place(time, EventKind.TELEPORT_END, vehicle, fronts[vehicle])
         self._stops(time, lists.emergency_stops, fronts)
@@ -261,9 +308,8 @@ class Recorder:
         spent = None if departed is None else time - departed
         self._events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
 
-    def _teleport(self, time: float, vehicle: str) -> None:
+    def _teleport(self, time: float, vehicle: str, stop: LastStop | None) -> None:
         """Report where and why it was stopped until now, as it has no place any more."""
-        stop = self._jams.last_stop(vehicle)
         if stop is None:
             self._events.append(Event(time, EventKind.TELEPORT_START, vehicle))
             return
@@ -313,3 +359,22 @@ class Recorder:
                 )
             )
         self._touching = touching
+
+
+def _event(row: Sequence[Any]) -> Event:
+    """Event from its JSON."""
+    time, kind, *values = row
+    return Event(time, EventKind(kind), *values)
+
+
+def _eventful_step(
+    number: int,
+    time: float,
+    lists: Sequence[Any] | None,
+    stops: Mapping[str, Sequence[Any]],
+    jams: Sequence[Sequence[Any]],
+) -> _EventfulStep:
+    """Step from its JSON."""
+    known = {name: LastStop.from_row(row) for name, row in stops.items()}
+    found = None if lists is None else StepLists.from_row(lists)
+    return _EventfulStep(number, time, found, known, tuple(map(_event, jams)))

@@ -26,9 +26,7 @@ from typing import TYPE_CHECKING
 from odscen.base.atomic_folders import in_use
 from odscen.base.errors import OdscenError
 from odscen.base.system_errors import NO_MEMORY, system_words
-from odscen.results.measures.summary import Outcomes
 from odscen.results.records.light_programs import programs_from_json
-from odscen.results.records.run_events import event_line
 from odscen.results.records.run_plan import Plan
 from odscen.sumo.folder.layout import (
     BEHAVIOUR_FILE,
@@ -37,16 +35,11 @@ from odscen.sumo.folder.layout import (
     LOG_FILE,
     STORY_FILE,
     SUMO_FOLDER,
-    TRIPINFO_FILE,
-    TRIPS_FILE,
 )
 from odscen.sumo.outputs.output_tables import (
     are_small,
-    make_tables,
+    make_results,
     outputs_to,
-    trips_in,
-    trips_logged,
-    write_results,
 )
 from odscen.sumo.worker.lockstep import LockstepWatch
 from odscen.sumo.worker.output_capture import captured_output
@@ -54,6 +47,7 @@ from odscen.sumo.worker.protocol import (
     Command,
     Done,
     Failed,
+    Left,
     Lockstep,
     Message,
     Pace,
@@ -121,12 +115,12 @@ def simulate(
     *,
     raw: bool = False,
 ) -> Done | None:
-    """Run the simulation in ``folder`` and write its events and actors.
+    """Run the simulation in ``folder`` and write its results.
 
     Parameters
     ----------
     raw
-        Whether the tables of a small run may be left to be made from what it returns.
+        Whether the results of a small run may be left to be made from what it returns.
 
     Returns
     -------
@@ -141,16 +135,10 @@ def simulate(
     try:
         if plan.slice_length is not None:
             return run_slice(plan, folder, stepper)
-        done = _in_one_piece(plan, folder, stepper, raw=raw and not plan.parking)
+        done = _in_one_piece(plan, folder, stepper, raw=raw)
     finally:
         if stepper.behaviour is not None:
             stepper.behaviour.close()
-    events = stepper.recorder.events
-    outcomes = Outcomes(plan)
-    made = done.lengths is None
-    trips = trips_in(folder / TRIPS_FILE) if made else trips_logged(folder / TRIPINFO_FILE)
-    outcomes.hear(events, trips)
-    write_results(folder, map(event_line, events), outcomes.rows())
     return done
 
 
@@ -187,9 +175,11 @@ def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper, *, raw: bool) -> D
     with open_session(arguments) as session:
         now = stepper.run(session, plan.until)
         lengths = session.lanes.lengths()
-    left = lengths if raw and are_small(folder) else None
-    if left is None:
-        make_tables(folder, plan, lengths)
+    left = None
+    if raw and are_small(folder):
+        left = Left(lengths, stepper.recorder.hand_over())
+    else:
+        make_results(folder, plan, stepper.recorder.events, lengths)
     return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped, left)
 
 

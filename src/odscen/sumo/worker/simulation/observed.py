@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntFlag
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -51,8 +51,8 @@ class Poses(NamedTuple):
     signals: NDArray[np.int64]
 
 
-class Collision(Protocol):
-    """One collision that lasts, as libsumo reports it."""
+class Collision(NamedTuple):
+    """One collision that lasts, in libsumo's words."""
 
     collider: str
     victim: str
@@ -78,6 +78,14 @@ class StepLists(NamedTuple):
     parked: Sequence[str]
     unparked: Sequence[str]
     fronts: Mapping[str, Front | None]
+
+    @classmethod
+    def from_row(cls, row: Sequence[Any]) -> Self:
+        """One from its JSON."""
+        step = cls(*row)
+        fronts = {name: None if one is None else Front(*one) for name, one in step.fronts.items()}
+        touching = [Collision(*one) for one in step.collisions]
+        return step._replace(collisions=touching, fronts=fronts)
 
 
 class StoppedVehicle(NamedTuple):

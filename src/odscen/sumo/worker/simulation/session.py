@@ -22,6 +22,7 @@ from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
 from odscen.sumo.worker.simulation.foreign_traffic import ForeignLights, ForeignTraffic, is_foreign
 from odscen.sumo.worker.simulation.moved_actors import MovedActors
 from odscen.sumo.worker.simulation.observed import (
+    Collision,
     Front,
     Poses,
     RouteAhead,
@@ -150,6 +151,9 @@ class Session:
         fronts: dict[str, Front | None] = {}
         lists.append(fronts)
         step = StepLists(*lists)
+        if step.collisions:
+            touching = [Collision(c.collider, c.victim, c.type, c.lane) for c in step.collisions]
+            step = step._replace(collisions=touching)
         for name in (
             *step.departed, *step.teleports_ended, *step.emergency_stops, *step.unparked
         ):  # fmt: skip
