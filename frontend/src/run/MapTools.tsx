@@ -11,6 +11,7 @@ export function MapTools({
   live,
   onBy,
   share,
+  views,
   children,
 }: {
   by: ColourBy;
@@ -19,6 +20,8 @@ export function MapTools({
   onBy: (by: ColourBy) => void;
   /** What the picture is taken away with. */
   share?: ReactNode;
+  /** What adds a view, or closes this one. */
+  views?: ReactNode;
   children?: ReactNode;
 }) {
   return (
@@ -46,6 +49,7 @@ export function MapTools({
           }}
         />
         {share}
+        {views}
       </div>
       {children}
     </div>

@@ -32,7 +32,11 @@ interface Props {
   replayable: boolean;
   tab: string;
   onTab: (tab: string | null) => void;
-  picture: Picture;
+  latest: Picture["latest"];
+  followed: string | null;
+  onFollow: (user: string | null) => void;
+  /** Which view of several it acts on; null of one alone. */
+  view: string | null;
   incidents: readonly Incident[];
   categories: ReadonlyMap<string, Category>;
   /** How many files of counts the run can be compared with. */
@@ -65,7 +69,10 @@ export function RunSide({
   replayable,
   tab,
   onTab,
-  picture,
+  latest,
+  followed,
+  onFollow,
+  view,
   incidents,
   categories,
   counts,
@@ -130,7 +137,13 @@ export function RunSide({
         </Tabs.Panel>
         <Tabs.Panel value="users" className="run-panel">
           {!ended && <SafeSlices info={info} />}
-          <RoadUsers picture={picture} wanted={tab === "users"} />
+          <RoadUsers
+            latest={latest}
+            followed={followed}
+            onFollow={onFollow}
+            view={view}
+            wanted={tab === "users"}
+          />
         </Tabs.Panel>
         <Tabs.Panel value="incidents" className="run-panel">
           <IncidentLog

@@ -8,7 +8,7 @@ import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import type { FitRow } from "../api/runs";
 import type { Category } from "../api/types";
 import { type LightProgram, signals } from "../api/signals";
-import type { MapHandle, Pointed } from "../map/MapCanvas";
+import type { Pointed } from "../map/MapCanvas";
 import { seenInLog } from "../signals/occupancy";
 import { sceneDetectors } from "../signals/sceneDetectors";
 import { useQueues } from "../signals/useQueues";
@@ -29,9 +29,11 @@ import { RunSide } from "./RunSide";
 import { LiveStrip, ReplayStrip } from "./Strip";
 import { useCounts } from "./useCounts";
 import { useIncidents } from "./useIncidents";
-import { useLaneUse } from "./useLaneUse";
+import { useLaneData } from "./useLaneUse";
 import { usePicture } from "./usePicture";
 import { useReplay } from "./useReplay";
+import { useViews } from "./useViews";
+import { viewName } from "./ViewButtons";
 import { useGround, useRun } from "./useRun";
 
 /** Watches one run from above; one that is resumed is watched anew. */
@@ -42,20 +44,29 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
 
 /** A run, live or as it was recorded; the scenario itself is not touched. */
 function Watched({ scenario, run, onResume }: { scenario: string; run: string; onResume: () => void }) {
-  const handle = useRef<MapHandle | null>(null);
   // What the address kept when the run was opened.
   const [linked] = useState(() => parseKept(location.hash));
   const { info, failure, lost, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
-  const picture = usePicture(handle);
-  const { show, clear, follow, followed, latest, now } = picture;
+  const [mode, setMode] = useState<"live" | "replay" | null>(null);
+  const views = useViews(linked);
+  const { used, handleOf, follow } = views;
+  // A recording has no lamps.
+  const sights = useMemo(
+    () =>
+      views.list.map((one) =>
+        mode === "replay" && one.by === "lamps" ? { ...one, by: "kind" as const } : one,
+      ),
+    [views.list, mode],
+  );
+  const picture = usePicture(sights, handleOf);
+  const { show, clear, latest, now } = picture;
   const ended = info !== null && hasEnded(info.state);
   const over = useRef(ended);
   over.current = ended;
   const complete = ended && info.summary != null;
   const [crowd, setCrowd] = useState<Crowd | null>(null);
   // A run that has ended is opened as its recording; one that was watched keeps its last picture.
-  const [mode, setMode] = useState<"live" | "replay" | null>(null);
   if (info && mode === null) setMode(ended ? "replay" : "live");
   const replayable = complete && info.state !== "failed" && info.state !== "interrupted";
   const player = useReplay(run, mode === "replay" && replayable, show);
@@ -66,7 +77,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const shownTab = tab ?? (ended ? "result" : "users");
 
   const { map, drawing, loaded } = ground;
-  const laneUse = useLaneUse(run, loaded);
+  const lanes = useLaneData(run, loaded);
   const lights = useRunLights(run, map, mode === "replay" && replayable);
   const { learn: learnLights, learnDetectors, drawn } = lights;
   const [junction, setJunction] = useState<string | null>(null);
@@ -102,24 +113,15 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   useEffect(() => {
     if (cleared) clear();
   }, [cleared, clear]);
-  useEffect(() => {
-    if (ground.bounds && !linked.at) handle.current?.show(ground.bounds);
-  }, [ground.bounds, linked]);
   const { replay, seek } = player;
   useEffect(() => {
     if (!replay) return;
-    const { time: moment, chosen } = linked;
-    if (moment !== undefined) seek(moment);
-    if (chosen?.[0]) follow(chosen[0]);
-  }, [replay, seek, follow, linked]);
+    if (linked.time !== undefined) seek(linked.time);
+  }, [replay, seek, linked]);
   useEffect(() => {
-    if (replay) keep({ time: player.time, chosen: followed ? [followed] : [] });
-  }, [replay, player.time, followed]);
+    if (replay) keep({ time: player.time });
+  }, [replay, player.time]);
   const known = player.replay?.crowd ?? crowd;
-  const recorded = useMemo(
-    () => (player.replay && followed ? player.replay.speedsOf(followed) : null),
-    [player.replay, followed],
-  );
   const categories = useMemo(
     () => new Map<string, Category>(known?.all().map((one) => [one.id, one.category]) ?? []),
     [known],
@@ -145,19 +147,17 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const { occupied } = lights;
   const second = mode === "replay" ? Math.floor(time) : 0;
   const scene = useMemo(() => {
-    const lanes = { ...ground.scene, laneColors: laneUse.colors };
-    if (!program) return lanes;
+    if (!program) return ground.scene;
     const on = mode === "live" ? occupied : seenInLog(program.detectors, second)?.on;
-    return { ...lanes, detectors: sceneDetectors(program, on) };
-  }, [ground.scene, program, mode, occupied, second, laneUse.colors]);
-  const pick = (spot: Pointed): void => {
-    laneUse.point(spot);
+    return { ...ground.scene, detectors: sceneDetectors(program, on) };
+  }, [ground.scene, program, mode, occupied, second]);
+  const pick = (view: number, spot: Pointed): void => {
     const user = picture.near(spot);
     const light = user === null ? lights.heads?.junctionAt(spot) : null;
     if (light) {
       setJunction(light);
       setTab("lights");
-    } else follow(user);
+    } else follow(view, user);
   };
 
   const jump = (to: number): void => {
@@ -165,8 +165,8 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     player.seek(to);
   };
   const place = (x: number, y: number): void => {
-    follow(null);
-    handle.current?.centre(x, y);
+    follow(used.id, null);
+    handleOf(used.id).current?.centre(x, y);
   };
   const back = (): void => go({ view: "editor", scenario });
   const wrong = failure ?? ground.failure;
@@ -184,29 +184,35 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
       <div className="run-body">
         <div className="run-map">
           {drawing ? (
-            <RunMap
-              run={run}
-              info={info}
-              lost={lost}
-              live={live}
-              drawing={drawing}
-              loaded={loaded}
-              scene={scene}
-              heads={heads}
-              marks={marks}
-              handle={handle}
-              picture={picture}
-              player={player}
-              replayable={replayable}
-              laneUse={laneUse}
-              crowd={known}
-              planned={crowd !== null}
-              categories={categories}
-              lights={lights.known && (map?.lights.length ?? 0) > 0}
-              kinds={kinds}
-              speeds={recorded ?? picture.speeds}
-              onPick={pick}
-            />
+            <div className="run-views">
+              {sights.map((sight, n) => (
+                <RunMap
+                  key={sight.id}
+                  run={run}
+                  info={n === 0 ? info : null}
+                  lost={lost && n === 0}
+                  live={live}
+                  drawing={drawing}
+                  loaded={loaded}
+                  scene={scene}
+                  heads={heads}
+                  marks={marks}
+                  bounds={ground.bounds}
+                  sight={sight}
+                  views={views}
+                  picture={picture}
+                  player={player}
+                  replayable={replayable}
+                  lanes={lanes}
+                  crowd={known}
+                  planned={crowd !== null}
+                  categories={categories}
+                  lights={lights.known && (map?.lights.length ?? 0) > 0}
+                  kinds={kinds}
+                  onPick={(spot) => pick(sight.id, spot)}
+                />
+              ))}
+            </div>
           ) : (
             <div className="empty">
               <Loader aria-label={t`Loading the map`} />
@@ -223,7 +229,10 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
           replayable={replayable}
           tab={shownTab}
           onTab={setTab}
-          picture={picture}
+          latest={latest}
+          followed={used.followed}
+          onFollow={(user) => follow(used.id, user)}
+          view={views.list.length > 1 ? viewName(views.list.indexOf(used) + 1, views.list.length) : null}
           incidents={incidents}
           categories={categories}
           counts={counts}

@@ -8,7 +8,11 @@ import { nth } from "../lists";
 import type { Frame } from "./frames";
 
 /** What the colour of a road user says. */
-export type ColourBy = "kind" | "speed" | "delay" | "lamps";
+const COLOURS_BY = ["kind", "speed", "delay", "lamps"] as const;
+export type ColourBy = (typeof COLOURS_BY)[number];
+
+export const isColourBy = (word: string | undefined): word is ColourBy =>
+  COLOURS_BY.some((one) => one === word);
 
 /** Below this speed one is stopped, as in the figures of a run; m/s. */
 export const STOPPED = 0.1;

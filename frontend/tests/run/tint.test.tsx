@@ -52,7 +52,8 @@ test("stopped delay adds up while one is stopped, also when others come and go",
 test("who is not introduced has no colour of another", () => {
   const crowd = new Crowd();
   crowd.introduce([{ index: 9, id: "b", category: "van", length: 5, width: 2, ego: false }]);
-  const moving = crowd.arrange(frame(0, [4, 0], [9, 30]), null, null, "speed");
+  const seen = frame(0, [4, 0], [9, 30]);
+  const moving = crowd.seen(crowd.arrange(seen, null), seen, null, "speed");
   expect([...(moving.tint?.group ?? [])]).toEqual([4]);
   expect(crowd.speed("b")).toBe(30);
   expect(crowd.speed("a")).toBeNull();
