@@ -9,6 +9,7 @@ import { type ColourBy, coloursFor } from "./tint";
 export function MapTools({
   by,
   live,
+  lights,
   onBy,
   share,
   views,
@@ -17,6 +18,8 @@ export function MapTools({
   by: ColourBy;
   /** Whether the run is watched while it runs. */
   live: boolean;
+  /** Whether states of traffic lights are known. */
+  lights: boolean;
   onBy: (by: ColourBy) => void;
   /** What the picture is taken away with. */
   share?: ReactNode;
@@ -42,7 +45,7 @@ export function MapTools({
           }
           leftSectionWidth={54}
           allowDeselect={false}
-          data={coloursFor(live)}
+          data={coloursFor(live, lights || by === "signal")}
           value={by}
           onChange={(next) => {
             if (next) onBy(next as ColourBy);

@@ -69,7 +69,7 @@ export function RoadUsers({
       </Group>
       {view !== null && (
         <Text size="sm" mt="sm" aria-live="polite">
-          <Trans>{view} follows, as it was used last.</Trans>
+          <Trans>{view} was used last: it follows whom you choose.</Trans>
         </Text>
       )}
       <TextInput

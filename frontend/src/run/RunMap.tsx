@@ -13,6 +13,7 @@ import type { Crowd } from "./frames";
 import { LaneTools } from "./LaneTools";
 import { QUANTITIES } from "./laneUse";
 import { Legend } from "./Legend";
+import type { LimitOf } from "./limits";
 import { MapTools } from "./MapTools";
 import { RunHint } from "./RunHint";
 import { ShareMenu } from "./ShareMenu";
@@ -46,6 +47,7 @@ interface Props {
   /** Whether there is a recording. */
   replayable: boolean;
   lanes: LaneData;
+  limitOf: LimitOf | null;
   /** All road users, once they are known. */
   crowd: Crowd | null;
   /** Whether their routes are planned. */
@@ -76,6 +78,7 @@ export function RunMap({
   player,
   replayable,
   lanes,
+  limitOf,
   crowd,
   planned,
   categories,
@@ -103,7 +106,12 @@ export function RunMap({
     if (focus?.id === id) frame.current?.querySelector<HTMLElement>('[role="application"]')?.focus();
   }, [focus, id]);
   const coloured = useMemo(() => ({ ...scene, laneColors: laneUse.colors }), [scene, laneUse.colors]);
-  const recorded = useMemo(() => (replay && followed ? replay.speedsOf(followed) : null), [replay, followed]);
+  // No limit of a lane is meant for people on foot.
+  const limits = followed !== null && categories.get(followed) !== "pedestrian" ? limitOf : null;
+  const recorded = useMemo(
+    () => (replay && followed ? replay.speedsOf(followed, limits) : null),
+    [replay, followed, limits],
+  );
   const speeds = recorded ?? (followed ? picture.speedsOf(followed) : []);
   // What has come before the map is drawn with it, so that nothing is missing or flickers.
   useEffect(() => redraw(), [redraw, drawing, loaded]);
@@ -154,6 +162,7 @@ export function RunMap({
         <MapTools
           by={by}
           live={live}
+          lights={lights}
           onBy={(next) => views.colour(id, next)}
           share={
             <ShareMenu

@@ -22,6 +22,7 @@ import { hasEnded } from "./figures";
 import { countMarks } from "./fit";
 import type { Crowd } from "./frames";
 import { markKind, marksAt } from "./incidents";
+import { limitsOf } from "./limits";
 import { Live } from "./live";
 import { RunGone } from "./RunGone";
 import { RunMap } from "./RunMap";
@@ -29,6 +30,7 @@ import { RunSide } from "./RunSide";
 import { LiveStrip, ReplayStrip } from "./Strip";
 import { useCounts } from "./useCounts";
 import { useIncidents } from "./useIncidents";
+import { useLightsAhead } from "./useLightsAhead";
 import { useLaneData } from "./useLaneUse";
 import { usePicture } from "./usePicture";
 import { useReplay } from "./useReplay";
@@ -48,9 +50,11 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const [linked] = useState(() => parseKept(location.hash));
   const { info, failure, lost, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
+  const { map, drawing, loaded } = ground;
   const [mode, setMode] = useState<"live" | "replay" | null>(null);
   const views = useViews(linked);
   const { used, handleOf, follow } = views;
+  const limitOf = useMemo(() => loaded && limitsOf(loaded), [loaded]);
   // A recording has no lamps.
   const sights = useMemo(
     () =>
@@ -59,16 +63,18 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
       ),
     [views.list, mode],
   );
-  const picture = usePicture(sights, handleOf);
-  const { show, clear, latest, now } = picture;
   const ended = info !== null && hasEnded(info.state);
+  const complete = ended && info.summary != null;
+  const replayable = complete && info.state !== "failed" && info.state !== "interrupted";
+  const lights = useRunLights(run, map, mode === "replay" && replayable);
+  const aheadOf = useLightsAhead(sights, map, loaded, lights.stateOf);
+  const picture = usePicture(sights, handleOf, limitOf, aheadOf);
+  const { show, clear, latest, now } = picture;
   const over = useRef(ended);
   over.current = ended;
-  const complete = ended && info.summary != null;
   const [crowd, setCrowd] = useState<Crowd | null>(null);
   // A run that has ended is opened as its recording; one that was watched keeps its last picture.
   if (info && mode === null) setMode(ended ? "replay" : "live");
-  const replayable = complete && info.state !== "failed" && info.state !== "interrupted";
   const player = useReplay(run, mode === "replay" && replayable, show);
   const { incidents, add } = useIncidents(run, complete);
   const counts = useCounts(run, replayable);
@@ -76,9 +82,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const [tab, setTab] = useState<string | null>(null);
   const shownTab = tab ?? (ended ? "result" : "users");
 
-  const { map, drawing, loaded } = ground;
   const lanes = useLaneData(run, loaded);
-  const lights = useRunLights(run, map, mode === "replay" && replayable);
   const { learn: learnLights, learnDetectors, drawn } = lights;
   const [junction, setJunction] = useState<string | null>(null);
   const shownJunction = junction ?? lights.heads?.junctions[0] ?? null;
@@ -204,6 +208,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                   player={player}
                   replayable={replayable}
                   lanes={lanes}
+                  limitOf={limitOf}
                   crowd={known}
                   planned={crowd !== null}
                   categories={categories}

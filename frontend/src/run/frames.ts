@@ -18,6 +18,8 @@ export interface Frame {
   rows: Float32Array;
   /** How long each row has been stopped so far, seconds, where that is known. */
   stopped?: Float32Array;
+  /** What the light ahead of each row shows, where some view wants to know. */
+  ahead?: Uint8Array;
 }
 
 const HEADER = 5;

@@ -4,6 +4,7 @@ import { nth } from "../lists";
 import type { MapHandle, Pointed } from "../map/MapCanvas";
 import type { Moving } from "../map/scene";
 import type { Crowd, Frame } from "./frames";
+import type { LimitOf } from "./limits";
 import type { SpeedPoint } from "./SpeedChart";
 import { StoppedDelay } from "./tint";
 import type { RunSight } from "./views";
@@ -39,27 +40,35 @@ export interface Picture {
 const MOST_POINTS = 2400;
 
 /** One more point of the speeds that were seen, unless no time has passed. */
-function note(points: SpeedPoint[], time: number, speed: number | null): void {
-  if (speed === null || time <= (points.at(-1)?.time ?? -1)) return;
-  points.push({ time, speed });
+function note(points: SpeedPoint[], point: SpeedPoint): void {
+  if (point.time <= (points.at(-1)?.time ?? -1)) return;
+  points.push(point);
   if (points.length > MOST_POINTS) points.splice(0, points.length - MOST_POINTS);
 }
 
 export function usePicture(
   views: readonly RunSight[],
   handleOf: (id: number) => RefObject<MapHandle | null>,
+  limitOf: LimitOf | null,
+  aheadOf: ((frame: Frame, crowd: Crowd) => Frame) | null,
 ): Picture {
   const [now, setNow] = useState<Now>({ time: 0, pace: 0, running: 0, arrived: 0, there: new Set() });
   const last = useRef<{ frame: Frame; crowd: Crowd; moving: Moving } | null>(null);
   const shown = useRef(views);
   shown.current = views;
+  const limits = useRef(limitOf);
+  limits.current = limitOf;
+  const lights = useRef(aheadOf);
+  lights.current = aheadOf;
   const delays = useRef(new StoppedDelay());
   const speeds = useRef(new Map<string, SpeedPoint[]>());
   const pending = useRef(0);
 
   const show = useCallback(
     (seen: Frame, crowd: Crowd) => {
-      const frame = delays.current.learn(seen);
+      let frame = delays.current.learn(seen);
+      // It is looked up for each vehicle: only if a view shows it.
+      if (shown.current.some(({ by }) => by === "signal")) frame = lights.current?.(frame, crowd) ?? frame;
       const moving = crowd.arrange(frame, crowd.egos()[0] ?? null);
       last.current = { frame, crowd, moving };
       for (const { id, followed, by } of shown.current) {
@@ -69,7 +78,12 @@ export function usePicture(
         const row = mine.followed;
         if (row >= 0) handle?.centre(nth(moving.pose, 5 * row), nth(moving.pose, 5 * row + 1));
       }
-      for (const [user, points] of speeds.current) note(points, frame.time, crowd.speed(user));
+      for (const [user, points] of speeds.current) {
+        const [speed, row] = [crowd.speed(user), crowd.row(user)];
+        if (speed === null) continue;
+        const [x, y, hdg] = [0, 1, 2].map((k) => nth(moving.pose, 5 * row + k)) as [number, number, number];
+        note(points, { time: frame.time, speed, limit: limits.current?.(x, y, hdg) ?? null });
+      }
       pending.current ||= window.setTimeout(() => {
         pending.current = 0;
         if (!last.current) return;
@@ -91,7 +105,7 @@ export function usePicture(
     for (const user of speeds.current.keys()) if (!followed.has(user)) speeds.current.delete(user);
     for (const user of followed) if (user !== null && !speeds.current.has(user)) speeds.current.set(user, []);
     redraw();
-  }, [views, redraw]);
+  }, [views, aheadOf, redraw]);
   const clear = useCallback(() => {
     last.current = null;
     for (const { id } of shown.current) handleOf(id).current?.setMoving(null);

@@ -98,10 +98,10 @@ test("who is followed has its speed in words and as a line that breaks where it 
 
 test("what colours say is chosen on the map; a recording has no lamps", async () => {
   const onBy = vi.fn();
-  const { user, again } = show(<MapTools by="kind" live onBy={onBy} />);
+  const { user, again } = show(<MapTools by="kind" live lights onBy={onBy} />);
   await choose(user, "Colour by", "Brakes and indicators");
   expect(onBy).toHaveBeenCalledWith("lamps");
-  again(<MapTools by="kind" live={false} onBy={onBy} />);
+  again(<MapTools by="kind" live={false} lights={false} onBy={onBy} />);
   await user.click(screen.getByRole("textbox", { name: "Colour by" }));
   expect(screen.getAllByRole("option").map((one) => one.textContent)).toEqual([
     "Kind",
