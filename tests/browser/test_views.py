@@ -154,6 +154,12 @@ def test_pictures_and_what_stands_beside_the_maps_act_on_the_view_that_was_used_
     assert "Car" in words[0] - words[1]
     assert "Not stopped yet" in words[1] - words[0]
 
+    view(user, 2).get_by_role("textbox", name="Colour by").click()
+    user.page.get_by_role("option", name="Light ahead", exact=True).click()
+    lights = view(user, 2).get_by_role("list", name="What is shown")
+    expect(lights).to_contain_text("No light ahead")
+    expect(lights).to_contain_text("May go, gives way")
+
     map_of(user, 1).area.focus()
     expect(view(user, 1)).to_have_attribute("aria-current", "true")
     still = shown(user, 2)
