@@ -29,19 +29,19 @@ test("who has not been introduced is not drawn, the others have their true size"
   crowd.introduce([
     { index: 12, id: "walker", category: "pedestrian", length: 0.5, width: 0.25, ego: false },
   ]);
-  const moving = crowd.arrange(decodeFrame(two), null, "walker");
+  const moving = crowd.arrange(decodeFrame(two), null);
   expect(moving.count).toBe(1);
   expect([...moving.pose.subarray(0, 5)]).toEqual([-5, 6, 0, 0.5, 0.25]);
   expect(moving.category[0]).toBe(6);
-  expect(moving.followed).toBe(0);
+  expect(crowd.seen(moving, decodeFrame(two), "walker", "kind").followed).toBe(0);
   expect(moving.ego).toBe(-1);
 });
 
 test("who has left the road is followed no more", () => {
   const crowd = new Crowd();
   crowd.introduce([{ index: 11, id: "car-1", category: "car", length: 5, width: 2, ego: true }]);
-  expect(crowd.arrange(decodeFrame(two), "car-1", null).ego).toBe(0);
-  expect(crowd.arrange(decodeFrame(frame(8, 4, 0, 1, 5)), "car-1", null).ego).toBe(-1);
+  expect(crowd.arrange(decodeFrame(two), "car-1").ego).toBe(0);
+  expect(crowd.arrange(decodeFrame(frame(8, 4, 0, 1, 5)), "car-1").ego).toBe(-1);
 });
 
 test("key figures that a run has not are left out", () => {

@@ -26,7 +26,7 @@ const columns = (): ReplayColumns => ({
 const shown = (time: number): Record<string, [number, number]> => {
   const replay = new Replay(columns());
   const frame = replay.at(time);
-  const { pose } = replay.crowd.arrange(frame, null, null);
+  const { pose } = replay.crowd.arrange(frame, null);
   const found: Record<string, [number, number]> = {};
   for (const who of replay.crowd.all()) {
     const row = replay.crowd.row(who.id);

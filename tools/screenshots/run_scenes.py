@@ -65,6 +65,24 @@ def results(studio: Studio) -> None:
         legend = page.get_by_role("list", name="What is shown")
         expect(legend.get_by_text(re.compile(r"s/km and more$"))).to_be_visible()
         camera.take("lanes")
+        user.choose("Colour the lanes by", "Plain")
+        _two_views(camera)
+
+
+def _two_views(camera: Camera) -> None:
+    """A junction by the lights ahead, and a road user that is followed by speeds."""
+    user, page = camera.user, camera.user.page
+    camera.look_at(user.graph.middle(JUNCTION), closer=2)
+    user.choose("Colour by", "Light ahead")
+    page.get_by_role("button", name="Add a view").click()
+    page.get_by_role("tab", name="Road users").click()
+    second = page.get_by_role("group", name="View 2 of 2")
+    second.get_by_role("textbox", name="Colour by").click()
+    page.get_by_role("option", name="Speed", exact=True).click()
+    users = page.get_by_role("list", name="Follow a road user").get_by_role("button")
+    users.first.click()
+    expect(second.get_by_role("figure")).to_be_visible()
+    camera.take("views")
 
 
 def _report(studio: Studio, address: str | None) -> None:

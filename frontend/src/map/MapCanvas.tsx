@@ -30,7 +30,7 @@ import type { Mark, Moving, Scene } from "./scene";
 import { useMeasure } from "./useMeasure";
 import { clampTo, fit, panBy, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { legendRows } from "./writtenLegend";
-import { keep, parseKept } from "../ui/kept";
+import { IN_ADDRESS, type KeptPlace } from "../ui/kept";
 
 /** Where the pointer is, in metres, and how far a touch reaches. */
 export interface Pointed {
@@ -74,6 +74,8 @@ interface Props {
   onDrop?: (at: Pointed | null) => void;
   /** A drag has drawn a rectangle, with Shift held down, or a line around something, with Ctrl. */
   onFrame?: (area: Area) => void;
+  /** Where it is kept what part is in sight; stays the same object. */
+  place?: KeptPlace;
   children?: ReactNode;
 }
 
@@ -98,6 +100,7 @@ export function MapCanvas({
   onGrab,
   onDrop,
   onFrame,
+  place = IN_ADDRESS,
   children,
 }: Props) {
   const host = useRef<HTMLDivElement>(null);
@@ -126,11 +129,11 @@ export function MapCanvas({
         queued.current = requestAnimationFrame(() => {
           queued.current = 0;
           setShown(view.current);
-          keep({ at: view.current });
+          place.write(view.current);
         });
       }
     },
-    [drawing],
+    [drawing, place],
   );
 
   const showAll = useCallback(() => apply(fit(drawing.bounds, size.current)), [apply, drawing]);
@@ -146,7 +149,7 @@ export function MapCanvas({
       size.current = { width: box.width, height: box.height };
       made.setSize(size.current, window.devicePixelRatio || 1);
       least.current = fit(drawing.bounds, size.current).scale * 0.6;
-      const { at } = parseKept(location.hash);
+      const at = place.read();
       if (first && at) apply(at);
       else if (first) showAll();
       else made.setView(view.current);
@@ -164,7 +167,7 @@ export function MapCanvas({
       made.destroy();
       renderer.current = null;
     };
-  }, [drawing, graph, picker, showAll, apply]);
+  }, [drawing, graph, picker, showAll, apply, place]);
 
   useEffect(() => ready?.setTheme(dark), [ready, dark]);
   useEffect(() => ready?.setScene(scene), [ready, scene]);
@@ -200,7 +203,7 @@ export function MapCanvas({
         apply({ x: x + aside / scale, y, scale });
       },
       picture: (into) => renderer.current?.picture(into) ?? null,
-      vector: () => renderer.current?.vector(legendRows()) ?? null,
+      vector: () => renderer.current?.vector(legendRows(host.current ?? document)) ?? null,
       seen: () => visible(view.current, size.current),
       pickMiddle: () =>
         pick({

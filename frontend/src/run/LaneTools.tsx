@@ -22,6 +22,7 @@ export function LaneTools({ shown }: { shown: ShownUse }) {
   return (
     <>
       <Select
+        className="lane-choice"
         size="xs"
         w={VALUE + named}
         aria-label={t`Colour the lanes by`}

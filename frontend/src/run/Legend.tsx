@@ -67,7 +67,7 @@ export function Legend({
         </li>
       )}
       {lights && (
-        <li>
+        <li className="wide">
           <span>
             <Trans>
               <SignalShapes />
@@ -112,7 +112,7 @@ export function Legend({
 function LaneRows({ word, colors, words, unused }: LaneLegend & { word: string; unused: string }) {
   return (
     <>
-      <li className="lane-row">
+      <li className="lane-row wide">
         <span>
           <Trans>
             <i style={{ background: "transparent" }} />

@@ -9,16 +9,22 @@ import { type ColourBy, coloursFor } from "./tint";
 export function MapTools({
   by,
   live,
+  lights,
   onBy,
   share,
+  views,
   children,
 }: {
   by: ColourBy;
   /** Whether the run is watched while it runs. */
   live: boolean;
+  /** Whether states of traffic lights are known. */
+  lights: boolean;
   onBy: (by: ColourBy) => void;
   /** What the picture is taken away with. */
   share?: ReactNode;
+  /** What adds a view, or closes this one. */
+  views?: ReactNode;
   children?: ReactNode;
 }) {
   return (
@@ -39,13 +45,14 @@ export function MapTools({
           }
           leftSectionWidth={54}
           allowDeselect={false}
-          data={coloursFor(live)}
+          data={coloursFor(live, lights || by === "signal")}
           value={by}
           onChange={(next) => {
             if (next) onBy(next as ColourBy);
           }}
         />
         {share}
+        {views}
       </div>
       {children}
     </div>

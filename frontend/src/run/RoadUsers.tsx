@@ -23,10 +23,22 @@ interface Row {
 }
 
 /** All road users on the road now; one of them can be followed. */
-export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boolean }) {
+export function RoadUsers({
+  latest,
+  followed,
+  onFollow: follow,
+  view,
+  wanted,
+}: {
+  latest: Picture["latest"];
+  followed: string | null;
+  onFollow: (id: string | null) => void;
+  /** Which view of several follows; null of one alone. */
+  view: string | null;
+  wanted: boolean;
+}) {
   const [rows, setRows] = useState<Row[]>([]);
   const [search, setSearch] = useState("");
-  const { latest, followed, follow } = picture;
   useEffect(() => {
     if (!wanted) return;
     const read = (): void => setRows(onTheRoad(latest()));
@@ -55,6 +67,11 @@ export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boole
           <Trans>Stop following</Trans>
         </Button>
       </Group>
+      {view !== null && (
+        <Text size="sm" mt="sm" aria-live="polite">
+          <Trans>{view} was used last: it follows whom you choose.</Trans>
+        </Text>
+      )}
       <TextInput
         mt="sm"
         label={t`Find a road user`}

@@ -12,7 +12,8 @@ export function RunHint({
   followed,
   there,
 }: {
-  info: Pick<RunInfo, "state" | "preparing">;
+  /** Null where another view says how the preparation goes. */
+  info: Pick<RunInfo, "state" | "preparing"> | null;
   /** Whether the server does not answer. */
   lost: boolean;
   /** Whether all road users are known, for their routes are planned. */
@@ -30,7 +31,7 @@ export function RunHint({
         </span>
       </div>
     );
-  if (info.state === "preparing")
+  if (info?.state === "preparing")
     return (
       <div className="map-hint" role="status">
         <span className="waiting">

@@ -40,6 +40,15 @@ export function ShareMenu({
       recording.stop().then((blob) => saveFile(blob, `${run}.webm`), tellError);
     }
   }, [recording, playing, run]);
+  // A view that is closed has no more pictures.
+  const running = useRef<Recording | null>(null);
+  running.current = recording;
+  useEffect(
+    () => () => {
+      running.current?.stop().then((blob) => saveFile(blob, `${run}.webm`), tellError);
+    },
+    [run],
+  );
   if (recording)
     return (
       <Button

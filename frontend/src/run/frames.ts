@@ -18,6 +18,8 @@ export interface Frame {
   rows: Float32Array;
   /** How long each row has been stopped so far, seconds, where that is known. */
   stopped?: Float32Array;
+  /** What the light ahead of each row shows, where some view wants to know. */
+  ahead?: Uint8Array;
 }
 
 const HEADER = 5;
@@ -56,6 +58,8 @@ export class Crowd {
   private readonly known = new Map<number, Introduced>();
   private readonly rowOf = new Map<string, number>();
   private speeds = new Float32Array(0);
+  /** Rows of the last frame, as the server sent them, that are drawn. */
+  private drawn = new Uint32Array(0);
   /** Added to all places of frames, which are too short for maps far from zero; metres. */
   origin: readonly [number, number] = [0, 0];
 
@@ -89,8 +93,8 @@ export class Crowd {
     return row < 0 ? null : (this.speeds[row] ?? null);
   }
 
-  /** The frame as it is drawn; those not introduced yet are left out. */
-  arrange(frame: Frame, ego: string | null, followed: string | null, by: ColourBy = "kind"): Moving {
+  /** The frame as it is drawn in every view; those not introduced yet are left out. */
+  arrange(frame: Frame, ego: string | null): Moving {
     const pose = new Float64Array(5 * frame.count);
     const category = new Uint8Array(frame.count);
     const flags = new Uint8Array(frame.count);
@@ -114,7 +118,12 @@ export class Crowd {
       this.rowOf.set(who.id, count);
       count += 1;
     }
-    const tint = tintOf(by, frame, drawn.subarray(0, count));
-    return { count, pose, category, flags, tint, ego: this.row(ego), followed: this.row(followed) };
+    this.drawn = drawn.subarray(0, count);
+    return { count, pose, category, flags, tint: null, ego: this.row(ego), followed: -1 };
+  }
+
+  /** The frame that was {@link arrange}d last as one view shows it; places are shared. */
+  seen(moving: Moving, frame: Frame, followed: string | null, by: ColourBy): Moving {
+    return { ...moving, tint: tintOf(by, frame, this.drawn), followed: this.row(followed) };
   }
 }

@@ -1,6 +1,7 @@
 import type { ReplayColumns } from "../api/runs";
 import { nth } from "../lists";
 import { Crowd, type Frame } from "./frames";
+import type { LimitOf } from "./limits";
 import type { SpeedPoint } from "./SpeedChart";
 import { STOPPED } from "./tint";
 
@@ -71,14 +72,19 @@ export class Replay {
     return { step: i, time, count, pace: 0, arrived: 0, rows, stopped };
   }
 
-  /** Speeds of a road user at all moments at which it is on the road. */
-  speedsOf(id: string): SpeedPoint[] {
-    const { times, first, actor, actors, speed } = this.columns;
+  /** Speeds of a road user at all moments at which it is on the road, with limits where they are known. */
+  speedsOf(id: string, limitOf?: LimitOf | null): SpeedPoint[] {
+    const { times, first, actor, actors, speed, x, y, hdg } = this.columns;
     const wanted = actors.findIndex((one) => one.id === id);
     const points: SpeedPoint[] = [];
     for (let i = 0; i < times.length; i++)
       for (let row = nth(first, i); row < nth(first, i + 1); row++)
-        if (actor[row] === wanted) points.push({ time: nth(times, i), speed: nth(speed, row) });
+        if (actor[row] === wanted)
+          points.push({
+            time: nth(times, i),
+            speed: nth(speed, row),
+            ...(limitOf && { limit: limitOf(nth(x, row), nth(y, row), nth(hdg, row)) }),
+          });
     return points;
   }
 }

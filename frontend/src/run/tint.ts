@@ -2,13 +2,18 @@ import { t } from "@lingui/core/macro";
 
 import { speedText } from "../language/units";
 import { localized } from "../language/localized";
+import { SIGNAL_COLOR } from "../map/colors";
 import type { Tint } from "../map/scene";
 import { FLAG_BRAKE, FLAG_LEFT, FLAG_RIGHT } from "../map/movingLayer";
 import { nth } from "../lists";
 import type { Frame } from "./frames";
 
 /** What the colour of a road user says. */
-export type ColourBy = "kind" | "speed" | "delay" | "lamps";
+const COLOURS_BY = ["kind", "speed", "delay", "signal", "lamps"] as const;
+export type ColourBy = (typeof COLOURS_BY)[number];
+
+export const isColourBy = (word: string | undefined): word is ColourBy =>
+  COLOURS_BY.some((one) => one === word);
 
 /** Below this speed one is stopped, as in the figures of a run; m/s. */
 export const STOPPED = 0.1;
@@ -63,6 +68,12 @@ export const SCALES = localized((): Record<Exclude<ColourBy, "kind">, Scale> => 
     legend: [t`Not stopped yet`, t`Stopped for 1 to 10 s`, t`10 to 30 s`, t`30 to 60 s`, t`1 min and more`],
     of: (frame, row) => below(DELAYS, frame.stopped?.[row] ?? 0),
   },
+  signal: {
+    word: t`Light ahead`,
+    colors: ["#8b949d", SIGNAL_COLOR.green, "#a3e635", SIGNAL_COLOR.yellow, SIGNAL_COLOR.red],
+    legend: [t`No light ahead`, t`May go`, t`May go, gives way`, t`Yellow`, t`Red`],
+    of: (frame, row) => frame.ahead?.[row] ?? 0,
+  },
   lamps: {
     word: t`Brakes and indicators`,
     colors: ["#8b949d", "#ffab00", "#e8251b"],
@@ -74,10 +85,17 @@ export const SCALES = localized((): Record<Exclude<ColourBy, "kind">, Scale> => 
   },
 }));
 
-/** Choices of colours; a recording has no lamps. */
-export const coloursFor = (live: boolean): { value: ColourBy; label: string }[] => [
+/** Choices of colours; a recording has no lamps, and not all maps have traffic lights. */
+export const coloursFor = (live: boolean, lights: boolean): { value: ColourBy; label: string }[] => [
   { value: "kind", label: t`Kind` },
-  ...(["speed", "delay", ...(live ? (["lamps"] as const) : [])] as const).map((value) => ({
+  ...(
+    [
+      "speed",
+      "delay",
+      ...(lights ? (["signal"] as const) : []),
+      ...(live ? (["lamps"] as const) : []),
+    ] as const
+  ).map((value) => ({
     value,
     label: SCALES()[value].word,
   })),

@@ -34,14 +34,19 @@ export interface ShownUse {
   failure: string | null;
 }
 
-/** How lanes were used in a run that has ended; asked for once one wants to see it. */
-export function useLaneUse(run: string, loaded: LoadedGraph | null): ShownUse {
-  const [by, choose] = useState<LanesBy | null>(null);
+/** How lanes were used in a run that has ended; asked for once any view wants to see it. */
+export interface LaneData {
+  use: LaneUse | null;
+  /** The area of each stretch of a lane. */
+  rings: readonly { lane: number; ring: Float64Array }[] | null;
+  failure: string | null;
+  ask: () => void;
+}
+
+export function useLaneData(run: string, loaded: LoadedGraph | null): LaneData {
+  const [wanted, want] = useState(false);
   const [use, setUse] = useState<LaneUse | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
-  const [chosen, setSpan] = useState<readonly [number, number] | null>(null);
-  const [node, setNode] = useState<number | null>(null);
-  const wanted = by !== null && use === null;
   useEffect(() => {
     if (!wanted) return;
     let current = true;
@@ -57,14 +62,6 @@ export function useLaneUse(run: string, loaded: LoadedGraph | null): ShownUse {
       current = false;
     };
   }, [run, wanted]);
-
-  const [from, to] = chosen ?? [0, use?.intervals ?? 0];
-  const bounds = useMemo(() => (use && by ? boundsOf(use.values(by)) : null), [use, by]);
-  const values = useMemo(() => (use && by ? use.values(by, from, to) : null), [use, by, from, to]);
-  const legend = useMemo(
-    () => (by && bounds ? { colors: sequential(bounds.length + 1), words: wordsOf(by, bounds) } : null),
-    [by, bounds],
-  );
   const rings = useMemo(() => {
     if (!use || !loaded) return null;
     const { node_first, node_end, node_lane } = use.columns;
@@ -74,6 +71,26 @@ export function useLaneUse(run: string, loaded: LoadedGraph | null): ShownUse {
       ring: ringOf(columns, node_first[k] ?? 0, node_end[k] ?? 0),
     }));
   }, [use, loaded]);
+  const ask = useCallback(() => want(true), []);
+  return useMemo(() => ({ use, rings, failure, ask }), [use, rings, failure, ask]);
+}
+
+/** What one view shows of it. */
+export function useLaneUse({ use, rings, failure, ask }: LaneData, loaded: LoadedGraph | null): ShownUse {
+  const [by, choose] = useState<LanesBy | null>(null);
+  const [chosen, setSpan] = useState<readonly [number, number] | null>(null);
+  const [node, setNode] = useState<number | null>(null);
+  useEffect(() => {
+    if (by !== null) ask();
+  }, [by, ask]);
+
+  const [from, to] = chosen ?? [0, use?.intervals ?? 0];
+  const bounds = useMemo(() => (use && by ? boundsOf(use.values(by)) : null), [use, by]);
+  const values = useMemo(() => (use && by ? use.values(by, from, to) : null), [use, by, from, to]);
+  const legend = useMemo(
+    () => (by && bounds ? { colors: sequential(bounds.length + 1), words: wordsOf(by, bounds) } : null),
+    [by, bounds],
+  );
   const colors = useMemo(() => {
     if (!legend || !bounds || !values || !rings) return null;
     const found: Float64Array[][] = legend.colors.map(() => []);

@@ -1,11 +1,13 @@
-import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
+import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import { nth } from "../lists";
 import type { MapHandle, Pointed } from "../map/MapCanvas";
 import type { Moving } from "../map/scene";
 import type { Crowd, Frame } from "./frames";
+import type { LimitOf } from "./limits";
 import type { SpeedPoint } from "./SpeedChart";
-import { type ColourBy, StoppedDelay } from "./tint";
+import { StoppedDelay } from "./tint";
+import type { RunSight } from "./views";
 
 /** Wall milliseconds between two updates of the figures; the map itself is drawn with every frame. */
 const READABLE = 150;
@@ -15,89 +17,100 @@ export interface Now {
   pace: number;
   running: number;
   arrived: number;
-  /** Whether the one that is followed is on the road. */
-  there: boolean;
+  /** Who is followed in some view and on the road. */
+  there: ReadonlySet<string>;
 }
 
-/** The newest picture of a run, live or recorded, and who is followed in it. */
+/** The newest picture of a run, live or recorded, in all its views. */
 export interface Picture {
   now: Now;
-  followed: string | null;
   show: (frame: Frame, crowd: Crowd) => void;
   /** Once more, on a map that has just come. */
   redraw: () => void;
   clear: () => void;
-  follow: (id: string | null) => void;
   /** The road user near a point. */
   near: (at: Pointed) => string | null;
-  /** What colours say. */
-  by: ColourBy;
-  colourBy: (by: ColourBy) => void;
-  /** Speeds of the one that is followed, as they were seen. */
-  speeds: readonly SpeedPoint[];
+  /** Speeds of one that is followed, as they were seen. */
+  speedsOf: (id: string) => readonly SpeedPoint[];
   /** The newest frame, read when it is needed. */
   latest: () => { frame: Frame; crowd: Crowd } | null;
 }
 
-/** Points of the chart of speeds that are kept. */
+/** Points of a chart of speeds that are kept. */
 const MOST_POINTS = 2400;
 
 /** One more point of the speeds that were seen, unless no time has passed. */
-function note(points: SpeedPoint[], time: number, speed: number | null): void {
-  if (speed === null || time <= (points.at(-1)?.time ?? -1)) return;
-  points.push({ time, speed });
+function note(points: SpeedPoint[], point: SpeedPoint): void {
+  if (point.time <= (points.at(-1)?.time ?? -1)) return;
+  points.push(point);
   if (points.length > MOST_POINTS) points.splice(0, points.length - MOST_POINTS);
 }
 
-export function usePicture(handle: RefObject<MapHandle | null>): Picture {
-  const [now, setNow] = useState<Now>({ time: 0, pace: 0, running: 0, arrived: 0, there: false });
-  const [followed, setFollowed] = useState<string | null>(null);
+export function usePicture(
+  views: readonly RunSight[],
+  handleOf: (id: number) => RefObject<MapHandle | null>,
+  limitOf: LimitOf | null,
+  aheadOf: ((frame: Frame, crowd: Crowd) => Frame) | null,
+): Picture {
+  const [now, setNow] = useState<Now>({ time: 0, pace: 0, running: 0, arrived: 0, there: new Set() });
   const last = useRef<{ frame: Frame; crowd: Crowd; moving: Moving } | null>(null);
-  const watched = useRef<string | null>(null);
-  const [by, setBy] = useState<ColourBy>("kind");
-  const colours = useRef<ColourBy>("kind");
+  const shown = useRef(views);
+  shown.current = views;
+  const limits = useRef(limitOf);
+  limits.current = limitOf;
+  const lights = useRef(aheadOf);
+  lights.current = aheadOf;
   const delays = useRef(new StoppedDelay());
-  const speeds = useRef<SpeedPoint[]>([]);
+  const speeds = useRef(new Map<string, SpeedPoint[]>());
   const pending = useRef(0);
 
   const show = useCallback(
     (seen: Frame, crowd: Crowd) => {
-      const frame = delays.current.learn(seen);
-      const moving = crowd.arrange(frame, crowd.egos()[0] ?? null, watched.current, colours.current);
-      note(speeds.current, frame.time, watched.current === null ? null : crowd.speed(watched.current));
+      let frame = delays.current.learn(seen);
+      // It is looked up for each vehicle: only if a view shows it.
+      if (shown.current.some(({ by }) => by === "signal")) frame = lights.current?.(frame, crowd) ?? frame;
+      const moving = crowd.arrange(frame, crowd.egos()[0] ?? null);
       last.current = { frame, crowd, moving };
-      handle.current?.setMoving(moving);
-      const row = moving.followed;
-      if (row >= 0) handle.current?.centre(nth(moving.pose, 5 * row), nth(moving.pose, 5 * row + 1));
+      for (const { id, followed, by } of shown.current) {
+        const mine = crowd.seen(moving, frame, followed, by);
+        const handle = handleOf(id).current;
+        handle?.setMoving(mine);
+        const row = mine.followed;
+        if (row >= 0) handle?.centre(nth(moving.pose, 5 * row), nth(moving.pose, 5 * row + 1));
+      }
+      for (const [user, points] of speeds.current) {
+        const [speed, row] = [crowd.speed(user), crowd.row(user)];
+        if (speed === null) continue;
+        const [x, y, hdg] = [0, 1, 2].map((k) => nth(moving.pose, 5 * row + k)) as [number, number, number];
+        note(points, { time: frame.time, speed, limit: limits.current?.(x, y, hdg) ?? null });
+      }
       pending.current ||= window.setTimeout(() => {
         pending.current = 0;
         if (!last.current) return;
         const {
           frame: { time, pace, count, arrived },
-          moving: { followed: row },
+          crowd: newest,
         } = last.current;
-        setNow({ time, pace, running: count, arrived, there: row >= 0 });
+        const there = new Set([...speeds.current.keys()].filter((user) => newest.row(user) >= 0));
+        setNow({ time, pace, running: count, arrived, there });
       }, READABLE);
     },
-    [handle],
+    [handleOf],
   );
   const redraw = useCallback(() => {
     if (last.current) show(last.current.frame, last.current.crowd);
   }, [show]);
+  useEffect(() => {
+    const followed = new Set(views.map((one) => one.followed));
+    for (const user of speeds.current.keys()) if (!followed.has(user)) speeds.current.delete(user);
+    for (const user of followed) if (user !== null && !speeds.current.has(user)) speeds.current.set(user, []);
+    redraw();
+  }, [views, aheadOf, redraw]);
   const clear = useCallback(() => {
     last.current = null;
-    handle.current?.setMoving(null);
-    setNow((old) => ({ ...old, running: 0, there: false }));
-  }, [handle]);
-  const follow = useCallback(
-    (id: string | null) => {
-      watched.current = id;
-      speeds.current = [];
-      setFollowed(id);
-      redraw();
-    },
-    [redraw],
-  );
+    for (const { id } of shown.current) handleOf(id).current?.setMoving(null);
+    setNow((old) => ({ ...old, running: 0, there: new Set() }));
+  }, [handleOf]);
   const near = useCallback((at: Pointed): string | null => {
     if (!last.current) return null;
     const { crowd, moving } = last.current;
@@ -111,29 +124,10 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     }
     return best;
   }, []);
-  const colourBy = useCallback(
-    (next: ColourBy) => {
-      colours.current = next;
-      setBy(next);
-      redraw();
-    },
-    [redraw],
-  );
+  const speedsOf = useCallback((id: string) => speeds.current.get(id) ?? [], []);
   const latest = useCallback(() => last.current, []);
   return useMemo(
-    () => ({
-      now,
-      followed,
-      show,
-      redraw,
-      clear,
-      follow,
-      near,
-      latest,
-      by,
-      colourBy,
-      speeds: speeds.current,
-    }),
-    [now, followed, show, redraw, clear, follow, near, latest, by, colourBy],
+    () => ({ now, show, redraw, clear, near, speedsOf, latest }),
+    [now, show, redraw, clear, near, speedsOf, latest],
   );
 }

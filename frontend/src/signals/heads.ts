@@ -30,7 +30,6 @@ const OF_LETTER: Record<string, Shown> = {
 };
 /** What a letter of SUMO's states shows. */
 export const shownOf = (letter: string): Shown => OF_LETTER[letter] ?? "off";
-/** Of several movements of one lane the one that may go most is shown. */
 const RANK: readonly Shown[] = ["green", "permissive", "yellow", "red", "off"];
 
 /** The heads of all lights of a map; made once. */
@@ -50,7 +49,7 @@ export class Heads {
     return this.places.flatMap(({ light, places }) => {
       const state = stateOf(light);
       if (state === undefined) return [];
-      return places.map(({ letters, ...place }) => ({ ...place, shown: most(letters, state) }));
+      return places.map(({ letters, ...place }) => ({ ...place, shown: mostOf(letters, state) }));
     });
   }
 
@@ -80,7 +79,8 @@ export class Heads {
   }
 }
 
-function most(letters: readonly number[], state: string): Shown {
+/** What letters of a state show together: of several movements the one that may go most. */
+export function mostOf(letters: readonly number[], state: string): Shown {
   const shown = letters.map((n) => shownOf(state[n] ?? ""));
   return RANK.find((one) => shown.includes(one)) ?? "off";
 }

@@ -37,9 +37,7 @@ export class QueueLanes {
     const seen = new Set<number>();
     light.paths.forEach((path, n) => {
       if (path.length < 2 || light.walks[n]) return;
-      const [x, y] = nth(path, 0);
-      const [tx, ty] = nth(path, 1);
-      const first = nearest(graph, x, y, Math.atan2(ty - y, tx - x));
+      const first = stopNode(graph, nth(path, 0), nth(path, 1));
       if (first === null || seen.has(first)) return;
       seen.add(first);
       const nodes = [];
@@ -105,6 +103,11 @@ function along(nodes: QueueLane["nodes"], x: number, y: number, hdg: number): nu
     if (away < least) [least, best] = [away, node.back - (dx * cos + dy * sin)];
   }
   return best === null ? null : Math.max(0, best);
+}
+
+/** The last node before the stop line where a path across a junction begins; null if there is no lane. */
+export function stopNode(graph: Graph, [x, y]: [number, number], [tx, ty]: [number, number]): number | null {
+  return nearest(graph, x, y, Math.atan2(ty - y, tx - x));
 }
 
 function nearest(graph: Graph, x: number, y: number, hdg: number): number | null {

@@ -14,6 +14,8 @@ export interface LightHistory {
 
 export interface RunLights {
   heads: Heads | null;
+  /** The state of a light at a time, where it is known. */
+  stateOf: (light: string, time: number) => string | undefined;
   /** What is shown at a time, at all stop lines. */
   drawn: (time: number) => Head[];
   /** What the light of a junction shows. */
@@ -84,9 +86,10 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
     },
     [recorded, logged],
   );
+  const stateOf = useCallback((light: string, time: number) => nowOf(light, time)?.state, [nowOf]);
   const drawn = useCallback(
-    (time: number): Head[] => heads?.at((light) => nowOf(light, time)?.state) ?? [],
-    [heads, nowOf],
+    (time: number): Head[] => heads?.at((light) => stateOf(light, time)) ?? [],
+    [heads, stateOf],
   );
   const now = useCallback(
     (junction: string, time: number): SignalNow | null => {
@@ -104,7 +107,7 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
   );
   const known = recorded ? (logged?.size ?? 0) > 0 : turn > 0;
   return useMemo(
-    () => ({ heads, drawn, now, history, learn, learnDetectors, occupied, turn, known }),
-    [heads, drawn, now, history, learn, learnDetectors, occupied, turn, known],
+    () => ({ heads, stateOf, drawn, now, history, learn, learnDetectors, occupied, turn, known }),
+    [heads, stateOf, drawn, now, history, learn, learnDetectors, occupied, turn, known],
   );
 }

@@ -35,6 +35,7 @@ export const IconMinus = icon(<path d="M5 12h14" />);
 export const IconRuler = icon(<path d="M3 16 16 3l5 5L8 21zM7 12l2 2M10 9l3 3M13 6l2 2" />);
 export const IconLayers = icon(<path d="m12 3 9 5-9 5-9-5zM3 12.5l9 5 9-5M3 17l9 5 9-5" />);
 export const IconFit = icon(<path d="M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5" />);
+export const IconViews = icon(<path d="M4 5h16v14H4zM12 5v14" />);
 export const IconUndo = icon(<path d="M9 14 4 9l5-5M4 9h10a6 6 0 0 1 0 12h-3" />);
 export const IconRedo = icon(<path d="m15 14 5-5-5-5M20 9H10a6 6 0 0 0 0 12h3" />);
 export const IconSun = icon(

@@ -10,12 +10,25 @@ export interface Kept {
   chosen?: readonly string[];
   /** The moment of a recording, seconds. */
   time?: number;
+  /** What the colours of road users say. */
+  by?: string;
+  /** Further views of the same, in their order; the first is what stands above. */
+  others?: readonly KeptView[];
+}
+
+/** One of several views. */
+export interface KeptView {
+  at?: View;
+  followed?: string;
+  by?: string;
 }
 
 /** Milliseconds for which the address may lag behind. */
 const LAG = 400;
 /** Longer lists are not kept: addresses would grow too long for mail and chat. */
 const MOST_CHOSEN = 30;
+/** Views that a link can ask for; nobody can look at more. */
+const MOST_OTHERS = 8;
 
 /** The part of an address that says which view it is. */
 export const pathOf = (hash: string): string => hash.split("?")[0] ?? "";
@@ -23,26 +36,54 @@ export const pathOf = (hash: string): string => hash.split("?")[0] ?? "";
 export function parseKept(hash: string): Kept {
   const query = new URLSearchParams(hash.slice(pathOf(hash).length + 1));
   const kept: Kept = {};
-  const [x, y, scale] = (query.get("at") ?? "").split(",").map(Number);
-  if (x !== undefined && y !== undefined && scale !== undefined)
-    if ([x, y, scale].every(Number.isFinite) && scale > 0) kept.at = { x, y, scale };
+  const at = parsePlace(query.get("at"));
+  if (at) kept.at = at;
   const step = query.get("step");
   if (step) kept.step = step;
   const chosen = query.getAll("chosen");
   if (chosen.length > 0) kept.chosen = chosen;
   const time = Number(query.get("time") ?? NaN);
   if (Number.isFinite(time)) kept.time = time;
+  const by = query.get("by");
+  if (by) kept.by = by;
+  const others: KeptView[] = [];
+  for (let n = 2; n < 2 + MOST_OTHERS && query.has(`at${n}`); n++) {
+    const place = parsePlace(query.get(`at${n}`));
+    const [followed, colours] = [query.get(`chosen${n}`), query.get(`by${n}`)];
+    others.push({
+      ...(place && { at: place }),
+      ...(followed && { followed }),
+      ...(colours && { by: colours }),
+    });
+  }
+  if (others.length > 0) kept.others = others;
   return kept;
 }
 
+function parsePlace(text: string | null): View | null {
+  const [x, y, scale] = (text ?? "").split(",").map(Number);
+  if (x === undefined || y === undefined || scale === undefined) return null;
+  return [x, y, scale].every(Number.isFinite) && scale > 0 ? { x, y, scale } : null;
+}
+
+/** Centimetres, and a scale that is right to a pixel in 10,000. */
+const placeText = ({ x, y, scale }: View): string =>
+  `${x.toFixed(2)},${y.toFixed(2)},${Number(scale.toPrecision(5))}`;
+
 /** Inverse of {@link parseKept}, put behind the path of an address. */
-export function withKept(hash: string, { at, step, chosen, time }: Kept): string {
+export function withKept(hash: string, { at, step, chosen, time, by, others = [] }: Kept): string {
   const query = new URLSearchParams();
-  // Centimetres, and a scale that is right to a pixel in 10,000.
-  if (at) query.set("at", `${at.x.toFixed(2)},${at.y.toFixed(2)},${Number(at.scale.toPrecision(5))}`);
+  if (at) query.set("at", placeText(at));
   if (step) query.set("step", step);
   if (chosen && chosen.length <= MOST_CHOSEN) for (const id of chosen) query.append("chosen", id);
   if (time !== undefined) query.set("time", time.toFixed(1));
+  if (by) query.set("by", by);
+  others.forEach((other, k) => {
+    // Also without a place it is there.
+    query.set(`at${k + 2}`, other.at ? placeText(other.at) : "");
+    if (other.followed) query.set(`chosen${k + 2}`, other.followed);
+    if (other.by) query.set(`by${k + 2}`, other.by);
+  });
   const text = query.toString().replaceAll("%2C", ",");
   return text ? `${pathOf(hash)}?${text}` : pathOf(hash);
 }
@@ -73,3 +114,15 @@ export function write(): void {
   const next = withKept(path, { ...parseKept(location.hash), ...kept });
   if (next !== location.hash) history.replaceState(history.state, "", next);
 }
+
+/** Keeps what part of a map is in sight. */
+export interface KeptPlace {
+  read: () => View | undefined;
+  write: (at: View) => void;
+}
+
+/** Of a map that is alone in its page. */
+export const IN_ADDRESS: KeptPlace = {
+  read: () => parseKept(location.hash).at,
+  write: (at) => keep({ at }),
+};

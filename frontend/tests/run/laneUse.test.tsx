@@ -13,7 +13,7 @@ import { writtenPath, writtenPicture } from "../../src/map/svg";
 import { LaneTools } from "../../src/run/LaneTools";
 import { boundsOf, classOf, LaneUse, sequential, valueText, wordsOf } from "../../src/run/laneUse";
 import { Legend } from "../../src/run/Legend";
-import { type ShownUse, useLaneUse } from "../../src/run/useLaneUse";
+import { type ShownUse, useLaneData, useLaneUse } from "../../src/run/useLaneUse";
 import { graph } from "../example";
 import { choose, server, show } from "../page";
 
@@ -94,7 +94,7 @@ const at = (x: number) => ({ x, y: 0, reach: 1, shift: false });
 
 test("lanes have the colour of their value, and one that is pointed at says it", async () => {
   const asked = server({ "/api/runs/r/lanes": LANES });
-  const { result } = renderHook(() => useLaneUse("r", loaded));
+  const { result } = renderHook(() => useLaneUse(useLaneData("r", loaded), loaded));
   expect(asked).toEqual([]);
   expect(result.current.colors).toBeNull();
   act(() => result.current.choose("flow"));

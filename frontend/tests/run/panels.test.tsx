@@ -43,7 +43,7 @@ const progressAt = (time: number, until: number, more: Partial<RunProgress> = {}
   time_left: null,
   ...more,
 });
-const now = { time: 65, pace: 2.5, running: 7, arrived: 3, there: false };
+const now = { time: 65, pace: 2.5, running: 7, arrived: 3, there: new Set<string>() };
 
 const REASON = "gridlock that did not dissolve, first at e_0 since 700 s";
 const GRIDLOCKED = summary({

@@ -52,7 +52,8 @@ test("stopped delay adds up while one is stopped, also when others come and go",
 test("who is not introduced has no colour of another", () => {
   const crowd = new Crowd();
   crowd.introduce([{ index: 9, id: "b", category: "van", length: 5, width: 2, ego: false }]);
-  const moving = crowd.arrange(frame(0, [4, 0], [9, 30]), null, null, "speed");
+  const seen = frame(0, [4, 0], [9, 30]);
+  const moving = crowd.seen(crowd.arrange(seen, null), seen, null, "speed");
   expect([...(moving.tint?.group ?? [])]).toEqual([4]);
   expect(crowd.speed("b")).toBe(30);
   expect(crowd.speed("a")).toBeNull();
@@ -97,10 +98,10 @@ test("who is followed has its speed in words and as a line that breaks where it 
 
 test("what colours say is chosen on the map; a recording has no lamps", async () => {
   const onBy = vi.fn();
-  const { user, again } = show(<MapTools by="kind" live onBy={onBy} />);
+  const { user, again } = show(<MapTools by="kind" live lights onBy={onBy} />);
   await choose(user, "Colour by", "Brakes and indicators");
   expect(onBy).toHaveBeenCalledWith("lamps");
-  again(<MapTools by="kind" live={false} onBy={onBy} />);
+  again(<MapTools by="kind" live={false} lights={false} onBy={onBy} />);
   await user.click(screen.getByRole("textbox", { name: "Colour by" }));
   expect(screen.getAllByRole("option").map((one) => one.textContent)).toEqual([
     "Kind",
