@@ -375,7 +375,16 @@ def test_varied_towns_differ_and_each_is_the_same_every_time():
     pytest.importorskip("scenariogeneration", reason="needs the maintainers' tools")
     from tools.make_maps.__main__ import map_text
 
-    one, again, other = (map_text(f"varied_town_{seed}") for seed in ("05", "05", "06"))
+    one, again, other, wide = (map_text(f"varied_town_{seed}") for seed in ("05", "05", "06", "28"))
     assert one == again
     assert one != other
     assert len(parse(one).junctions) >= 9
+    assert most_lanes(one) == 2
+    assert most_lanes(wide) == 4
+
+
+def most_lanes(text: str) -> int:
+    """Lanes for cars each way of the widest road."""
+    roads = ET.fromstring(text).iterfind("road[@junction='-1']")
+    sides = [side for road in roads for side in road.iterfind(".//right")]
+    return max(len(side.findall("lane[@type='driving']")) for side in sides)

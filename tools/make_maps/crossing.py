@@ -108,7 +108,13 @@ def _lane_pairs(
     """Left turns from the inner lane, right turns from the outer one, straight on from all.
 
     Where fewer lanes go straight on, the inner ones only turn left, if there is a left turn at all.
+    Where none does, the lanes of a road of more than two are shared by both turns.
     """
+    if len(coming) > 2 and all(abs(one) > STRAIGHT for one in turns):
+        half = min((len(coming) + 1) // 2 if len(turns) > 1 else len(coming), len(going))
+        if turn > STRAIGHT:
+            return list(zip(coming[:half], going[:half], strict=True))
+        return list(zip(coming[-half:], going[-half:], strict=True))
     if turn > STRAIGHT:
         return [(coming[0], going[0])]
     if turn < -STRAIGHT:

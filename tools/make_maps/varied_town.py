@@ -26,8 +26,10 @@ if TYPE_CHECKING:
 Node = tuple[int, int]
 """Column and row of a junction."""
 
-COUNT = 24
+COUNT = 32
 """Towns that have a name."""
+ARTERIAL = 24
+"""Seed from which on streets have up to four lanes each way, and junctions are far apart."""
 STYLES = ("lights", "none", "signs", "mixed")
 """How junctions are ruled: each second of the unruled ones is wide."""
 EAST, NORTH, WEST, SOUTH = range(4)
@@ -92,14 +94,17 @@ def varied_town(name: str) -> Builder:
 
 
 def _drawn(rng: random.Random, seed: int) -> VariedGrid:
-    columns, rows = rng.randint(3, 5), rng.randint(3, 5)
-    long = rng.choice((90.0, 130.0, 200.0))
+    arterial = seed >= ARTERIAL
+    most = 3 if arterial else 5
+    columns, rows = rng.randint(3, most), rng.randint(3, most)
+    long = rng.choice((180.0, 300.0, 450.0) if arterial else (90.0, 130.0, 200.0))
     style = STYLES[seed % len(STYLES)]
     wide = style in ("none", "mixed") and seed % 8 >= 4
     lanes, speeds = [], []
     for _ in range(columns + rows):
-        lanes.append(2 if rng.random() < (0.6 if wide else 0.35) else 1)
-        fast = rng.random() < (0.5 if wide else 0.25)
+        few, more = (2, rng.choice((3, 3, 4))) if arterial else (1, 2)
+        lanes.append(more if rng.random() < (0.6 if wide or arterial else 0.35) else few)
+        fast = rng.random() < (0.5 if wide or arterial else 0.25)
         speeds.append(rng.choice((70, 90, 100) if fast else (30, 40, 50, 50)))
     inner = [
         ((i, j), direction)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from odscen.learning.reference.expected_flow import expected_flow
+from odscen.lanegraph.graphs import LaneGraph
+from odscen.learning.reference.expected_flow import expected_flows
 from odscen.learning.reference.gap_states import FREE, gap_states
 from odscen.learning.reference.road_strips import road_strips
 from odscen.learning.reference.site_features import site_of
-from tests.graphs import fork, ring, two_lane_road
+from tests.graphs import ToyLane, fork, key, map_graph, ring, two_lane_road
 
 CAR, STANDING = 0, 0.0
 
@@ -72,7 +73,36 @@ def test_features_are_finite_and_about_one(graph) -> None:  # type: ignore[no-un
 
 def test_traffic_is_expected_where_trips_come_together() -> None:
     lanes = fork().lanes
-    flow = expected_flow(lanes)
+    flow = expected_flows(lanes).lane
     roads = [row for row, name in enumerate(lanes.lanes.junctions) if name is None]
     assert np.mean(flow[roads]) == pytest.approx(1.0)
     assert (flow >= 0).all()
+
+
+def leaving(inner: float, outer: float) -> LaneGraph:
+    """Road 1 of two lanes, of which the inner leads to road 2 and the outer to road 3, metres."""
+    in1, out1 = key("1", -1), key("1", -2)
+    return map_graph(
+        [
+            ToyLane(in1, 0.0, 0.0, 0.0, 200.0, "r1", next=(key("8", -1),), right=out1),
+            ToyLane(out1, 0.0, -3.5, 0.0, 200.0, "r1", next=(key("9", -1),), left=in1),
+            ToyLane(key("8", -1), 200.0, 0.0, 0.0, 20.0, "j7", junction="7",
+                    next=(key("2", -1),)),
+            ToyLane(key("9", -1), 200.0, -3.5, 0.0, 20.0, "j7", junction="7",
+                    next=(key("3", -1),)),
+            ToyLane(key("2", -1), 220.0, 0.0, 0.0, inner, "r2"),
+            ToyLane(key("3", -1), 220.0, -3.5, 0.0, outer, "r3"),
+        ]
+    ).lanes  # fmt: skip
+
+
+@pytest.mark.parametrize(("inner", "outer", "fuller"), [(900.0, 90.0, -1), (90.0, 900.0, -2)])
+def test_the_lane_by_which_most_leave_a_road_is_expected_to_be_the_fuller(
+    inner: float, outer: float, fuller: int
+) -> None:
+    lanes = leaving(inner, outer)
+    road, lane = expected_flows(lanes)
+    row = {one: place for place, one in enumerate(lanes.lanes.keys)}
+    busy, empty = row[key("1", fuller)], row[key("1", -3 - fuller)]
+    assert lane[busy] > 2.0 * lane[empty]
+    assert road[busy] == road[empty] == pytest.approx((lane[busy] + lane[empty]) / 2.0)

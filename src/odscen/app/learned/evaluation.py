@@ -246,24 +246,23 @@ class _ComparedMap:
 
     def filled(
         self,
-        place: Callable[[WholeMap, FillRequest, np.random.Generator], Fill],
+        source: Callable[[WholeMap, FillRequest, np.random.Generator], Fill],
         seed: int,
         most: int,
     ) -> _MadeTraffic:
         """Ask for traffic like that of each scene, and for some with the lights of a beginning."""
         on, scenes, off = self._on, [], []
-        step = -(-len(self._scenes) // max(most, 1))
-        for number, scene in enumerate(self._scenes[::step]):
-            actors, dropped = self._asked(place, len(scene.node), scene.lights, seed, number)
+        for number, place in enumerate(_even_steps(len(self._scenes), most)):
+            scene = self._scenes[place]
+            actors, dropped = self._asked(source, len(scene.node), scene.lights, seed, number)
             scenes.append(scene_of_actors(on, actors, scene.lights, name=scene.name))
             off.append(dropped)
         lights = lights_at_start(on.loaded.sumo)
         by_size = sorted(range(len(self._scenes)), key=lambda k: len(self._scenes[k].node))
-        steps = (np.arange(RUN) + 0.5) / RUN * len(by_size)
         scenarios = []
-        for number in dict.fromkeys(by_size[int(step)] for step in steps):
+        for number in (by_size[place] for place in _even_steps(len(by_size), RUN)):
             wanted = len(self._scenes[number].node)
-            actors, _ = self._asked(place, wanted, lights, seed, len(scenes) + number)
+            actors, _ = self._asked(source, wanted, lights, seed, len(scenes) + number)
             scenarios.append(scenario_of(on, actors, number))
         return _MadeTraffic(scenes, float(np.mean(off)), scenarios)
 
@@ -308,6 +307,12 @@ class _ComparedMap:
         mean = float(np.mean([len(one.node) for one in scenes])) if scenes else 0.0
         name = self._on.region.graph.map_name
         return TrafficQuality(name, source, len(scenes), mean, values)
+
+
+def _even_steps(count: int, most: int) -> list[int]:
+    """Places at even steps, ``most`` of them at most; of a run with snapshots, early and late."""
+    wanted = max(min(count, most), 1)
+    return [int((place + 0.5) / wanted * count) for place in range(wanted)]
 
 
 def _values(

@@ -12,7 +12,6 @@ from odscen.base.categories import Category
 from odscen.learning.fill import VEHICLES, Fill
 from odscen.learning.reference.gap_states import GapStates
 from odscen.learning.reference.onward_goals import NO_GOAL, onward_goals
-from odscen.learning.reference.queue_places import OCCUPIED_MORE, STOPPED_MORE, queue_places
 from odscen.learning.reference.site_features import (
     junction_columns,
     light_columns,
@@ -45,7 +44,9 @@ PASSES = 13
 BEFORE = 3
 """Passes after which what is behind junctions is as in traffic."""
 BACK = 0.6
-"""Share of the last step of the bias that the next may be, if it goes the other way."""
+"""Share of the last step of the wish that the next may be, if it goes the other way."""
+DENSER = 1.0
+"""By how much the feature of density is changed at most, to have as many as are wanted."""
 MORE = 1.05
 """Share of the vehicles wanted that a pass may place at most; those too many are taken away."""
 SHARPNESS = 2.0
@@ -130,8 +131,8 @@ def place_traffic(
 ) -> PlacedTraffic:
     """Place about as many vehicles as are wanted, never more.
 
-    The whole map is placed several times, with another bias, until the number is close. What is
-    behind a junction is what the time before has put there.
+    The whole map is placed several times, with another wish for more, until the number is close.
+    What is behind a junction is what the time before has put there.
 
     Parameters
     ----------
@@ -146,10 +147,10 @@ def place_traffic(
     density = np.full(len(site.limit), density_column(wanted, metres))
     fixed = np.column_stack([site.columns, light_columns(site, lights), density])
     draw = _Draw(model, site, lights, allowed, lengths, fixed)
-    bias, best, most, last = 0.0, NOBODY, 2.0, 0.0
+    wish, best, most, last = 0.0, NOBODY, 2.0, 0.0
     states = GapStates.empty(len(site.limit))
     for number in range(PASSES if wanted else 0):
-        states, found = draw.traffic(bias, states, rng)
+        states, found = draw.traffic(wish, states, rng)
         if number >= BEFORE and _missing(found, wanted) < _missing(best, wanted):
             best = found
         if number >= BEFORE and wanted <= len(found.node) <= MORE * wanted + 1.0:
@@ -159,7 +160,7 @@ def place_traffic(
         # Vehicles attract others, so that a little more may be many more: go back by less.
         most = most * BACK if step * last < 0.0 else most
         last = float(np.clip(step, -most, most))
-        bias += last
+        wish += last
     keep = np.sort(rng.permutation(len(best.node))[:wanted])
     return PlacedTraffic(best.node[keep], best.category[keep], best.speed[keep])
 
@@ -181,14 +182,24 @@ class _Draw(NamedTuple):
     fixed: FloatArray
 
     def traffic(
-        self, bias: float, before: GapStates, rng: np.random.Generator
+        self, wish: float, before: GapStates, rng: np.random.Generator
     ) -> tuple[GapStates, PlacedTraffic]:
         """Place vehicles row after row, from the stop lines backwards.
 
-        ``before`` is traffic as it may be behind junctions.
+        Parameters
+        ----------
+        wish
+            Logarithm of how much denser traffic the model is told of than is wanted: it knows where
+            more goes, into queues rather than onto empty lanes. Beyond what :data:`DENSER` allows
+            the odds of all nodes are raised alike.
+        before
+            Traffic as it may be behind junctions.
         """
         site, states = self.site, GapStates.empty(len(self.site.limit))
+        denser = float(np.clip(wish / 2.0, -DENSER, DENSER))
+        bias = wish - 2.0 * denser
         fixed = np.column_stack([self.fixed, junction_columns(site, before)])
+        fixed[:, self.fixed.shape[1] - 1] += denser
         anywhere = np.asarray(self.allowed.any(axis=0))
         found: list[PlacedTraffic] = []
         for row in site.strips.rows:
@@ -197,8 +208,7 @@ class _Draw(NamedTuple):
             if not len(free):
                 continue
             x = np.column_stack([fixed[free], traffic_columns(site, states, free)])
-            place = queue_places(site, self.lights, states, free)
-            chance = logistic(self.model.occupied(x)[:, 0] + bias + OCCUPIED_MORE[place])
+            chance = logistic(self.model.occupied(x)[:, 0] + bias)
             hit = np.flatnonzero(rng.random(len(free)) < chance)
             if len(hit):
                 placed = self._vehicles(free[hit], x[hit], states, rng)
@@ -221,7 +231,6 @@ class _Draw(NamedTuple):
         category = _drawn(shares, rng)
         most = np.minimum(self._stoppable(nodes, category), self._safe(nodes, category, states))
         logits = self.model.speed(with_category(x, category)).astype(np.float64)
-        logits[:, 0] += STOPPED_MORE[queue_places(self.site, self.lights, states, nodes)]
         odds = _sharpened(softmax(logits))
         # Those who would be too fast are none of the slower ones at the limit of what is safe.
         odds = np.where(least_speeds(limit) < most[:, None], odds, 0.0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from odscen.lanegraph.graphs import Relation
 from odscen.learning.reference.beyond_junctions import Ways, beyond_columns
-from odscen.learning.reference.expected_flow import expected_flow
+from odscen.learning.reference.expected_flow import expected_flows
 from odscen.learning.reference.junction_approaches import approaches
 from odscen.learning.reference.road_strips import Strips, road_strips
 from odscen.learning.reference.stop_lines import setbacks
@@ -79,7 +79,8 @@ def site_of(lanes: LaneGraph, walks: PedestrianGraph | None = None) -> Site:
     to_line = np.maximum(strips.to_end - setback, 0.0)
     limit = np.where(np.isnan(lanes.speed_limit), UNKNOWN_LIMIT, lanes.speed_limit)
     limit = np.maximum(limit, 1.0)
-    flow = expected_flow(lanes)[lanes.lane]
+    flows = expected_flows(lanes)
+    flow = flows.lane[lanes.lane]
     rights, lefts = _lanes_beside(lanes)
     ends = _ends(lanes, strips, flow)
     ways, more = approaches(lanes, strips.on_road, limit=limit, flow=flow)
@@ -98,8 +99,8 @@ def site_of(lanes: LaneGraph, walks: PedestrianGraph | None = None) -> Site:
             lefts == 0,
             np.minimum(np.abs(lanes.curvature) * 30.0, 1.0),
             np.minimum(bend * 30.0, 1.0),
-            np.log(0.1 + flow) / 2.0,
-            *(one[strips.root] for one in (*ends, *more)),
+            *(np.log(0.1 + one) / 2.0 for one in (flows.road[lanes.lane], flow)),
+            *(one[strips.root] for one in (*ends, *more, _flow_behind(ways, flow))),
         ]
     ).astype(np.float64)
     beside = np.column_stack(
@@ -254,6 +255,14 @@ def _ends(lanes: LaneGraph, strips: Strips, flow: FloatArray) -> list[FloatArray
         np.log(0.1 + others) / 2.0,
         np.minimum(many, 12) / 12,
     ]
+
+
+def _flow_behind(ways: Ways, flow: FloatArray) -> FloatArray:
+    """Most traffic on a lane that the strip leads to, where it merges with that of others."""
+    most = np.zeros(len(flow))
+    np.maximum.at(most, ways.root, flow[ways.entry])
+    found: FloatArray = np.log(0.1 + most) / 2.0
+    return found
 
 
 def _numbered(names: tuple[str | None, ...]) -> list[tuple[str | None, int]]:

@@ -29,7 +29,7 @@ from odscen.learning.traffic_snapshots import STOPPED
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
 
-VERSION = 3
+VERSION = 4
 STEP = 0.05
 """Of the ratio of speed to limit."""
 CLASSES = 29
