@@ -15,7 +15,7 @@ from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
-from tests.sumo.realize.test_program_files import crossing, net_file
+from tests.sumo.realize.lights.test_program_files import crossing, net_file
 
 
 def travel_times(folder: Path, *, ignores_red: bool) -> np.ndarray:
