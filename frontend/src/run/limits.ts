@@ -1,7 +1,7 @@
 import type { LoadedGraph } from "../map/loaded";
 import { nodeUnder } from "./onLane";
 
-/** The speed limit at a place for one with this heading, m/s; null where the map tells none. */
+/** The speed limit at a place for one with this heading, m/s; null where the map has none. */
 export type LimitOf = (x: number, y: number, hdg: number) => number | null;
 
 /** Metres from the middle of a lane up to which one is on it. */

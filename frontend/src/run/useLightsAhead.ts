@@ -7,7 +7,7 @@ import type { Crowd, Frame } from "./frames";
 import { LightsAhead } from "./lightsAhead";
 import type { RunSight } from "./views";
 
-/** Tells of frames what lights ahead show; null while no view wants to know, or the map has not come. */
+/** What lights ahead show is added to frames; null while no view wants to know, or the map has not come. */
 export function useLightsAhead(
   views: readonly RunSight[],
   map: MapDetails | null,

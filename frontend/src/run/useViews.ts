@@ -8,7 +8,7 @@ import { added, changed, closed, keptOf, openedViews, type RunSight, type RunVie
 
 export interface ViewsOfRun {
   list: readonly RunSight[];
-  /** The view that was used last: what stands beside the maps acts on it. */
+  /** The view that was used last: the panels beside the maps act on it. */
   used: RunSight;
   /** The map of a view; the same object as long as the view is open. */
   handleOf: (id: number) => RefObject<MapHandle | null>;

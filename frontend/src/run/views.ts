@@ -37,7 +37,7 @@ export function openedViews({ at, chosen, by, others = [] }: Kept): RunViews {
   };
 }
 
-/** What a link keeps of views; `places` tells by id where they are now. */
+/** What a link keeps of views; `places` has by id where they are now. */
 export function keptOf({ list }: RunViews, places: ReadonlyMap<number, View>): Kept {
   const [first, ...others] = list.map(({ id, followed, by, begin }) => {
     const at = places.get(id) ?? begin;

@@ -12,7 +12,7 @@ export interface Kept {
   time?: number;
   /** What the colours of road users say. */
   by?: string;
-  /** Further views of the same, in their order; the first is what stands above. */
+  /** Further views of the same, in their order; the first one is described above. */
   others?: readonly KeptView[];
 }
 
@@ -27,7 +27,7 @@ export interface KeptView {
 const LAG = 400;
 /** Longer lists are not kept: addresses would grow too long for mail and chat. */
 const MOST_CHOSEN = 30;
-/** Views that a link can ask for; nobody can look at more. */
+/** Views that a link can ask for: no reader can look at more. */
 const MOST_OTHERS = 8;
 
 /** The part of an address that says which view it is. */

@@ -41,7 +41,7 @@ function road(): GraphColumns {
 const graph = new Graph(road());
 const loaded = { graph, picker: new Picker(graph) };
 
-test("the limit is that of the lane below, in its direction, and unknown where the map tells none", () => {
+test("the limit is that of the lane below, in its direction, and unknown where the map has none", () => {
   const limit = limitsOf(loaded);
   expect(limit(50.3, 0.8, 0.1)).toBe(10);
   expect(limit(150, -1, 0)).toBe(20);
