@@ -22,7 +22,7 @@ export function ViewButtons({
   return (
     <>
       {onAdd && (
-        <Tooltip label={t`Add a view`}>
+        <Tooltip withinPortal={false} label={t`Add a view`}>
           <Button
             className="view-button"
             size="xs"
@@ -36,7 +36,7 @@ export function ViewButtons({
         </Tooltip>
       )}
       {name !== null && (
-        <Tooltip label={t`Close this view`}>
+        <Tooltip withinPortal={false} label={t`Close this view`}>
           <Button
             className="view-button"
             size="xs"
