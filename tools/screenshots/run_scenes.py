@@ -86,12 +86,15 @@ def _two_views(camera: Camera) -> None:
 
 
 def _report(studio: Studio, address: str | None) -> None:
-    """The beginning of the report of a run: its verdict and the level of service on the map."""
+    """The report of a run: its verdict, the level of service on the map, and a corridor."""
     assert address is not None
     with studio.visit(width=1080, height=1240) as camera:
         camera.user.page.goto(address)
         expect(camera.user.page.get_by_role("heading", level=1)).to_be_visible()
         camera.take("report")
+        corridor = camera.user.page.locator("#corridor")
+        corridor.evaluate("one => one.scrollIntoView()")
+        camera.take("corridor", corridor)
 
 
 def time_of_a_run(studio: Studio) -> None:
