@@ -3907,9 +3907,9 @@ export interface components {
             jams: number;
             /** Jams At The End */
             jams_at_the_end: number;
-            /** Moved On */
+            /** Teleported */
             moved_on: number;
-            /** Kept Out */
+            /** Not inserted */
             kept_out: number;
             /** Places */
             places: components["schemas"]["Incident"][];

@@ -238,7 +238,8 @@ class _Trials:
                 run = run_prepared(prepared, checked.folder, progress=_limit(prepared.plan))
                 level, headline = (run.usability[key] for key in ("level", "headline"))
                 # Whether it was noticed in time is a matter of the machine, the words are not.
-                backlog = _most_waiting(run) > BACKLOG * len(prepared.plan.actors)
+                waiting = _most_waiting(run, prepared.plan.until)
+                backlog = waiting > BACKLOG * len(prepared.plan.actors)
             except _BacklogError:
                 backlog = True
             if backlog:
@@ -271,9 +272,10 @@ def _limit(plan: Plan) -> OnProgress:
     return stop
 
 
-def _most_waiting(run: Run) -> int:
-    """Road users who were due and not inserted at one time, at most."""
+def _most_waiting(run: Run, until: float) -> int:
+    """Road users who were due before the run's end and not inserted at one time, at most."""
     table = run.actors()
+    table = table.filter(table["depart"] < until)
     depart, inserted = (table[name].to_numpy() for name in ("depart", "inserted"))
     times = np.concatenate([depart, inserted])
     change = np.repeat([1, -1], len(depart))

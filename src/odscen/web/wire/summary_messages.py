@@ -32,8 +32,8 @@ class GridlockInfo(Answer):
 
     jams: int
     jams_at_the_end: int
-    moved_on: int
-    kept_out: int
+    moved_on: int = Field(title="Teleported")
+    kept_out: int = Field(title="Not inserted")
     places: list[Incident]
 
 
