@@ -33,7 +33,7 @@ SHOWN = (
     "interchange/tll_",
     "lanegraph/",
     "learning/fill",
-    "learning/generator_options",
+    "learning/offered_options",
     "opendrive/",
     "results/by_place/analysis_times",
     "results/judging/",

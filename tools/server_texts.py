@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from odscen.app.generators import installed_generators
 from odscen.results.measures.usability import UsabilityLevel
 from odscen.scenario.templates.template_registry import TEMPLATES
+from odscen.sumo.worker.behaviour.behaviour_doors import installed_behaviours
 from odscen.web.routes.figure_routes import actor_measures, figures
 
 TARGET = Path(__file__).parents[1] / "frontend/src/language/serverTexts.ts"
@@ -49,3 +51,9 @@ def _registered() -> Iterator[str]:
         yield from (template.title, template.summary, template.needs)
         for number in template.parameters:
             yield number.meaning
+    for one in (*installed_generators(), *installed_behaviours()):
+        yield one.summary
+        for option in one.options:
+            yield option.title
+            if option.meaning:
+                yield option.meaning

@@ -28,6 +28,8 @@ export const summary = (
   map_sha256: null,
   meso: false,
   driven_by: null,
+  behaviour: null,
+  behaviour_options: {},
   seed: 0,
   until: 60,
   step_length: 0.5,

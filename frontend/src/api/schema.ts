@@ -236,6 +236,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/generators": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Generators
+         * @description Generators that are installed, for the edit ``fill_roi``: the one that ships is the first.
+         */
+        get: operations["list_generators_api_generators_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/behaviours": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Behaviours
+         * @description Behaviour models that are installed, for a new run: those that ship are the first.
+         */
+        get: operations["list_behaviours_api_behaviours_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/scenarios": {
         parameters: {
             query?: never;
@@ -1608,26 +1648,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/generators": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * List Generators
-         * @description Generators that are installed, for the edit ``fill_roi``: the one that ships is the first.
-         */
-        get: operations["list_generators_api_generators_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/scenarios/{name}/demand/day": {
         parameters: {
             query?: never;
@@ -2551,6 +2571,18 @@ export interface components {
             values: number[];
             /** Weights */
             weights: number[] | null;
+        };
+        /**
+         * ChosenBehaviour
+         * @description An installed behaviour model by its name, and options that differ from its usual ones.
+         */
+        ChosenBehaviour: {
+            /** Name */
+            name: string;
+            /** Options */
+            options?: {
+                [key: string]: boolean | number | string;
+            };
         };
         /**
          * ClearTimingEdit
@@ -3769,45 +3801,6 @@ export interface components {
             once: boolean;
         };
         /**
-         * GeneratorInfo
-         * @description A generator that can fill a region; ``error`` says why it cannot, and is empty if it can.
-         */
-        GeneratorInfo: {
-            /** Name */
-            name: string;
-            /** Summary */
-            summary: string;
-            /** Options */
-            options: components["schemas"]["GeneratorOptionInfo"][];
-            /** Error */
-            error: string;
-        };
-        /**
-         * GeneratorOptionInfo
-         * @description An option of a generator; ``usual`` ``null`` has to be given.
-         */
-        GeneratorOptionInfo: {
-            /** Name */
-            name: string;
-            /**
-             * Kind
-             * @enum {string}
-             */
-            kind: "number" | "integer" | "boolean" | "string";
-            /** Title */
-            title: string;
-            /** Meaning */
-            meaning: string;
-            /** Usual */
-            usual: boolean | number | string | null;
-            /** Low */
-            low: number | null;
-            /** High */
-            high: number | null;
-            /** Choices */
-            choices: string[];
-        };
-        /**
          * GoOn
          * @description Go on with an interrupted run; ``speed`` as in :class:`NewRun`.
          */
@@ -4734,7 +4727,7 @@ export interface components {
          *     simulated seconds per second, ``None`` as fast as it can; a ``paused`` run makes one step.
          *     Places of road users are recorded ``every`` so many seconds, ``None`` with each step, unless
          *     ``trajectories`` is false. With ``carla`` it is shown on the CARLA server too, step by step, and
-         *     recorded whole.
+         *     recorded whole. Vehicles are driven by a ``behaviour`` model, ``None`` for SUMO's drivers.
          */
         NewRun: {
             /** Scenario */
@@ -4764,6 +4757,7 @@ export interface components {
              * @default false
              */
             carla?: boolean;
+            behaviour?: components["schemas"]["ChosenBehaviour"] | null;
         };
         /**
          * NewScenario
@@ -4834,6 +4828,20 @@ export interface components {
             version: number;
         };
         /**
+         * OfferedInfo
+         * @description A generator or behaviour model to choose; ``error`` says why it cannot be, or is empty.
+         */
+        OfferedInfo: {
+            /** Name */
+            name: string;
+            /** Summary */
+            summary: string;
+            /** Options */
+            options: components["schemas"]["OptionInfo"][];
+            /** Error */
+            error: string;
+        };
+        /**
          * OneActor
          * @description An actor, the rule's own if none is named.
          */
@@ -4848,6 +4856,31 @@ export interface components {
         "OneActor-Output": {
             /** Of */
             of: string | null;
+        };
+        /**
+         * OptionInfo
+         * @description An option of a generator or behaviour model; ``usual`` ``null`` has to be given.
+         */
+        OptionInfo: {
+            /** Name */
+            name: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "number" | "integer" | "boolean" | "string";
+            /** Title */
+            title: string;
+            /** Meaning */
+            meaning: string;
+            /** Usual */
+            usual: boolean | number | string | null;
+            /** Low */
+            low: number | null;
+            /** High */
+            high: number | null;
+            /** Choices */
+            choices: string[];
         };
         /**
          * OwnAction
@@ -6139,8 +6172,8 @@ export interface components {
          * @description Key figures of a run that has ended; seconds, metres, m/s.
          *
          *     ``figures`` are those of ``docs/runs.md`` by name, null where there was nothing to measure.
-         *     ``driven_by`` says who moved the actors, if not SUMO. ``files`` are relative to the run's
-         *     folder.
+         *     ``driven_by`` says who moved the actors, if not SUMO, and ``behaviour`` which model drove its
+         *     vehicles, if any. ``files`` are relative to the run's folder.
          */
         RunSummary: {
             /** Format */
@@ -6169,6 +6202,12 @@ export interface components {
             meso: boolean;
             /** Driven By */
             driven_by: string | null;
+            /** Behaviour */
+            behaviour: string | null;
+            /** Behaviour Options */
+            behaviour_options: {
+                [key: string]: boolean | number | string;
+            };
             /** Seed */
             seed: number;
             /** Until */
@@ -12736,6 +12775,226 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["AssetsInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    list_generators_api_generators_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OfferedInfo"][];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    list_behaviours_api_behaviours_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OfferedInfo"][];
                 };
             };
             /** @description The request cannot be read. */
@@ -21255,116 +21514,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["TemplateInfo"][];
-                };
-            };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-        };
-    };
-    list_generators_api_generators_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["GeneratorInfo"][];
                 };
             };
             /** @description The request cannot be read. */

@@ -3,7 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useDeferredValue, useState } from "react";
 
-import type { Filler } from "../api/generators";
+import type { Chosen } from "../api/models";
 import { type Actor, type Assets, CATEGORIES, type Edit, type Flow } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
@@ -43,7 +43,7 @@ interface Props {
   onRemove: () => void;
   onSelect: (ids: string[]) => void;
   onShowGoals: () => void;
-  onFill: (share: number, seed: number, filler: Filler | null) => void;
+  onFill: (share: number, seed: number, filler: Chosen | null) => void;
 }
 
 /** Choose a kind, place road users on the map, then set where they go and how. */

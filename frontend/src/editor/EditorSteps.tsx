@@ -3,7 +3,7 @@ import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { memo, useMemo, useState } from "react";
 
-import type { Filler } from "../api/generators";
+import type { Chosen } from "../api/models";
 import type { Assets, Edit } from "../api/types";
 import { inBounds, inCircle } from "../map/areas";
 import type { PackedDrawing } from "../map/drawing";
@@ -83,7 +83,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
       region.candidates.map((segment): Edit => ({ kind: "grow_roi", segment })),
       t`Add ${plural(region.candidates.length, { one: "# segment", other: "# segments" })}`,
     );
-  const fill = async (share: number, seed: number, filler: Filler | null): Promise<void> => {
+  const fill = async (share: number, seed: number, filler: Chosen | null): Promise<void> => {
     setFilling(true);
     if (await changes.fill(share, seed, filler).finally(() => setFilling(false))) now.select([]);
   };

@@ -3,9 +3,9 @@ import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
-import type { Filler } from "../api/generators";
+import { type Chosen, models } from "../api/models";
 import { IconDice } from "../ui/icons";
-import { GeneratorForm } from "./GeneratorForm";
+import { ModelChoice } from "./ModelChoice";
 
 /** Road users, random ones or those of a generator, in the place of all that were placed; flows stay. */
 export function FillForm({
@@ -15,14 +15,22 @@ export function FillForm({
 }: {
   actors: number;
   busy: boolean;
-  onFill: (share: number, seed: number, filler: Filler | null) => void;
+  onFill: (share: number, seed: number, filler: Chosen | null) => void;
 }) {
   const [share, setShare] = useState(30);
   const [seed, setSeed] = useState(1);
-  const [filler, setFiller] = useState<Filler | null>(null);
+  const [filler, setFiller] = useState<Chosen | null>(null);
   return (
     <div className="fold">
-      <GeneratorForm filler={filler} onChange={setFiller} />
+      <ModelChoice
+        offered={models.generators}
+        label={t`Placed by`}
+        none={t`Random`}
+        words={(name) => t`Generator ${name}`}
+        unusable={t`This generator cannot be used`}
+        chosen={filler}
+        onChange={setFiller}
+      />
       <div>
         <Text size="sm" fw={500}>
           <Trans>Density: {share} % of the maximum</Trans>

@@ -4,13 +4,16 @@ import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import { localized } from "../language/localized";
+import { type Chosen, models } from "../api/models";
 import type { RunWish } from "../api/runs";
 import type { Edit, ScenarioDocument } from "../api/types";
 import { CarlaChoice } from "../carla/CarlaChoice";
+import { driverWords } from "../ui/drivers";
 import { IconPlay } from "../ui/icons";
 import { Duration } from "./Duration";
 import { Forecast } from "./Forecast";
 import { MeasureList } from "./MeasureList";
+import { ModelChoice } from "./ModelChoice";
 
 const CONTROLS = localized(() => [
   { value: "fixed", label: t`Fixed-time` },
@@ -63,6 +66,7 @@ export function RunStep({
   const [inCarla, setInCarla] = useState(false);
   const [recording, setRecording] = useState("step");
   const [pace, setPace] = useState<string | null>(null);
+  const [driver, setDriver] = useState<Chosen | null>(null);
   const long = duration > LONG;
   const chosenPace = pace ?? (long ? "fast" : "real");
   const every = inCarla || recording === "step" || recording === "none" ? null : Number(recording);
@@ -72,6 +76,7 @@ export function RunStep({
     carla: inCarla,
     trajectories: inCarla || recording !== "none",
     every,
+    ...(driver && { behaviour: driver }),
   };
   return (
     <>
@@ -137,6 +142,15 @@ export function RunStep({
         </div>
       )}
       <MeasureList measures={measures} />
+      <ModelChoice
+        offered={models.behaviours}
+        label={t`Vehicles driven by`}
+        none={t`SUMO’s drivers`}
+        words={driverWords}
+        unusable={t`This behaviour model cannot be used`}
+        chosen={driver}
+        onChange={setDriver}
+      />
       <div>
         <Text size="sm" fw={500}>
           <Trans>Speed at the start</Trans>

@@ -1,6 +1,6 @@
 import { plural, t } from "@lingui/core/macro";
 
-import type { Filler } from "../api/generators";
+import type { Chosen } from "../api/models";
 import type { Actor, Category, Edit, Flow, ScenarioState } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { extension } from "./regions";
@@ -24,7 +24,7 @@ export interface Changes {
   /** Adds segments to the region: those that hang together with it. */
   extendRegion: (rows: readonly number[]) => void;
   /** Random road users, or those of a generator, in the place of all; whether they were placed. */
-  fill: (share: number, seed: number, filler: Filler | null) => Promise<boolean>;
+  fill: (share: number, seed: number, filler: Chosen | null) => Promise<boolean>;
 }
 
 /** What can be done to road users and flows, as edits that the server is asked for. */
@@ -127,7 +127,12 @@ export function changesOf({
         );
     },
     fill: async (share, seed, filler) => {
-      const done = await edit({ kind: "fill_roi", share, seed, ...filler });
+      const done = await edit({
+        kind: "fill_roi",
+        share,
+        seed,
+        ...(filler && { generator: filler.name, options: filler.options }),
+      });
       if (done)
         say(
           t`${plural(done.document.actors.length, { one: "# road user", other: "# road users" })} placed. Undo restores the previous ones.`,

@@ -7,7 +7,8 @@ import { served } from "../language/served";
 import { localized } from "../language/localized";
 import { carla } from "../api/carla";
 import { allFigures } from "../api/figures";
-import { type RunInfo, runs, type Summary, type Verdict } from "../api/runs";
+import { type RunInfo, runs, type RunWish, type Summary, type Verdict } from "../api/runs";
+import { driverWords } from "../ui/drivers";
 import { tellError } from "../ui/notices";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
@@ -44,7 +45,13 @@ export function Result({
   const known = useLoaded(allFigures);
   const again = (): void => {
     setBusy(true);
-    runs.start({ scenario, speed: Number(info.summary?.until) > LONG ? null : 1 }).then(
+    const driver = info.summary?.behaviour;
+    const wish: RunWish = {
+      scenario,
+      speed: Number(info.summary?.until) > LONG ? null : 1,
+      ...(driver && { behaviour: { name: driver, options: info.summary?.behaviour_options } }),
+    };
+    runs.start(wish).then(
       ({ run }) => go({ view: "run", scenario, run }),
       (error: unknown) => {
         setBusy(false);
@@ -61,6 +68,11 @@ export function Result({
         {TITLE()[info.state] ?? t`The run is finished`}
         {verdict && `: ${served(verdict.level)}`}
       </Title>
+      {info.summary?.behaviour && (
+        <Text size="sm" c="dimmed">
+          <Trans>Vehicles driven by: {driverWords(info.summary.behaviour)}</Trans>
+        </Text>
+      )}
       {verdict && <Reservations verdict={verdict} />}
       {failed && <Failure info={info} />}
       {info.summary && <Criteria criteria={info.summary.criteria} onShow={failed ? null : onShow} />}

@@ -3,7 +3,7 @@ import { screen, within } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
 import type { Background } from "../../src/api/demand";
-import { generators } from "../../src/api/generators";
+import { models } from "../../src/api/models";
 import { ActorForm, ManyForm } from "../../src/editor/ActorForm";
 import { BackgroundForm } from "../../src/editor/BackgroundForm";
 import { Duration } from "../../src/editor/Duration";
@@ -176,7 +176,7 @@ test("a random fill says whom it replaces and passes on density and seed", async
 
 test("a generator is chosen with its options, and one that fails says why", async () => {
   const option = { title: "", meaning: "", low: null, high: null, choices: [] };
-  vi.spyOn(generators, "all").mockResolvedValue([
+  vi.spyOn(models, "generators").mockResolvedValue([
     { name: "gone", summary: "", options: [], error: "it cannot be imported" },
     {
       name: "spread",
@@ -199,7 +199,7 @@ test("a generator is chosen with its options, and one that fails says why", asyn
   await user.click(screen.getByRole("checkbox", { name: "They move" }));
   await user.click(screen.getByRole("button", { name: "Fill the region" }));
   const options = { apart: 30, moving: true };
-  expect(onFill).toHaveBeenLastCalledWith(0.3, 1, { generator: "spread", options });
+  expect(onFill).toHaveBeenLastCalledWith(0.3, 1, { name: "spread", options });
   await choose(user, "Placed by", "Random");
   await user.click(screen.getByRole("button", { name: "Fill the region" }));
   expect(onFill).toHaveBeenLastCalledWith(0.3, 1, null);

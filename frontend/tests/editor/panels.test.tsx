@@ -342,10 +342,20 @@ test("a change of several road users is one change; flows among them are left as
   );
 });
 
+const OPTION = { meaning: "", low: 0, high: 10, choices: [] };
+const BEHAVIOURS = [
+  {
+    name: "idm",
+    summary: "Intelligent driver model (IDM), with lane changes by MOBIL.",
+    error: "",
+    options: [{ ...OPTION, name: "headway", kind: "number", title: "Time headway, s", usual: 1.2 }],
+  },
+  { name: "gone", summary: "", options: [], error: "it cannot be imported" },
+];
 const CARLA = { state: "absent", address: "", message: "No CARLA server is there." };
 
 function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunStep>[0]> = {}) {
-  server({ "/carla": CARLA });
+  server({ "/carla": CARLA, "/behaviours": BEHAVIOURS });
   const [onEdit, onRun] = [vi.fn(), vi.fn()];
   const shown = show(
     <RunStep
@@ -382,6 +392,26 @@ test("measures are listed with what they do and when", () => {
   expect(screen.getByText("Closure shut")).toBeTruthy();
   expect(screen.getByText("r1; 1:00.0 to 2:00.0")).toBeTruthy();
   expect(screen.getByText("only bus: 1.0.-1; 0:00.0 to the end")).toBeTruthy();
+});
+
+test("SUMO drives the vehicles, or a behaviour model with options that differ from its usual ones", async () => {
+  const { user, onRun } = toRun(scenario([actor("a")]));
+  expect(await screen.findByRole("textbox", { name: "Vehicles driven by" })).toHaveProperty(
+    "value",
+    "SUMO’s drivers",
+  );
+  await choose(user, "Vehicles driven by", "Intelligent driver model");
+  expect(screen.getByText(/with lane changes by MOBIL/)).toBeTruthy();
+  await user.click(screen.getByRole("button", { name: "Run" }));
+  expect(onRun.mock.lastCall?.[0]).toHaveProperty("behaviour", { name: "idm", options: {} });
+  await fill(user, "Time headway, s", "0.8");
+  await user.click(screen.getByRole("button", { name: "Run" }));
+  expect(onRun.mock.lastCall?.[0]).toHaveProperty("behaviour", { name: "idm", options: { headway: 0.8 } });
+  await choose(user, "Vehicles driven by", "Behaviour model gone");
+  expect(screen.getByRole("alert").textContent).toContain("it cannot be imported");
+  await choose(user, "Vehicles driven by", "SUMO’s drivers");
+  await user.click(screen.getByRole("button", { name: "Run" }));
+  expect(onRun.mock.lastCall?.[0]).not.toHaveProperty("behaviour");
 });
 
 test("a run begins in real time with its trajectories, unless another choice is made", async () => {

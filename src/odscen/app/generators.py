@@ -10,12 +10,10 @@ The page chooses among these and the one that ships; it cannot name a module or 
 
 from __future__ import annotations
 
-import inspect
 import shlex
 import subprocess
 import tempfile
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,13 +21,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from odscen.base.errors import InputError, NotFoundError, OdscenError
 from odscen.learning.fill import Fill, FillRequest, fill_from_arrays, fill_from_bytes, request_bytes
 from odscen.learning.fill_check import CheckedFill, checked_fill
-from odscen.learning.generator_options import (
-    GeneratorOption,
-    OptionValue,
-    option_values,
-    options_of,
-)
 from odscen.learning.named_objects import named_object
+from odscen.learning.offered_models import installed_names, offered_models
+from odscen.learning.offered_options import OptionValue, option_values, options_of
 from odscen.scenario.document.named_random import stream
 
 if TYPE_CHECKING:
@@ -41,6 +35,7 @@ if TYPE_CHECKING:
     from odscen.base.categories import Body, Category
     from odscen.lanegraph.graphs import MapGraph
     from odscen.learning.fill import Generator
+    from odscen.learning.offered_models import OfferedModel
     from odscen.learning.traffic_snapshots import LightView
     from odscen.scenario.document.scenario_document import Actor
     from odscen.scenario.edits.actor_edits import NamedPlacer
@@ -61,22 +56,13 @@ MOST_BYTES = 1_000_000_000
 class GeneratorDoor(NamedTuple):
     """Where traffic comes from: a class or an entry point by name, or the line of a command.
 
-    ``options`` are those of a class, see :mod:`odscen.learning.generator_options`.
+    ``options`` are those of a class, see :mod:`odscen.learning.offered_options`.
     """
 
     name: str | None = None
     command: str | None = None
     time_limit: float = TIME_LIMIT
     options: Mapping[str, OptionValue] = MappingProxyType({})
-
-
-class OfferedGenerator(NamedTuple):
-    """A generator that is installed; ``error`` says why it cannot be used, or is empty."""
-
-    name: str
-    summary: str
-    options: tuple[GeneratorOption, ...] = ()
-    error: str = ""
 
 
 def open_generator(door: GeneratorDoor) -> Generator:
@@ -117,9 +103,9 @@ def _values(found: Any, door: GeneratorDoor) -> dict[str, OptionValue]:
         raise
 
 
-def installed_generators() -> tuple[OfferedGenerator, ...]:
+def installed_generators() -> tuple[OfferedModel, ...]:
     """The generator that ships and those of installed packages, by name, with their options."""
-    return tuple(_offered(name) for name in _installed())
+    return offered_models(_installed(), _found)
 
 
 def placer_of(loaded: LoadedMap) -> NamedPlacer:
@@ -145,16 +131,7 @@ def placer_of(loaded: LoadedMap) -> NamedPlacer:
 
 
 def _installed() -> list[str]:
-    return [REFERENCE, *sorted({one.name for one in entry_points(group=GROUP)} - {REFERENCE})]
-
-
-def _offered(name: str) -> OfferedGenerator:
-    try:
-        found = _found(name)
-        summary = (inspect.getdoc(found) or "").partition("\n")[0]
-        return OfferedGenerator(name, summary, options_of(found))
-    except InputError as error:
-        return OfferedGenerator(name, "", error=error.problem)
+    return installed_names(GROUP, [REFERENCE])
 
 
 class Placer:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +19,7 @@ from odscen.base.shown import visible
 if TYPE_CHECKING:
     from odscen.base.errors import ReportedRow
     from odscen.learning.behaviour.behaviour_model import BehaviourDoor
+    from odscen.learning.offered_options import OptionValue
 
 WorkspaceOption = Annotated[
     Path | None,
@@ -244,6 +245,28 @@ def progress(title: str) -> Iterator[Callable[[str, float], None]]:
         yield lambda what, share: bar.update(task, completed=share, what=what)
 
 
+def option_settings(settings: Iterable[str], *, element: str) -> dict[str, OptionValue]:
+    """Read ``NAME=VALUE``: numbers and true or false as JSON, all else as text.
+
+    Raises
+    ------
+    InputError
+        If one has no name or no value; ``element`` is the option of the command.
+    """
+    found: dict[str, OptionValue] = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        if not (name.strip().isidentifier() and equals):
+            msg = f"{setting!r} sets nothing; write NAME=VALUE"
+            raise InputError(msg, element=element)
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = text
+        found[name.strip()] = value if isinstance(value, bool | int | float | str) else text
+    return found
+
+
 def behaviour_door(
     name: str | None, given: list[str] | None, command: str | None, time_limit: float
 ) -> BehaviourDoor | None:
@@ -261,16 +284,7 @@ def behaviour_door(
         return None
     from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 
-    options: dict[str, float | str] = {}
-    for text in given or ():
-        key, sign, value = text.partition("=")
-        if not sign or not key.isidentifier():
-            msg = f"{text!r} sets nothing; write for example headway=0.8"
-            raise InputError(msg, element="--behaviour-set")
-        try:
-            options[key] = float(value)
-        except ValueError:
-            options[key] = value
+    options = option_settings(given or (), element="--behaviour-set")
     if name is not None and name.partition(":")[0].endswith(".py"):
         file, _, attribute = name.rpartition(":")
         name = f"{Path(file).resolve()}:{attribute}"  # runs may go on in another folder

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,15 +15,13 @@ from odscen.cli.console import (
     WorkspaceOption,
     error_fields,
     log,
+    option_settings,
     print_json,
     progress,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from odscen.learning.fill_check import CheckedFill
-    from odscen.learning.generator_options import OptionValue
     from odscen.workspace.store import Workspace
 
 _MOST_REMARKS = 10
@@ -104,7 +101,7 @@ def generate(
     )
     door = None
     if generator is not None or generator_cmd is not None:
-        given = _option_values(generator_option or ())
+        given = option_settings(generator_option or (), element="--generator-option")
         door = GeneratorDoor(generator, generator_cmd, generator_timeout, given)
     elif generator_option:
         msg = "--generator-option is of a generator: name one with --generator"
@@ -131,22 +128,6 @@ def generate(
             _show_remarks(checked)
     if as_json:
         print_json({"scenarios": rows})
-
-
-def _option_values(settings: Iterable[str]) -> dict[str, OptionValue]:
-    """Read ``NAME=VALUE``: numbers and true or false as JSON, all else as text."""
-    found: dict[str, OptionValue] = {}
-    for setting in settings:
-        name, equals, text = setting.partition("=")
-        if not (name and equals):
-            msg = f"--generator-option {setting!r}: write NAME=VALUE"
-            raise InputError(msg)
-        try:
-            value = json.loads(text)
-        except ValueError:
-            value = text
-        found[name.strip()] = value if isinstance(value, bool | int | float | str) else text
-    return found
 
 
 def _show_remarks(checked: CheckedFill) -> None:

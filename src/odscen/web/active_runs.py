@@ -25,6 +25,7 @@ from odscen.sumo.folder.run_status import read_status
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.live_run import Live
+from odscen.sumo.worker.behaviour.behaviour_doors import chosen_behaviour
 from odscen.sumo.worker.protocol import Command, Failed, Pace
 from odscen.sumo.worker.snapshots import origin
 from odscen.web.kept_runs import KeptRuns, names_of_runs, numbered_stem
@@ -377,11 +378,13 @@ class Runs:
 
 
 def _settings(wish: NewRun) -> RunSettings:
+    chosen = wish.behaviour
     return RunSettings(
         seed=wish.seed,
         until=wish.until,
         step_length=wish.step_length,
         recording=Recording(trajectories=wish.trajectories, every=wish.every),
+        behaviour=None if chosen is None else chosen_behaviour(chosen.name, chosen.options),
     )
 
 

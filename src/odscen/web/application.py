@@ -28,6 +28,7 @@ from odscen.web.routes import (
     demand_routes,
     figure_routes,
     map_routes,
+    model_routes,
     removal_routes,
     result_routes,
     run_routes,
@@ -129,6 +130,7 @@ def create_app(
 
     for routes in (
         map_routes,
+        model_routes,
         scenario_routes,
         demand_routes,
         run_routes,
@@ -142,7 +144,6 @@ def create_app(
     ):
         app.include_router(routes.router)
     app.include_router(scenario_routes.templates)
-    app.include_router(scenario_routes.generators)
     app.include_router(demand_routes.days)
     app.include_router(exchange_routes.router)
     app.include_router(exchange_routes.exports)

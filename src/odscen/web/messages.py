@@ -5,12 +5,13 @@ Field names are those of the documents; units are SI; positions are in the OpenD
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from odscen.base.categories import Category
-from odscen.learning.generator_options import OptionKind, OptionValue
+from odscen.learning.offered_models import OfferedModel
+from odscen.learning.offered_options import OptionKind, OptionValue
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.workspace.asset_catalogue import Age, TimeOfDay
 
@@ -200,8 +201,8 @@ class TemplateInfo(Answer):
     numbers: list[TemplateNumber]
 
 
-class GeneratorOptionInfo(Answer):
-    """An option of a generator; ``usual`` ``null`` has to be given."""
+class OptionInfo(Answer):
+    """An option of a generator or behaviour model; ``usual`` ``null`` has to be given."""
 
     name: str
     kind: OptionKind
@@ -213,13 +214,22 @@ class GeneratorOptionInfo(Answer):
     choices: list[str]
 
 
-class GeneratorInfo(Answer):
-    """A generator that can fill a region; ``error`` says why it cannot, and is empty if it can."""
+class OfferedInfo(Answer):
+    """A generator or behaviour model to choose; ``error`` says why it cannot be, or is empty."""
 
     name: str
     summary: str
-    options: list[GeneratorOptionInfo]
+    options: list[OptionInfo]
     error: str
+
+    @classmethod
+    def of(cls, one: OfferedModel) -> Self:
+        """What the page is told of one."""
+        options = [
+            OptionInfo(**{**option._asdict(), "choices": [*option.choices]})
+            for option in one.options
+        ]
+        return cls(name=one.name, summary=one.summary, options=options, error=one.error)
 
 
 class OfVersion(RequestBody):

@@ -43,7 +43,7 @@ def test_it_drives_on_when_free_and_brakes_behind_somebody_slow_and_before_red()
 
 
 def test_drawn_accelerations_depend_on_the_seed_alone() -> None:
-    road, model = scene(2), ImitationDriver(sampled=1.0)
+    road, model = scene(2), ImitationDriver(sampled=True)
     view = seen(road, [0, 1], [100.0, 200.0], [10.0, 12.0])
     one, same, other = (
         model.act(view, model.init(np.random.default_rng(seed), road))[0].speed

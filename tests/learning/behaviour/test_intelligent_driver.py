@@ -19,7 +19,7 @@ def drive(model: IntelligentDriver, lane: list[int], pos: list[float], speed: li
 
 
 def test_at_the_equilibrium_gap_of_its_paper_it_keeps_its_speed() -> None:
-    model, speed = IntelligentDriver(changes_lanes=0.0), 10.0
+    model, speed = IntelligentDriver(changes_lanes=False), 10.0
     gap = (model.gap + speed * model.headway) / np.sqrt(1.0 - (speed / 20.0) ** 4)
     action = drive(model, [0, 0], [100.0, 105.0 + gap], [speed, speed])
     assert action.speed[0] == pytest.approx(speed)

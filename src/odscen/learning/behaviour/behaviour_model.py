@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.learning.fill import Array
+    from odscen.learning.offered_options import OptionValue
 
 AHEAD = 4
 """Lanes along its route that each vehicle is told of, those inside junctions included."""
@@ -210,14 +211,14 @@ class BehaviourDoor:
     time_limit
         Wall seconds that another program may take for one step.
     options
-        Keyword arguments of the class: numbers and texts.
+        Keyword arguments of the class: numbers, texts, true or false.
     """
 
     name: str | None = None
     command: str | None = None
     socket: str | None = None
     time_limit: float = 60.0
-    options: Mapping[str, float | str] = field(default_factory=dict)
+    options: Mapping[str, OptionValue] = field(default_factory=dict)
 
     @property
     def shown(self) -> str:

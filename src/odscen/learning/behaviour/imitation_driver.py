@@ -20,6 +20,7 @@ import numpy as np
 from odscen.base.errors import InputError
 from odscen.learning.behaviour.behaviour_model import DrivingAction, LightAhead
 from odscen.learning.behaviour.intelligent_driver import desired_speeds
+from odscen.learning.offered_options import offered
 from odscen.learning.reference.small_network import (
     SmallNetwork,
     new_network,
@@ -52,18 +53,20 @@ class ImitationState(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ImitationDriver:
-    """The model.
+    """A small network that has learned from SUMO's drivers how to accelerate.
 
     Attributes
     ----------
     weights
         File of weights; those that ship if not given.
     sampled
-        1 to draw accelerations, 0 to take their mean.
+        Draws accelerations instead of taking their mean.
     """
 
     weights: str = ""
-    sampled: float = 0.0
+    sampled: bool = offered(
+        False, "Accelerations drawn", meaning="else the mean of what was learned"
+    )
 
     def init(self, rng: np.random.Generator, scene: BehaviourScene) -> tuple[Any, ...]:
         """Read the weights."""

@@ -25,6 +25,7 @@ import numpy as np
 
 from odscen.learning.behaviour.behaviour_model import DrivingAction, LightAhead
 from odscen.learning.behaviour.lane_order import LaneOrder
+from odscen.learning.offered_options import offered
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
@@ -45,7 +46,7 @@ class DriverState(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class IntelligentDriver:
-    """The model.
+    """Intelligent driver model (IDM), with lane changes by MOBIL.
 
     Attributes
     ----------
@@ -60,18 +61,21 @@ class IntelligentDriver:
     spread
         Deviation of desired speeds, drawn for each vehicle, as a share; 0 for SUMO's alone.
     changes_lanes
-        1, or 0 to leave lane changes to SUMO.
+        False leaves lane changes to SUMO.
     """
 
-    acceleration: float = 1.8
-    deceleration: float = 2.5
-    headway: float = 1.2
-    gap: float = 2.0
-    politeness: float = 0.2
-    threshold: float = 0.2
-    safe_braking: float = 3.0
-    spread: float = 0.0
-    changes_lanes: float = 1.0
+    acceleration: float = offered(1.8, "Acceleration, m/s²", low=0.1, high=10.0)
+    deceleration: float = offered(2.5, "Comfortable deceleration, m/s²", low=0.1, high=10.0)
+    headway: float = offered(1.2, "Time headway, s", low=0.0, high=10.0)
+    gap: float = offered(2.0, "Gap at standstill, m", low=0.0, high=50.0)
+    politeness: float = offered(0.2, "Politeness of lane changes", low=0.0, high=1.0)
+    threshold: float = offered(0.2, "Least gain of a lane change, m/s²", low=0.0, high=10.0)
+    safe_braking: float = offered(3.0, "Most braking of a new follower, m/s²", low=0.0, high=10.0)
+    spread: float = offered(
+        0.0, "Deviation of desired speeds", low=0.0, high=0.5,
+        meaning="share of the limit; 0 for SUMO's alone",
+    )  # fmt: skip
+    changes_lanes: bool = offered(True, "Lane changes by the model")
 
     def init(self, rng: np.random.Generator, scene: BehaviourScene) -> DriverState:
         """Draw how fast each wants to be."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from odscen.scenario.document.json_form import dumps
 from odscen.sumo.folder.layout import BEHAVIOUR_FILE
@@ -83,7 +83,7 @@ def prepare(
             "map_sha256": scenario.map.sha256,
             "meso": settings.meso,
         }
-        | ({} if settings.behaviour is None else {"behaviour": settings.behaviour.shown}),
+        | _driver(settings.behaviour),
         expected=forecast(
             plan,
             realization.files,
@@ -91,6 +91,13 @@ def prepare(
             lanes=len(sumo_map.net.lanes),
         ),
     )
+
+
+def _driver(door: BehaviourDoor | None) -> dict[str, Any]:
+    """What the summary says of a behaviour model."""
+    if door is None:
+        return {}
+    return {"behaviour": door.shown, "behaviour_options": dict(door.options)}
 
 
 def _with_behaviour(files: Mapping[str, str], door: BehaviourDoor | None) -> Mapping[str, str]:

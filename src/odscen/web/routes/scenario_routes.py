@@ -11,7 +11,6 @@ from fastapi import APIRouter, File, Form, Query, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
-from odscen.app.generators import installed_generators
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
 from odscen.app.template_scenarios import template_scenario
@@ -37,8 +36,6 @@ from odscen.web.edit_requests import EditRequest
 from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import (
     CopyName,
-    GeneratorInfo,
-    GeneratorOptionInfo,
     Goals,
     NewName,
     NewScenario,
@@ -69,7 +66,6 @@ if TYPE_CHECKING:
 
 router = APIRouter(prefix="/api/scenarios", route_class=LargeDocumentRoute)
 templates = APIRouter(prefix="/api/templates")
-generators = APIRouter(prefix="/api/generators")
 
 _FILE: Responses = {
     200: {
@@ -114,23 +110,6 @@ def list_templates() -> list[TemplateInfo]:
             ],
         )
         for one in TEMPLATES.values()
-    ]
-
-
-@generators.get("")
-def list_generators() -> list[GeneratorInfo]:
-    """Generators that are installed, for the edit ``fill_roi``: the one that ships is the first."""
-    return [
-        GeneratorInfo(
-            name=one.name,
-            summary=one.summary,
-            options=[
-                GeneratorOptionInfo(**{**option._asdict(), "choices": [*option.choices]})
-                for option in one.options
-            ],
-            error=one.error,
-        )
-        for one in installed_generators()
     ]
 
 

@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
 
 from odscen.base.categories import Category
+from odscen.learning.offered_options import OptionValue
 from odscen.results.records.outcomes import ActorStatus
 from odscen.results.records.run_events import EventKind
 from odscen.web.messages import Answer, Name, RequestBody
@@ -18,6 +19,13 @@ RunState = Literal[
 ]
 
 
+class ChosenBehaviour(RequestBody):
+    """An installed behaviour model by its name, and options that differ from its usual ones."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    options: Annotated[dict[str, OptionValue], Field(max_length=100)] = Field(default_factory=dict)
+
+
 class NewRun(RequestBody):
     """Run a scenario as it is now.
 
@@ -25,7 +33,7 @@ class NewRun(RequestBody):
     simulated seconds per second, ``None`` as fast as it can; a ``paused`` run makes one step.
     Places of road users are recorded ``every`` so many seconds, ``None`` with each step, unless
     ``trajectories`` is false. With ``carla`` it is shown on the CARLA server too, step by step, and
-    recorded whole.
+    recorded whole. Vehicles are driven by a ``behaviour`` model, ``None`` for SUMO's drivers.
     """
 
     scenario: Name
@@ -37,6 +45,7 @@ class NewRun(RequestBody):
     trajectories: bool = True
     every: Annotated[float, Field(gt=0, le=3600)] | None = None
     carla: bool = False
+    behaviour: ChosenBehaviour | None = None
 
 
 class GoOn(RequestBody):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field, create_model
 
+from odscen.learning.offered_options import OptionValue
 from odscen.results.measures.gridlock import Incident
 from odscen.results.measures.registry import COUNTS
 from odscen.results.measures.usability import UsabilityLevel, UsabilityReason
@@ -85,8 +86,8 @@ class RunSummary(Answer):
     """Key figures of a run that has ended; seconds, metres, m/s.
 
     ``figures`` are those of ``docs/runs.md`` by name, null where there was nothing to measure.
-    ``driven_by`` says who moved the actors, if not SUMO. ``files`` are relative to the run's
-    folder.
+    ``driven_by`` says who moved the actors, if not SUMO, and ``behaviour`` which model drove its
+    vehicles, if any. ``files`` are relative to the run's folder.
     """
 
     format: str
@@ -100,6 +101,8 @@ class RunSummary(Answer):
     map_sha256: str | None = None
     meso: bool = False
     driven_by: str | None = None
+    behaviour: str | None = None
+    behaviour_options: dict[str, OptionValue] = Field(default_factory=dict)
     seed: int
     until: float
     step_length: float

@@ -4,6 +4,8 @@ An installed package offers one in its ``pyproject.toml``::
 
     [project.entry-points."odscen.behaviour"]
     mine = "my_package.drivers:MyDriver"
+
+The page chooses among these and those that ship; it cannot name a module or a program.
 """
 
 from __future__ import annotations
@@ -12,17 +14,25 @@ import shlex
 import shutil
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, NotFoundError
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.learning.named_objects import named_object
+from odscen.learning.offered_models import installed_names, offered_models
+from odscen.learning.offered_options import option_values, options_of
 from odscen.sumo.worker.behaviour.piped_driver import PipedDriver, SocketDriver
 
 if TYPE_CHECKING:
-    from odscen.learning.behaviour.behaviour_model import BehaviourDoor, BehaviourModel
+    from collections.abc import Mapping
+
+    from odscen.learning.behaviour.behaviour_model import BehaviourModel
+    from odscen.learning.offered_models import OfferedModel
+    from odscen.learning.offered_options import OptionValue
 
 GROUP = "odscen.behaviour"
 """Of entry points."""
 IDM, IMITATION = "idm", "imitation"
 """Names of the models that ship."""
+_SHIPPED = IDM, IMITATION
 
 
 def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
@@ -36,7 +46,7 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
     Raises
     ------
     InputError
-        If there is none, or it cannot be imported or made.
+        If there is none, it cannot be imported or made, or an option is not possible.
     """
     given = [one for one in (door.name, door.command, door.socket) if one is not None]
     if len(given) != 1:
@@ -51,8 +61,9 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
         return PipedDriver(_words(door.command), seed, door.time_limit)
     name = door.name or ""
     found = _found(name)
+    options = _keywords(found, door.options, name) if isinstance(found, type) else {}
     try:
-        made = found(**door.options) if isinstance(found, type) else found
+        made = found(**options) if isinstance(found, type) else found
     except Exception as error:  # whatever code from outside may raise
         msg = f"it cannot be made: {error!r}"
         raise InputError(msg, element=name) from error
@@ -62,6 +73,46 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
             raise InputError(msg, element=name)
     model: BehaviourModel = made
     return model
+
+
+def installed_behaviours() -> tuple[OfferedModel, ...]:
+    """Models that ship and those of installed packages, by name, with their options."""
+    return offered_models(installed_names(GROUP, _SHIPPED), _found)
+
+
+def chosen_behaviour(name: str, options: Mapping[str, OptionValue]) -> BehaviourDoor:
+    """The door of one of :func:`installed_behaviours`, with none but the options that it offers.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such model; a module or a file is none.
+    InputError
+        If it cannot be imported, or an option is not possible.
+    """
+    known = installed_names(GROUP, _SHIPPED)
+    if name not in known:
+        what = "behaviour model"
+        raise NotFoundError(what, name, known)
+    values = _values(_found(name), options, name)
+    return BehaviourDoor(name=name, options={one: values[one] for one in options})
+
+
+def _values(found: Any, given: Mapping[str, OptionValue], name: str) -> dict[str, OptionValue]:
+    try:
+        return option_values(options_of(found) if isinstance(found, type) else (), given)
+    except InputError as error:
+        error.element = name
+        raise
+
+
+def _keywords(
+    found: type, given: Mapping[str, OptionValue], name: str
+) -> Mapping[str, OptionValue]:
+    """Keyword arguments of a class: those that it offers are checked, the others left to it."""
+    offered = {one.name for one in options_of(found)}
+    checked = _values(found, {key: v for key, v in given.items() if key in offered}, name)
+    return {**given, **checked}
 
 
 def _words(command: str) -> tuple[str, ...]:

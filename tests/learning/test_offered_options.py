@@ -8,7 +8,7 @@ import pytest
 from pydantic import BaseModel, Field
 
 from odscen.base.errors import InputError
-from odscen.learning.generator_options import GeneratorOption, option_values, options_of
+from odscen.learning.offered_options import OfferedOption, option_values, options_of
 
 
 def saying(options: object) -> type:
@@ -31,7 +31,7 @@ def test_a_class_that_says_nothing_has_no_options() -> None:
 
 def test_a_pydantic_model_has_its_fields_as_options() -> None:
     share, mood = options_of(saying(Wishes))
-    assert share == GeneratorOption("share", "number", "Share", "of all", 0.5, 0, 1, ())
+    assert share == OfferedOption("share", "number", "Share", "of all", 0.5, 0, 1, ())
     assert (mood.kind, mood.usual, mood.choices) == ("string", "calm", ("calm", "busy"))
 
 
@@ -54,7 +54,7 @@ def test_values_are_completed_and_of_the_kind_that_is_said() -> None:
         ({"type": "number"}, True, "option 'a' is True, not a number"),
         ({"type": "number"}, float("nan"), "option 'a' is nan, not a number"),
         ({"type": "integer"}, 1.5, "option 'a' is 1.5, not a whole number"),
-        ({"type": "boolean"}, 1, "option 'a' is 1, not true or false"),
+        ({"type": "boolean"}, 2, "option 'a' is 2, not true or false"),
         ({"type": "string"}, "x" * 2000, "not a text"),
         ({"type": "string", "enum": ["b", "c"]}, "d", "option 'a' is 'd', not one of b, c"),
         ({"type": "number", "minimum": 0, "maximum": 4}, 5, "option 'a' is 5, not within 0..4"),

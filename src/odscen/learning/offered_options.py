@@ -1,13 +1,14 @@
-"""Options of a generator: what it lets one choose, as it says so in JSON Schema.
+"""Options of a generator or behaviour model: what it lets one choose, in JSON Schema.
 
 A class has an attribute ``options``: a schema of an object whose properties are numbers, whole
-numbers, true or false, or texts, or a pydantic model, which has such a schema. It is made with the
-values as keyword arguments.
+numbers, true or false, or texts, or a pydantic model, which has such a schema; or it is a dataclass
+with fields that are :func:`offered`. It is made with the values as keyword arguments.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 from odscen.base.errors import InputError
@@ -22,14 +23,17 @@ _CALLED = {
     "number": "a number", "integer": "a whole number", "boolean": "true or false",
     "string": "a text",
 }  # fmt: skip
+_TYPES = {"boolean": bool, "integer": int, "number": float, "string": str}
+_SCHEMA = "schema"
+"""Key of a field's metadata."""
 _MOST = 100
-"""Options of a generator, and choices of an option."""
+"""Options of one, and choices of an option."""
 _LONGEST = 1000
 """Characters of a text."""
 
 
-class GeneratorOption(NamedTuple):
-    """What a generator lets one choose.
+class OfferedOption(NamedTuple):
+    """What one lets choose.
 
     Attributes
     ----------
@@ -51,8 +55,23 @@ class GeneratorOption(NamedTuple):
     choices: tuple[str, ...]
 
 
-def options_of(made_by: Any) -> tuple[GeneratorOption, ...]:
-    """Options that a class of generators has; none if it says nothing of them.
+def offered(
+    usual: OptionValue,
+    title: str,
+    *,
+    meaning: str = "",
+    low: float | None = None,
+    high: float | None = None,
+) -> Any:
+    """A field of a dataclass that is an option."""
+    kind = next(name for name, of in _TYPES.items() if isinstance(usual, of))
+    bounds = {"minimum": low, "maximum": high}
+    schema = {"type": kind, "title": title, "description": meaning, "default": usual, **bounds}
+    return field(default=usual, metadata={_SCHEMA: schema})
+
+
+def options_of(made_by: Any) -> tuple[OfferedOption, ...]:
+    """Options that a class has; none if it says nothing of them.
 
     Raises
     ------
@@ -61,7 +80,9 @@ def options_of(made_by: Any) -> tuple[GeneratorOption, ...]:
     """
     said = getattr(made_by, "options", None)
     if said is None:
-        return ()
+        some = fields(made_by) if is_dataclass(made_by) else ()
+        schemas = {one.name: one.metadata[_SCHEMA] for one in some if _SCHEMA in one.metadata}
+        return tuple(_option(name, schema) for name, schema in schemas.items())
     try:
         schema = said.model_json_schema() if hasattr(said, "model_json_schema") else said
     except Exception as error:  # whatever code from outside may raise
@@ -75,7 +96,7 @@ def options_of(made_by: Any) -> tuple[GeneratorOption, ...]:
 
 
 def option_values(
-    options: Iterable[GeneratorOption], given: Mapping[str, OptionValue]
+    options: Iterable[OfferedOption], given: Mapping[str, OptionValue]
 ) -> dict[str, OptionValue]:
     """Check values and complete them with the usual ones.
 
@@ -100,7 +121,7 @@ def option_values(
     return found
 
 
-def _option(name: str, schema: Any) -> GeneratorOption:
+def _option(name: str, schema: Any) -> OfferedOption:
     kind = schema.get("type") if isinstance(schema, dict) else None
     choices = schema.get("enum", ()) if isinstance(schema, dict) else ()
     texts = isinstance(choices, list | tuple) and all(isinstance(one, str) for one in choices)
@@ -111,7 +132,7 @@ def _option(name: str, schema: Any) -> GeneratorOption:
     if not all(one is None or _is_number(one) for one in bounds):
         msg = f"bounds of option {name!r} are no numbers: {bounds}"
         raise InputError(msg)
-    option = GeneratorOption(
+    option = OfferedOption(
         name=name,
         kind=kind,
         title=str(schema.get("title", name))[:_LONGEST],
@@ -125,13 +146,13 @@ def _option(name: str, schema: Any) -> GeneratorOption:
     return option if usual is None else option._replace(usual=_checked(option, usual))
 
 
-def _checked(option: GeneratorOption, value: Any) -> OptionValue:
-    """Return a value as it is given to the generator."""
+def _checked(option: OfferedOption, value: Any) -> OptionValue:
+    """Return a value as it is given to the class."""
     name, kind = option.name, option.kind
     fits = {
         "number": _is_number(value),
         "integer": _is_number(value) and value == round(value),
-        "boolean": isinstance(value, bool),
+        "boolean": isinstance(value, bool) or value in (0, 1),
         "string": isinstance(value, str) and len(value) <= _LONGEST,
     }[kind]
     if not fits:
@@ -147,7 +168,7 @@ def _checked(option: GeneratorOption, value: Any) -> OptionValue:
             msg = f"option {name!r} is {value:g}, not within {bounds}"
             raise InputError(msg)
         return int(value) if kind == "integer" else float(value)
-    found: OptionValue = value
+    found: OptionValue = bool(value) if kind == "boolean" else value
     return found
 
 

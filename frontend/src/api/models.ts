@@ -1,0 +1,18 @@
+import { call } from "./client";
+import type { components } from "./schema";
+
+/** A generator or behaviour model that is installed. */
+export type Offered = components["schemas"]["OfferedInfo"];
+export type OfferedOption = components["schemas"]["OptionInfo"];
+export type OptionValue = boolean | number | string;
+
+/** One of them, and the options that differ from its usual ones. */
+export interface Chosen {
+  name: string;
+  options: Record<string, OptionValue>;
+}
+
+export const models = {
+  generators: () => call("get", "/api/generators"),
+  behaviours: () => call("get", "/api/behaviours"),
+};
