@@ -16,6 +16,7 @@ def test_a_model_is_chosen_for_a_run_and_for_the_run_after_it(
     user.step("Run").click()
     user.choose("Vehicles driven by", "Intelligent driver model")
     expect(user.page.get_by_text("with lane changes by MOBIL")).to_be_visible()
+    user.page.get_by_text("9 options").click()
     user.page.get_by_label("Time headway, s").fill("2.5")
     user.page.get_by_text("As fast as possible").click()
     user.run.click()

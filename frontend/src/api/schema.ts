@@ -8180,7 +8180,7 @@ export interface components {
             /** Scenario */
             scenario: string;
             /** Vary */
-            vary: components["schemas"]["VaryWish"][];
+            vary: (components["schemas"]["VaryWish"] | components["schemas"]["TableWish"])[];
             /**
              * Method
              * @default grid
@@ -8211,6 +8211,16 @@ export interface components {
              * @default 1
              */
             processes?: number;
+        };
+        /**
+         * TableWish
+         * @description Parameters that take values together: each row of ``table`` has one for each of them.
+         */
+        TableWish: {
+            /** Parameters */
+            parameters: string[];
+            /** Table */
+            table: number[][];
         };
         /**
          * TemplateInfo

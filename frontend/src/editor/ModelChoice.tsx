@@ -1,10 +1,14 @@
 import { Alert, Checkbox, NumberInput, Select, Text, TextInput } from "@mantine/core";
 
+import { Plural } from "@lingui/react/macro";
+
 import type { Chosen, Offered, OfferedOption, OptionValue } from "../api/models";
 import { served } from "../language/served";
 import { useLoaded } from "../ui/useLoaded";
 
 const NONE = "";
+/** Options that do not push away what is below them. */
+const FEW = 4;
 
 /** What is to be done by an installed model, with its options, or by none of them. */
 export function ModelChoice({
@@ -71,6 +75,14 @@ function Options({
       options: Object.fromEntries(value === null ? others : [...others, [name, value]]),
     });
   };
+  const fields = model.options.map((option) => (
+    <OptionField
+      key={`${model.name} ${option.name}`}
+      option={option}
+      value={chosen.options[option.name] ?? option.usual}
+      onChange={(value) => change(option.name, value)}
+    />
+  ));
   return (
     <>
       {model.summary && (
@@ -78,14 +90,16 @@ function Options({
           {served(model.summary)}
         </Text>
       )}
-      {model.options.map((option) => (
-        <OptionField
-          key={`${model.name} ${option.name}`}
-          option={option}
-          value={chosen.options[option.name] ?? option.usual}
-          onChange={(value) => change(option.name, value)}
-        />
-      ))}
+      {fields.length > FEW ? (
+        <details>
+          <summary>
+            <Plural value={fields.length} one="# option" other="# options" />
+          </summary>
+          {fields}
+        </details>
+      ) : (
+        fields
+      )}
     </>
   );
 }

@@ -1,4 +1,4 @@
-import { Alert, Button, Group, NumberInput, Select, TagsInput, Text } from "@mantine/core";
+import { Alert, Button, Group, NumberInput, Select, TagsInput, Text, Textarea } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useMemo, useRef, useState } from "react";
@@ -12,7 +12,7 @@ import { go } from "../ui/address";
 import { reasonOf } from "../ui/reason";
 import { useLoaded } from "../ui/useLoaded";
 import { bytes } from "../ui/words";
-import { countOf, faultOf, lasting, METHODS, newForm, type SweepForm, wishOf } from "./plan";
+import { countOf, faultOf, lasting, METHODS, newForm, type SweepForm, tableOf, wishOf } from "./plan";
 import { VariedRow } from "./VariedRow";
 
 /** What is varied and how; says what it takes before it starts. */
@@ -51,9 +51,12 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
     sweeps.start(wish).then(({ sweep }) => go({ view: "sweep", scenario, sweep }), failed);
   };
   const grid = form.method === "grid";
+  const parameters = Object.entries(document.parameters);
+  const free = parameters.filter(([name]) => document.formulas[`parameters/${name}/value`] === undefined);
+  const together = tableOf(form.table, Object.keys(form.varied)).names;
   return (
     <div className="plan-form">
-      {Object.entries(document.parameters).map(([name, { value, unit, description }]) => (
+      {parameters.map(([name, { value, unit, description }]) => (
         <VariedRow
           key={name}
           name={name}
@@ -62,10 +65,24 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           description={description}
           computed={document.formulas[`parameters/${name}/value`]}
           grid={grid}
+          inTable={together.includes(name)}
           varied={form.varied[name]}
           onVaried={(one) => set({ varied: { ...form.varied, [name]: one } })}
         />
       ))}
+      {free.length > 1 && (
+        <Textarea
+          label={t`Table of values that belong together`}
+          description={t`Names of parameters in the first line, below them their values, one row after the other: ${unitsOf(free)}`}
+          placeholder={exampleOf(free)}
+          autosize
+          minRows={2}
+          maxRows={12}
+          spellCheck={false}
+          value={form.table}
+          onChange={(event) => set({ table: event.currentTarget.value })}
+        />
+      )}
       <div className="plan-fields">
         <Select
           label={t`Plan`}
@@ -188,6 +205,20 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
       </Group>
     </div>
   );
+}
+
+type Named = [string, ScenarioDocument["parameters"][string]];
+
+/** The units in which a table has its values. */
+const unitsOf = (parameters: Named[]): string =>
+  parameters.map(([name, { unit }]) => (unit ? `${name} (${unit})` : name)).join(", ");
+
+/** How a table of the first two parameters may look. */
+function exampleOf(parameters: Named[]): string {
+  const some = parameters.slice(0, 2);
+  const row = (share: number) =>
+    some.map(([, { value, min, max }]) => shortNumber((min ?? value) * (1 - share) + (max ?? value) * share));
+  return [some.map(([name]) => name), row(0), row(1)].map((words) => words.join(" ")).join("\n");
 }
 
 /** The forecast in a sentence. */

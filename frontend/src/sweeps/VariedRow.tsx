@@ -22,6 +22,7 @@ export function VariedRow({
   description,
   computed,
   grid,
+  inTable,
   varied,
   onVaried,
 }: {
@@ -31,6 +32,8 @@ export function VariedRow({
   description: string;
   computed: string | undefined;
   grid: boolean;
+  /** Whether the table of values that belong together has it. */
+  inTable: boolean;
   varied: Varied | undefined;
   onVaried: (varied: Varied) => void;
 }) {
@@ -62,6 +65,10 @@ export function VariedRow({
         <Text size="sm">
           <Trans>Computed: {computed}</Trans>
         </Text>
+      ) : inTable ? (
+        <Text size="sm">
+          <Trans>In the table</Trans>
+        </Text>
       ) : (
         <SegmentedControl
           size="xs"
@@ -71,7 +78,7 @@ export function VariedRow({
           onChange={(how) => onVaried({ ...varied, how: how as Varied["how"] })}
         />
       )}
-      {varied.how === "range" && (
+      {!inTable && varied.how === "range" && (
         <>
           {number(t`From`, "low")}
           {number(t`To`, "high")}
@@ -90,7 +97,7 @@ export function VariedRow({
           )}
         </>
       )}
-      {varied.how === "set" && (
+      {!inTable && varied.how === "set" && (
         <SetInput
           label={t`Values, between commas${sign ? `, ${sign}` : ""}`}
           name={name}

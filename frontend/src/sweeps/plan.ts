@@ -1,4 +1,4 @@
-import { t } from "@lingui/core/macro";
+import { plural, t } from "@lingui/core/macro";
 
 import { fixed } from "../language/numbers";
 import { localized } from "../language/localized";
@@ -22,6 +22,8 @@ export interface Varied {
 /** A sweep as its form has it. */
 export interface SweepForm {
   varied: Readonly<Record<string, Varied>>;
+  /** Values that belong together, as typed: names of parameters, and below them their values row by row. */
+  table: string;
   method: Method;
   samples: number;
   sampleSeed: number;
@@ -66,6 +68,7 @@ export function newForm({
   });
   return {
     varied: Object.fromEntries(varied),
+    table: "",
     method: "grid",
     samples: 32,
     sampleSeed: 0,
@@ -86,15 +89,53 @@ export function setOf(text: string): number[] | null {
   return found.length > 0 && found.every(Number.isFinite) ? found : null;
 }
 
+/** Values that belong together; `fault` says what is wrong with what was typed. */
+export interface Table {
+  names: string[];
+  rows: number[][];
+  fault: string | null;
+}
+
+/** Reads a table that was typed or pasted: words between blanks, commas, semicolons or tabs. */
+export function tableOf(text: string, parameters: readonly string[]): Table {
+  const lines = text.split("\n").map((line) => line.split(/[,;\s]+/).filter(Boolean));
+  const [names = [], ...typed] = lines.filter((words) => words.length > 0);
+  const rows = typed.map((words) => words.map(Number));
+  return { names, rows, fault: text.trim() === "" ? null : faultIn(names, rows, parameters) };
+}
+
+function faultIn(names: string[], rows: number[][], parameters: readonly string[]): string | null {
+  const strange = names.find((name) => !parameters.includes(name));
+  if (strange !== undefined) return t`Table: there is no parameter ${strange} that could be varied.`;
+  const twice = names.find((name, n) => names.indexOf(name) < n);
+  if (twice !== undefined) return t`Table: ${twice} is there twice.`;
+  if (rows.length === 0) return t`Table: write values below the names.`;
+  const wrong = rows.findIndex((row) => row.length !== names.length || !row.every(Number.isFinite));
+  const [row, count] = [wrong + 1, names.length];
+  return wrong < 0
+    ? null
+    : t`Table: row ${row} needs ${plural(count, { one: "# number", other: "# numbers" })}.`;
+}
+
+/** The table of a form, and what its other parameters do: those in the table are varied there. */
+function partsOf({ varied, table }: SweepForm): { table: Table; others: [string, Varied][] } {
+  const found = tableOf(table, Object.keys(varied));
+  const others = Object.entries(varied).filter(
+    ([name, { how }]) => how !== "fixed" && !found.names.includes(name),
+  );
+  return { table: found, others };
+}
+
 const LIMIT = /^\s*[A-Za-z_]\w*\s*(>=|<=|>|<)\s*[+-]?\d+(\.\d+)?([eE][+-]?\d+)?\s*$/;
 
 /** What is wrong with a form, or null. */
-export function faultOf({ varied, limits }: SweepForm): string | null {
-  const odd = limits.find((one) => !LIMIT.test(one));
+export function faultOf(form: SweepForm): string | null {
+  const odd = form.limits.find((one) => !LIMIT.test(one));
   if (odd !== undefined) return t`${odd}: write a column, >=, <=, > or <, and a number.`;
-  const chosen = Object.entries(varied).filter(([, { how }]) => how !== "fixed");
-  if (chosen.length === 0) return t`Vary at least one parameter.`;
-  for (const [name, { how, low, high, values }] of chosen) {
+  const { table, others } = partsOf(form);
+  if (table.fault !== null) return table.fault;
+  if (others.length + table.names.length === 0) return t`Vary at least one parameter.`;
+  for (const [name, { how, low, high, values }] of others) {
     if (how === "set" && setOf(values) === null) return t`${name}: write numbers between commas.`;
     if (how === "range" && low >= high) return t`${name}: the range must end above its begin.`;
   }
@@ -102,22 +143,26 @@ export function faultOf({ varied, limits }: SweepForm): string | null {
 }
 
 /** How many cases a form has. */
-export function countOf({ varied, method, samples }: SweepForm): number {
-  if (method !== "grid") return samples;
-  return Object.values(varied).reduce((product, { how, steps, values }) => {
-    if (how === "fixed") return product;
-    return product * (how === "range" ? steps : (setOf(values)?.length ?? 0));
-  }, 1);
+export function countOf(form: SweepForm): number {
+  if (form.method !== "grid") return form.samples;
+  const { table, others } = partsOf(form);
+  return others.reduce(
+    (product, [, { how, steps, values }]) =>
+      product * (how === "range" ? steps : (setOf(values)?.length ?? 0)),
+    table.names.length > 0 ? table.rows.length : 1,
+  );
 }
 
 /** A form as the server takes it. */
 export function wishOf(scenario: string, form: SweepForm): SweepWish {
   const grid = form.method === "grid";
-  const vary = Object.entries(form.varied).flatMap(([parameter, one]): VaryWish[] => {
-    if (one.how === "fixed") return [];
-    if (one.how === "set") return [{ parameter, values: setOf(one.values) ?? [] }];
-    return [{ parameter, low: one.low, high: one.high, ...(grid && { steps: one.steps }) }];
-  });
+  const { table, others } = partsOf(form);
+  const single = others.map(([parameter, one]): VaryWish =>
+    one.how === "set"
+      ? { parameter, values: setOf(one.values) ?? [] }
+      : { parameter, low: one.low, high: one.high, ...(grid && { steps: one.steps }) },
+  );
+  const vary = table.names.length > 0 ? [...single, { parameters: table.names, table: table.rows }] : single;
   return {
     scenario,
     vary,

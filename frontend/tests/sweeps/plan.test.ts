@@ -49,6 +49,42 @@ test("parameters with bounds of their own are varied between them, computed ones
   expect(faultOf(form())).toBeNull();
 });
 
+test("values that belong together are typed or pasted, and multiply what is varied alone", () => {
+  const typed = {
+    ...varied({ how: "range", low: 5, high: 50, steps: 4 }),
+    table: "speed\thalf\n10\t3\n 12.5, 4 \n\n",
+  };
+  expect(faultOf(typed)).toBeNull();
+  expect(countOf(typed)).toBe(4 * 2);
+  expect(wishOf("s", typed).vary).toEqual([
+    { parameter: "gap", low: 5, high: 50, steps: 4 },
+    {
+      parameters: ["speed", "half"],
+      table: [
+        [10, 3],
+        [12.5, 4],
+      ],
+    },
+  ]);
+});
+
+test("a parameter in the table is varied there alone", () => {
+  const typed = { ...form(), table: "gap speed\n6 10\n7 11\n8 12" };
+  expect(countOf(typed)).toBe(3);
+  expect(wishOf("s", typed).vary).toHaveLength(1);
+  expect(countOf({ ...typed, method: "sobol", samples: 7 })).toBe(7);
+});
+
+test.each([
+  ["gap fog\n1 2", "Table: there is no parameter fog that could be varied."],
+  ["gap gap\n1 2", "Table: gap is there twice."],
+  ["gap speed", "Table: write values below the names."],
+  ["gap speed\n6 10\n7", "Table: row 2 needs 2 numbers."],
+  ["gap\nsix", "Table: row 1 needs 1 number."],
+])("a table that cannot be is refused with its place", (table, said) => {
+  expect(faultOf({ ...form(), table })).toBe(said);
+});
+
 test("limits of a safe case are those of the form, and odd ones are told", () => {
   const limited = { ...form(), ttc: null, pet: 1.5, drac: 3, limits: ["mean_speed >= 8"] };
   expect(wishOf("s", limited).safe).toEqual(["min_pet >= 1.5", "max_drac <= 3", "mean_speed >= 8"]);

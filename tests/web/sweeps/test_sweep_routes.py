@@ -219,6 +219,17 @@ def test_a_plan_says_how_many_cases_there_are_and_what_they_take(client: TestCli
     assert not [one for one in client.get("/api/sweeps").json() if one["state"] == "running"]
 
 
+def test_values_of_a_table_belong_together(client: TestClient) -> None:
+    rows = {"parameters": ["van", "gap"], "table": [[12, 10], [26, 40]]}
+    planned = asked(client, "/plan", {**WISH, "vary": [rows]}, status=200)
+    assert (planned["cases"], planned["tried"]) == (2, "case-002")
+    answer = client.post(
+        "/api/sweeps/plan", json={**WISH, "vary": [{**rows, "table": [[12, 10], [26]]}]}
+    )
+    assert answer.status_code == 422
+    assert "vary[0]" in answer.json()["error"]["message"]
+
+
 def test_a_sweep_of_a_server_that_has_ended_is_stopped_and_can_be_deleted(
     client: TestClient,
 ) -> None:

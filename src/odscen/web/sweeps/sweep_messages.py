@@ -35,6 +35,18 @@ class VaryWish(RequestBody):
         return {"parameter": self.parameter, **ends}
 
 
+class TableWish(RequestBody):
+    """Parameters that take values together: each row of ``table`` has one for each of them."""
+
+    parameters: Annotated[list[Name], Field(min_length=1, max_length=50)]
+    table: Annotated[list[list[float]], Field(min_length=1, max_length=10_000)]
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """As a plan of a sweep has it."""
+        return {"parameters": self.parameters, "table": self.table}
+
+
 class SweepWish(RequestBody):
     """A sweep of a scenario as it is now; parameters that are not varied keep their values.
 
@@ -44,7 +56,7 @@ class SweepWish(RequestBody):
     """
 
     scenario: Name
-    vary: Annotated[list[VaryWish], Field(min_length=1, max_length=50)]
+    vary: Annotated[list[VaryWish | TableWish], Field(min_length=1, max_length=50)]
     method: Method = "grid"
     samples: Annotated[int, Field(ge=1, le=100_000)] | None = None
     sample_seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
