@@ -11,11 +11,11 @@ from scipy.sparse import csgraph
 
 from odscen.base.errors import InputError
 from odscen.lanegraph import path_finder
-from odscen.lanegraph.chained_distances import ChainedDistances
-from odscen.lanegraph.edge_matrix import shortest_edges
 from odscen.lanegraph.graph_files import to_networkx
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import induced, node_id, node_ids, node_index, walk_node_id
+from odscen.lanegraph.searches.chained_distances import ChainedDistances
+from odscen.lanegraph.searches.edge_matrix import shortest_edges
 from odscen.lanegraph.shortest_paths import Router, WalkRouter
 from tests.graphs import fork, line_of_segments, ring, two_lane_road
 

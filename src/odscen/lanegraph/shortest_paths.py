@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.lanegraph.chained_distances import ChainedDistances
 from odscen.lanegraph.path_finder import PathFinder
 from odscen.lanegraph.query import node_id, walk_node_id
+from odscen.lanegraph.searches.chained_distances import ChainedDistances
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+    from scipy import sparse
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.lanegraph.graphs import MapGraph
@@ -65,6 +67,11 @@ class Router(PathFinder):
             if (np.diff(self._lane[rows]) > 0).all():  # else it is rounding that decides
                 yield spawn, self._on_roads(self.nodes[rows].astype(np.int32))
 
+    def _cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
+        """Blocks end where a junction is left."""
+        inside = self._in_junction[self.nodes]
+        return np.asarray(inside[edges.row] & ~inside[edges.col], dtype=np.bool_)
+
     def is_terminal(self, node: int) -> bool:
         """Whether no edge leaves ``node`` inside the region."""
         return bool(self._is_end[self._local[node]])
@@ -101,6 +108,11 @@ class WalkRouter(PathFinder):
             len(walks.x), walks.source, walks.target, walks.length, walks.lane, mask, directed=False
         )
         self._graph = graph
+
+    def _cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
+        """Blocks are segments."""
+        segment = self._graph.walks.segment[self.nodes]
+        return np.asarray(segment[edges.row] != segment[edges.col], dtype=np.bool_)
 
     def _name(self, node: int) -> str:
         inside_map = 0 <= node < len(self.mask)

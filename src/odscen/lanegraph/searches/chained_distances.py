@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.lanegraph.block_distances import BlockDistances
-from odscen.lanegraph.edge_matrix import shortest_edges
+from odscen.lanegraph.searches.block_distances import BlockDistances
+from odscen.lanegraph.searches.edge_matrix import shortest_edges
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
