@@ -253,12 +253,8 @@ class PathFinder:
         pairs = list(zip(spawns, goals, strict=True))
         found: dict[tuple[int, int], bool] = {}
         if len(spawns) * len(self.nodes) >= _MANY:
-            asked: dict[int, list[int]] = {}
-            for spawn, goal in pairs:
-                if self._holds(spawn) and self._is_closed(spawn):
-                    asked.setdefault(spawn, []).append(goal)
-            for spawn, nodes in self._farthest_from([*asked]):
-                found |= {(spawn, goal): goal in nodes for goal in asked[spawn]}
+            asked = dict.fromkeys(pairs)
+            found |= self._are_farthest([pair for pair in asked if self._is_asked_of_lane(*pair)])
         return [found[one] if one in found else self.is_candidate(*one) for one in pairs]
 
     def _ends_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
@@ -274,6 +270,17 @@ class PathFinder:
     def _farthest_from(self, spawns: Sequence[int]) -> Iterator[tuple[int, Int32Array]]:  # noqa: ARG002
         """Yield spawns that reach no end with their candidates, where that goes sooner."""
         yield from ()
+
+    def _are_farthest(
+        self,
+        pairs: Sequence[tuple[int, int]],  # noqa: ARG002
+    ) -> dict[tuple[int, int], bool]:
+        """Whether goals are the farthest nodes of their lanes, as far as that goes sooner."""
+        return {}
+
+    def _is_asked_of_lane(self, spawn: int, goal: int) -> bool:
+        """Whether a goal of the region can only be the farthest node of its lane."""
+        return self._holds(spawn) and self._holds(goal) and self._is_closed(spawn)
 
     def _is_closed(self, spawn: int) -> bool:
         """Whether no end can be reached from a node of the region, but other nodes."""
