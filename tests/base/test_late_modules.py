@@ -9,7 +9,7 @@ import sys
 def test_paths_do_not_import_what_builds_fortran_and_it_is_there_when_used() -> None:
     code = (
         "import sys; import odscen.lanegraph.shortest_paths; import numpy as np;"
-        "import odscen.lanegraph.graph_searches as s;"
+        "import odscen.lanegraph.searches.graph_searches as s;"
         "print('numpy.f2py.f2py2e' in sys.modules, 'numpy.testing._private' in sys.modules);"
         "np.testing.assert_allclose(1.0, 1.0); from numpy.testing import assert_array_equal;"
         "print('numpy.testing._private' in sys.modules, s.csgraph.__name__)"
@@ -21,7 +21,7 @@ def test_paths_do_not_import_what_builds_fortran_and_it_is_there_when_used() -> 
 def test_paths_do_not_import_linear_algebra_and_the_laplacian_is_there_when_called() -> None:
     code = (
         "import sys; import odscen.lanegraph.shortest_paths; import numpy as np;"
-        "import odscen.lanegraph.graph_searches as s;"
+        "import odscen.lanegraph.searches.graph_searches as s;"
         "print('scipy.linalg' in sys.modules);"
         "print(s.csgraph.laplacian(np.array([[0.0, 1.0], [1.0, 0.0]])).tolist());"
         "print('scipy.sparse.linalg' in sys.modules)"

@@ -11,12 +11,15 @@ from scipy.sparse import csgraph
 
 from odscen.base.errors import InputError
 from odscen.lanegraph import path_finder
-from odscen.lanegraph.chained_distances import ChainedDistances
-from odscen.lanegraph.edge_matrix import shortest_edges
+from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.graph_files import to_networkx
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import induced, node_id, node_ids, node_index, walk_node_id
+from odscen.lanegraph.searches.chained_distances import ChainedDistances
+from odscen.lanegraph.searches.edge_matrix import shortest_edges
 from odscen.lanegraph.shortest_paths import Router, WalkRouter
+from odscen.opendrive.parse import parse
+from odscen.workspace.shipped import shipped_maps
 from tests.graphs import fork, line_of_segments, ring, two_lane_road
 
 FORK = fork()
@@ -210,6 +213,23 @@ def test_distances_along_chains_are_those_over_all_nodes(
     for place, source in enumerate(sources):
         distances = csgraph.dijkstra(matrix, indices=source)
         assert found[place] == pytest.approx(distances, rel=chained.rounding)
+    spans = [(place % count, min(count, place % count + 9)) for place in range(len(sources))]
+    for place, distances in chained.each_at(sources, spans):
+        assert distances.tolist() == found[place][slice(*spans[place])].tolist()
+
+
+def test_on_a_closed_town_goals_of_many_are_those_of_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    (path,) = (one for one in shipped_maps() if one.stem == "town_5x5")
+    odr = parse(path.read_bytes(), file=path.name)
+    router = Router(build_map_graph(odr, name="town", sha256="0" * 64))
+    pairs = []
+    for spawn in np.random.default_rng(1).integers(0, len(router.nodes), 20).tolist():
+        goals = router.goal_candidates(spawn)[::50].tolist()
+        pairs += [(spawn, node) for goal in goals for node in (goal, goal - 1)]
+    expected = [router.is_candidate(*pair) for pair in pairs]
+    assert 0 < sum(expected) < len(expected)
+    monkeypatch.setattr(path_finder, "_MANY", 0)
+    assert router.are_candidates(*zip(*pairs, strict=True)) == expected
 
 
 def test_paths_to_a_node_are_as_long_as_those_from_each_source() -> None:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import InputError
-from odscen.lanegraph.edge_matrix import shortest_edges
-from odscen.lanegraph.graph_searches import csgraph
-from odscen.lanegraph.kept_trees import KEPT_TREES, ROUTERS, Tree
-from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo
+from odscen.lanegraph.searches.corridor_paths import CorridorPaths
+from odscen.lanegraph.searches.edge_matrix import shortest_edges
+from odscen.lanegraph.searches.graph_searches import csgraph
+from odscen.lanegraph.searches.kept_trees import KEPT_TREES, ROUTERS, Tree
+from odscen.lanegraph.searches.paths_to_goal import NO_PREDECESSOR, PathsTo
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -20,11 +21,20 @@ if TYPE_CHECKING:
     from scipy import sparse
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
+    from odscen.lanegraph.searches.corridor_paths import Way
 
 _FEW = 64
 """Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
 _MANY = 1 << 20
 """Nodes, times sources, from which chains are worth their making."""
+_LARGE = 1 << 15
+"""Nodes from which a path is found sooner in its corridor than in the tree of its source."""
+_TREES = 8
+"""Trees that take as long as to cut a graph into blocks."""
+_TO_ONE_BY_ONE = 8
+"""Paths from one source that are found one by one; all of more of them are in one tree."""
+_SOURCES = 32
+"""Sources whose paths are kept."""
 
 
 class PathFinder:
@@ -60,6 +70,8 @@ class PathFinder:
         if not directed:
             self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
         self._number = next(ROUTERS)
+        self._searched = 0
+        self._ways: dict[int, dict[int, Way | None]] = {}
 
     def distances(self, source: int) -> FloatArray:
         """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
@@ -69,6 +81,8 @@ class PathFinder:
 
     def distance(self, source: int, target: int) -> float:
         """Metres from one node to another one; inf if it cannot be reached."""
+        if (way := self._way(source, target)) is not None:
+            return way.metres
         distances = self._from(source).distances
         return float(distances[self._local[target]]) if self.mask[target] else math.inf
 
@@ -78,6 +92,8 @@ class PathFinder:
 
     def path(self, source: int, target: int) -> Int32Array:
         """Nodes of the shortest path, both ends included; empty if there is none."""
+        if (way := self._way(source, target)) is not None:
+            return self.nodes[way.nodes].astype(np.int32)
         distances, predecessors = self._from(source)
         if not self.mask[target] or not np.isfinite(distances[self._local[target]]):
             return np.empty(0, dtype=np.int32)
@@ -86,6 +102,42 @@ class PathFinder:
         while (step := item(step)) != NO_PREDECESSOR:
             steps.append(step)
         return self.nodes[steps[::-1]].astype(np.int32)
+
+    def _way(self, source: int, target: int) -> Way | None:
+        """Find the shortest path in its corridor; ``None`` where it is in a tree sooner."""
+        if len(self.nodes) < _LARGE or self._searched < _TREES or self._corridors is None:
+            return None
+        if not (self._holds(source) and self._holds(target)):
+            return None
+        if KEPT_TREES.get(self._number, source) is not None:
+            return None
+        if len(self._ways) >= _SOURCES and source not in self._ways:
+            self._ways = {}
+        ways = self._ways.setdefault(source, {})
+        if target not in ways and len(ways) < _TO_ONE_BY_ONE:
+            ends = (int(self._local[node]) for node in (source, target))
+            ways[target] = self._corridors.find(*ends)
+        return ways.get(target)
+
+    @cached_property
+    def _corridors(self) -> CorridorPaths | None:
+        """Corridors of the graph; ``None`` if it has none that are of use."""
+        found = CorridorPaths(self._both_ways, self._cuts(self._both_ways.tocoo()))
+        return found if found.is_of_use else None
+
+    @cached_property
+    def _both_ways(self) -> sparse.csr_matrix[np.float64]:
+        """Edges in the directions in which they may be taken."""
+        if self._directed:
+            return self._matrix
+        edges = self._matrix.tocoo()
+        rows = np.concatenate([edges.row, edges.col])
+        columns = np.concatenate([edges.col, edges.row])
+        return shortest_edges(len(self.nodes), rows, columns, np.tile(edges.data, 2))
+
+    def _cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
+        """Whether a block ends at each edge between two nodes of the region; shape ``(E,)``."""
+        return np.asarray(self._lane[edges.row] != self._lane[edges.col], dtype=np.bool_)
 
     def paths_to(self, target: int) -> PathsTo:
         """Shortest paths from everywhere to one node, for many sources with the same target."""
@@ -201,12 +253,8 @@ class PathFinder:
         pairs = list(zip(spawns, goals, strict=True))
         found: dict[tuple[int, int], bool] = {}
         if len(spawns) * len(self.nodes) >= _MANY:
-            asked: dict[int, list[int]] = {}
-            for spawn, goal in pairs:
-                if self._holds(spawn) and self._is_closed(spawn):
-                    asked.setdefault(spawn, []).append(goal)
-            for spawn, nodes in self._farthest_from([*asked]):
-                found |= {(spawn, goal): goal in nodes for goal in asked[spawn]}
+            asked = dict.fromkeys(pairs)
+            found |= self._are_farthest([pair for pair in asked if self._is_asked_of_lane(*pair)])
         return [found[one] if one in found else self.is_candidate(*one) for one in pairs]
 
     def _ends_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
@@ -222,6 +270,17 @@ class PathFinder:
     def _farthest_from(self, spawns: Sequence[int]) -> Iterator[tuple[int, Int32Array]]:  # noqa: ARG002
         """Yield spawns that reach no end with their candidates, where that goes sooner."""
         yield from ()
+
+    def _are_farthest(
+        self,
+        pairs: Sequence[tuple[int, int]],  # noqa: ARG002
+    ) -> dict[tuple[int, int], bool]:
+        """Whether goals are the farthest nodes of their lanes, as far as that goes sooner."""
+        return {}
+
+    def _is_asked_of_lane(self, spawn: int, goal: int) -> bool:
+        """Whether a goal of the region can only be the farthest node of its lane."""
+        return self._holds(spawn) and self._holds(goal) and self._is_closed(spawn)
 
     def _is_closed(self, spawn: int) -> bool:
         """Whether no end can be reached from a node of the region, but other nodes."""
@@ -292,6 +351,7 @@ class PathFinder:
             raise InputError(msg)
         tree = KEPT_TREES.get(self._number, source)
         if tree is None:
+            self._searched += 1
             distances, predecessors = csgraph.dijkstra(
                 self._matrix,
                 directed=self._directed,

@@ -26,8 +26,10 @@ class Street:
 
     def __init__(self, **ahead: Ahead) -> None:
         self._ahead = ahead
+        self.asked: list[str] = []
 
     def ahead(self, name: str) -> Ahead | None:
+        self.asked.append(name)
         return self._ahead.get(name)
 
 
@@ -53,6 +55,17 @@ def test_vehicles_that_wait_for_each_other_are_a_circle() -> None:
         a=FREE._replace(leader="b"), b=FREE._replace(leader="c"), c=FREE._replace(leader="b")
     )
     assert jams.explain(street, "a") == (StopReason.CIRCLE, "c")  # type: ignore[arg-type]
+
+
+def test_queues_with_a_common_head_ask_for_each_vehicle_once() -> None:
+    red = FREE._replace(light="r", open=False)
+    street = Street(
+        a=FREE._replace(leader="c"), b=FREE._replace(leader="c"), c=FREE._replace(leader="d"), d=red
+    )
+    known: dict[str, Ahead | None] = {}
+    found = [jams.explain(street, one, known) for one in ("a", "b")]  # type: ignore[arg-type]
+    assert found == [(StopReason.RED, "d"), (StopReason.RED, "d")]
+    assert street.asked == ["a", "c", "d", "b"]
 
 
 @pytest.mark.parametrize(("until", "dissolved"), [(280.0, False), (400.0, True)])

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.lanegraph.edge_matrix import MIN_EDGE_LENGTH
 from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, LaneGraph, PedestrianGraph, Relation
+from odscen.lanegraph.searches.edge_matrix import MIN_EDGE_LENGTH
 from odscen.scenario.placing.bodies import SIDE_GAP, Crowd, box_at
 
 if TYPE_CHECKING:

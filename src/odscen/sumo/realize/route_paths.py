@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.base.categories import Body
     from odscen.lanegraph.graphs import LaneGraph
-    from odscen.lanegraph.paths_to_goal import PathsTo
+    from odscen.lanegraph.searches.paths_to_goal import PathsTo
     from odscen.lanegraph.shortest_paths import Router, WalkRouter
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser

@@ -96,10 +96,11 @@ class JamWatch:
         over = [lane for lane, seen in self._seen.items() if time - seen >= RELEASE]
         events = [self._end(time, lane) for lane in sorted(over)]
         before, self.stops = self.stops, {}
+        known: dict[str, Ahead | None] = {}
         for lane, queue in sorted(queues.items()):
             first = max(queue, key=lambda one: (one.pos, one.vehicle))
             reason: StopReason | str
-            reason, head = explain(session.stopped, first.vehicle)
+            reason, head = explain(session.stopped, first.vehicle, known)
             if reason in (StopReason.RED, StopReason.UNKNOWN) and first.vehicle in before:
                 reason = before[first.vehicle].reason
             for one in queue:
@@ -143,18 +144,35 @@ class JamWatch:
         return Event(time, EventKind.JAM_END, "", lane=lane, waited=lasted)
 
 
-def explain(stopped: StoppedVehicles, vehicle: str) -> tuple[StopReason, str]:
-    """Why a vehicle is stopped, and the vehicle at the head of its queue."""
-    seen = [vehicle]
-    ahead = stopped.ahead(vehicle)
+def explain(
+    stopped: StoppedVehicles, vehicle: str, known: dict[str, Ahead | None] | None = None
+) -> tuple[StopReason, str]:
+    """Why a vehicle is stopped, and the vehicle at the head of its queue.
+
+    Parameters
+    ----------
+    known
+        What vehicles have ahead in this step; what is asked is added. Where much is stopped, most
+        queues lead to the same few heads, and to ask SUMO takes longer than all else here.
+    """
+    known = {} if known is None else known
+    head, seen = vehicle, {vehicle}
+    ahead = _ahead(stopped, vehicle, known)
     while ahead is not None and _own_reason(ahead) is None and ahead.leader:
         if ahead.leader in seen or len(seen) >= _HOPS:
-            return StopReason.CIRCLE if ahead.leader in seen else StopReason.NO_ROOM, seen[-1]
-        seen.append(ahead.leader)
-        ahead = stopped.ahead(ahead.leader)
+            return StopReason.CIRCLE if ahead.leader in seen else StopReason.NO_ROOM, head
+        head = ahead.leader
+        seen.add(head)
+        ahead = _ahead(stopped, head, known)
     if ahead is None:
-        return StopReason.UNKNOWN, seen[-1]
-    return _own_reason(ahead) or StopReason.UNKNOWN, seen[-1]
+        return StopReason.UNKNOWN, head
+    return _own_reason(ahead) or StopReason.UNKNOWN, head
+
+
+def _ahead(stopped: StoppedVehicles, vehicle: str, known: dict[str, Ahead | None]) -> Ahead | None:
+    if vehicle not in known:
+        known[vehicle] = stopped.ahead(vehicle)
+    return known[vehicle]
 
 
 def _own_reason(ahead: Ahead) -> StopReason | None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.lanegraph.graph_searches import csgraph
+from odscen.lanegraph.searches.graph_searches import csgraph
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -8,12 +8,13 @@ eight is a fork.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.lanegraph.block_distances import BlockDistances
-from odscen.lanegraph.edge_matrix import shortest_edges
+from odscen.lanegraph.searches.block_distances import BlockDistances
+from odscen.lanegraph.searches.edge_matrix import shortest_edges
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -77,15 +78,58 @@ class ChainedDistances:
         Not in the order of ``sources``; inf where no path leads.
         """
         places = self._place[list(sources)].tolist()
-        forks = [
-            source if place < 0 else self._chains[self._chain[place]].end
-            for source, place in zip(sources, places, strict=True)
-        ]
-        for number, found in self._from_forks.each(self._number[forks].tolist()):
+        for number, found in self._from_forks_of(sources, places):
             distances = self._unfolded(found)
             if (place := places[number]) >= 0:
                 self._begin(distances, place)
             yield number, distances
+
+    def each_at(
+        self, sources: Sequence[int], spans: Sequence[tuple[int, int]]
+    ) -> Iterator[tuple[int, FloatArray]]:
+        """Yield place in ``sources`` and metres to the nodes of its span, its end excluded.
+
+        As :meth:`each` has them.
+        """
+        places = self._place[list(sources)].tolist()
+        for number, found in self._from_forks_of(sources, places):
+            nodes = slice(*spans[number])
+            on_chain, at_fork = self._place[nodes], self._number[nodes]
+            distances = np.where(
+                at_fork >= 0,
+                found[at_fork],
+                found[self._head_of[nodes]] + self._metres_of[nodes],
+            )
+            if (place := places[number]) >= 0:
+                chain = self._chains[self._chain[place]]
+                distances += chain.metres - self._metres[place]
+                ahead = (on_chain >= place) & (on_chain < chain.stop)
+                distances[ahead] = self._metres_of[nodes][ahead] - self._metres[place]
+            yield number, distances
+
+    def _from_forks_of(
+        self, sources: Sequence[int], places: Sequence[int]
+    ) -> Iterator[tuple[int, FloatArray]]:
+        """Yield place in ``sources`` and metres of all forks from the fork at or after it."""
+        forks = [
+            source if place < 0 else self._chains[self._chain[place]].end
+            for source, place in zip(sources, places, strict=True)
+        ]
+        yield from self._from_forks.each(self._number[forks].tolist())
+
+    @cached_property
+    def _head_of(self) -> Int32Array:
+        """Number of the fork before each node, 0 for forks."""
+        heads = np.zeros(self._count, dtype=np.int32)
+        heads[self._nodes] = self._head
+        return heads
+
+    @cached_property
+    def _metres_of(self) -> FloatArray:
+        """Metres of each node from the fork before it, 0 for forks."""
+        metres = np.zeros(self._count)
+        metres[self._nodes] = self._metres
+        return metres
 
     def _unfolded(self, of_forks: FloatArray) -> FloatArray:
         """Distances of all nodes from those of the forks."""

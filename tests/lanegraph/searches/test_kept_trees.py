@@ -5,8 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from odscen.lanegraph import kept_trees
-from odscen.lanegraph.kept_trees import KEPT_TREES
+from odscen.lanegraph.searches import kept_trees
+from odscen.lanegraph.searches.kept_trees import KEPT_TREES
 from odscen.lanegraph.shortest_paths import Router
 from tests.graphs import ring, two_lane_road
 
