@@ -1,7 +1,8 @@
 """What timing lights after demand gains: delay, paired over five seeds, with 95 % intervals.
 
-Four comparisons on shipped maps, twenty minutes each and an hour with buses: Webster's splits
-against equal ones with the same cycle; a green wave against lights that begin at once; actuated
+Five comparisons on shipped maps, twenty minutes each and an hour with buses: Webster's splits
+against equal ones with the same cycle; left turns with an arrow beside gaps, where the volumes ask
+for it, against gaps alone; a green wave against lights that begin at once; actuated
 against fixed-time control at half the demand; priority for buses. Prints the table of
 ``docs/signals.md``. A change is significant where its interval does not contain 0.
 
@@ -28,6 +29,7 @@ from odscen.app.maps import load_map
 from odscen.app.running.runs import run
 from odscen.app.signals.green_waves import coordinate_signals
 from odscen.app.signals.signal_optimisation import time_signals
+from odscen.app.signals.turn_arrows import with_turn_arrows
 from odscen.base.categories import Category
 from odscen.lanegraph.query import node_id
 from odscen.scenario import edits
@@ -86,6 +88,7 @@ def main() -> None:
         print("|---|---|---|---|")
         bench = _Bench(workspace)
         bench.splits()
+        bench.arrows()
         bench.wave()
         bench.actuation()
         bench.buses()
@@ -104,6 +107,15 @@ class _Bench:
                 f"Webster's splits against equal ones, {self._words(level)}",
                 lambda seed, f=level: self._timed(self._crossing(seed, f), equal=True),
                 lambda seed, f=level: self._timed(self._crossing(seed, f)),
+                ("every",),
+            )
+
+    def arrows(self) -> None:
+        for level in LEVELS:
+            self._compare(
+                f"protected-permissive against permissive left turns, {self._words(level)}",
+                lambda seed, f=level: self._timed(self._crossing(seed, f)),
+                lambda seed, f=level: self._timed(self._with_arrows(self._crossing(seed, f))),
                 ("every",),
             )
 
@@ -218,6 +230,9 @@ class _Bench:
         (timing,) = timed.scenario.signals.junctions
         entry = changed_part(timing, {"green": same})
         return with_fields(scenario, signals=Signals(junctions=(entry,)))
+
+    def _with_arrows(self, scenario: Scenario) -> Scenario:
+        return with_turn_arrows(self._workspace, scenario)[0]
 
     def _waved(self, seed: int, favoured: str, *, offsets: bool) -> Scenario:
         found = coordinate_signals(

@@ -67,6 +67,15 @@ def test_lights_are_timed_after_the_demand(workspace: Path, tmp_path: Path) -> N
     table = odscen("signals", "webster", file, "-o", out, "--workspace", workspace).out
     assert "flow ratio" in table
     assert "v/c" in table
+    few = odscen(
+        "signals", "webster", file, "--turn-arrows", "-o", out, "--workspace", workspace, "--json"
+    )
+    assert few.json["arrows"] == []
+    busy = placed(
+        workspace, scenario(None, vehicles=900.0), "signal_crossing", tmp_path / "two.scenario.json"
+    )
+    told = odscen("signals", "webster", busy, "--turn-arrows", "-o", out, "--workspace", workspace)
+    assert "the left turn from r1 has got an arrow" in told.err
     wrong = odscen("signals", "webster", file, "--end", 9000, "--workspace", workspace, "--json")
     assert wrong.code != 0
     assert "which lasts 600 s" in wrong.json["error"]["message"]

@@ -154,6 +154,13 @@ def webster(
     ] = 1900.0,
     shortest: Annotated[float, typer.Option(help="Shortest cycle, seconds.")] = 40.0,
     longest: Annotated[float, typer.Option(help="Longest cycle, seconds.")] = 120.0,
+    turn_arrows: Annotated[
+        bool,
+        typer.Option(
+            help="Give turns across oncoming traffic a protected stage beside their permissive one "
+            "where the volumes ask for it."
+        ),
+    ] = False,
     out: OutOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
@@ -161,11 +168,18 @@ def webster(
     """Time lights after the demand: cycle and splits by Webster's method."""
     from odscen.app import scenarios
     from odscen.app.signals.signal_optimisation import time_signals
+    from odscen.app.signals.turn_arrows import with_turn_arrows
     from odscen.workspace.store import Workspace
 
+    store = Workspace.open(workspace)
+    given, arrows = (
+        with_turn_arrows(store, scenario, junctions=junction or (), begin=begin, end=end)
+        if turn_arrows
+        else (scenario, ())
+    )
     timed = time_signals(
-        Workspace.open(workspace),
-        scenario,
+        store,
+        given,
         junctions=junction or (),
         begin=begin,
         end=end,
@@ -174,8 +188,14 @@ def webster(
     )
     path = scenarios.write_scenario(timed.scenario, out or scenario)
     if as_json:
-        print_json({"scenario": str(path), **timed.to_dict()})
+        found = {"arrows": [arrow._asdict() for arrow in arrows]} if turn_arrows else {}
+        print_json({"scenario": str(path), **timed.to_dict(), **found})
         return
+    for arrow in arrows:
+        log(
+            f"junction {arrow.junction}: the {arrow.turn} turn from {arrow.approach} has got an "
+            f"arrow ({arrow.vehicles:.0f} vehicles an hour across {arrow.opposing:.0f})"
+        )
     for light in timed.lights:
         print_timed_light(light)
     for name in timed.without:

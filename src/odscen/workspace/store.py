@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from odscen.workspace.asset_catalogue import Assets
     from odscen.workspace.converters import GivenNetwork
 
-BUILDER = "11"
+BUILDER = "12"
 """Raised whenever what a map folder contains changes; older folders are then rebuilt."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"

@@ -61,6 +61,25 @@ def test_turns_through_gaps_wait_for_the_queue_that_comes_towards_them(
     assert all(one.blocked == 0.0 for one in loads.values() if one.turns != ("left",))
 
 
+def test_cars_keep_off_the_lanes_of_bicycles(workspace: Workspace) -> None:
+    """Lane -3 of each leg is for bicycles: it carried half of the cars that went straight on."""
+    one = placed(workspace, scenario(None, vehicles=500.0))
+    flow = one.flows[0]
+    riders = flow.model_copy(update={"id": "riders", "per_hour": 120.0, "mix": {"bicycle": 1.0}})
+    mixed = one.model_copy(update={"flows": (*one.flows, riders)})
+    loads = {
+        name: {
+            lane.load.lane: lane.load.volume
+            for lane in time_signals(workspace, two).lights[0].lanes
+        }
+        for name, two in (("cars", one), ("mixed", mixed))
+    }
+    assert not [lane for lane in loads["cars"] if lane.endswith("-3")]
+    beside = {lane: volume for lane, volume in loads["mixed"].items() if lane.endswith("-3")}
+    assert 0.0 < sum(beside.values()) <= 120.0
+    assert len(beside) == 1
+
+
 def test_greens_of_the_map_and_of_a_program_are_replaced_and_add_up(workspace: Workspace) -> None:
     for junction in (None, one_plan(cycle=None, on_call=None)):
         one = placed(workspace, scenario(junction, vehicles=500.0))

@@ -168,6 +168,16 @@ def test_nobody_enters_a_junction_so_far_that_the_flank_of_a_bus_touches_it(tmp_
     assert pairs_on_town07(tmp_path, *paths, *delays, lit=True)["safety"]["collisions"] == "0"
 
 
+@pytest.mark.parametrize("waiting", ["car", "bus"])
+def test_nobody_waits_where_a_bus_comes_to_that_goes_straight_on_in_an_s(
+    tmp_path: Path, waiting: str
+) -> None:
+    """A bus swings out to where others waited: 49 of these 80 pairs of buses touched."""
+    delays = [-6.0 + 0.15 * n for n in range(80)]
+    paths = ("bus", "0.0.b 55.0.f"), (waiting, "55.0.b 45.0.f")
+    assert pairs_on_town07(tmp_path, *paths, *delays, lit=True)["safety"]["collisions"] == "0"
+
+
 @each_map()
 def test_only_lanes_beside_the_own_path_are_seen_besides_those_that_lead_in(path: Path) -> None:
     made = converted(path)

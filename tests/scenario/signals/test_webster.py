@@ -7,6 +7,7 @@ import math
 import pytest
 
 from odscen.scenario.signals.webster import (
+    GapGreen,
     LaneNeed,
     StageNeed,
     critical_ratios,
@@ -70,6 +71,32 @@ def test_what_a_lane_with_two_stages_lacks_is_divided_among_them() -> None:
     assert critical_ratios(lanes, 2) == pytest.approx((0.4, 0.2))
     assert critical_ratios([LaneNeed(0.6, (0, 1))], 2) == pytest.approx((0.3, 0.3))
     assert critical_ratios([LaneNeed(0.6, ())], 2) == (0.0, 0.0)
+
+
+def test_a_protected_permissive_turn_needs_what_gaps_do_not_carry() -> None:
+    # 0.3 of the cycle are 0.45 with half as much spare; 0.2 go by with the oncoming queue, the rest
+    # (0.25 of 0.8) has gaps for half the saturation flow: 0.156 of 0.25.
+    turn = LaneNeed(0.25, (1,), (GapGreen(0, 0.5, 0.2),))
+    found = critical_ratios([turn, LaneNeed(0.3, (0,))], 2, spare=1.5)
+    assert found == pytest.approx((0.3, 0.09375))
+    assert critical_ratios([LaneNeed(0.3, (0,)), turn], 2) == pytest.approx((0.3, 0.1875))
+    few = turn._replace(ratio=0.05)
+    assert critical_ratios([LaneNeed(0.3, (0,)), few], 2) == pytest.approx((0.3, 0.0))
+
+
+def test_greens_of_a_protected_permissive_turn_carry_it() -> None:
+    stages = (StageNeed(8.0), StageNeed(6.0), StageNeed(8.0))
+    lanes = [
+        LaneNeed(0.3, (0,)),
+        LaneNeed(0.2, (2,)),
+        LaneNeed(0.2, (1,), (GapGreen(0, 0.5, 0.3),)),
+    ]
+    splits = webster(stages, lanes, between=18.0)
+    through, arrow, _ = (green / splits.cycle for green in splits.greens)
+    carried = arrow + (through - 0.3) / 0.7 * 0.5
+    assert through > 0.3
+    assert 0.2 <= carried < 0.3, "half as much again at most: greens are in proportion"
+    assert splits.ratios[1] < 0.2
 
 
 def test_greens_are_whole_seconds_that_add_up() -> None:

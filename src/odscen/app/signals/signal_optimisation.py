@@ -174,6 +174,21 @@ def chosen_lights(loaded: LoadedMap, junctions: Sequence[str]) -> list[int]:
     return list(dict.fromkeys(found)) if junctions else list(range(len(loaded.lights)))
 
 
+def refuse_interval(scenario: Scenario, begin: float | None, end: float | None) -> None:
+    """Refuse seconds that are no part of a scenario.
+
+    Raises
+    ------
+    InputError
+        With the interval and the duration.
+    """
+    duration = scenario.simulation.duration
+    first, last = begin or 0.0, duration if end is None else end
+    if not 0.0 <= first < last <= duration:
+        msg = f"{first:g} to {last:g} s is no part of the scenario, which lasts {duration:g} s"
+        raise InputError(msg)
+
+
 def _refuse_settings(
     scenario: Scenario,
     begin: float | None,
@@ -181,11 +196,7 @@ def _refuse_settings(
     saturation: float,
     bounds: tuple[float, float],
 ) -> None:
-    duration = scenario.simulation.duration
-    first, last = begin or 0.0, duration if end is None else end
-    if not 0.0 <= first < last <= duration:
-        msg = f"{first:g} to {last:g} s is no part of the scenario, which lasts {duration:g} s"
-        raise InputError(msg)
+    refuse_interval(scenario, begin, end)
     if not 0.0 < bounds[0] <= bounds[1]:
         msg = f"a shortest cycle of {bounds[0]:g} s and a longest of {bounds[1]:g} s: none is both"
         raise InputError(msg)

@@ -10,6 +10,7 @@ import shapely
 
 from odscen.base.ids import SumoEdgeId
 from odscen.convert.building.junction_ruling import junction_kind, ruled, signposts
+from odscen.convert.building.swept_paths import swept_width
 from odscen.convert.building.waiting_places import inner_junctions, waiting_places
 from odscen.convert.model.lane_alignment import divided_shape, drawn_length
 from odscen.convert.model.net import (
@@ -37,13 +38,6 @@ if TYPE_CHECKING:
     from odscen.convert.building.junction_ruling import Ruling
     from odscen.convert.model.right_of_way import Conflicts, Movement
     from odscen.convert.model.walk_net import PlacedCrossing
-
-
-BUS_LENGTH = 12.0
-"""Metres of the longest body that turns are made for."""
-
-MOST_SWEPT = 4.0
-"""Metres that are added to the width of an internal lane, at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,17 +195,6 @@ def _obeying(passages: Sequence[Passage]) -> list[Passage]:
     return result
 
 
-def _swept(passage: Passage) -> float:
-    """Metres that a bus takes up beside its lane in a turn: SUMO keeps others off a lane's width.
-
-    SUMO draws a body as the chord of its path, so that the middle lies inside of it by the sagitta
-    of a circle. Half of what a lane is wider lies on that side: hence twice the sagitta.
-    """
-    turn = abs(passage.movement.turn)
-    radius = passage.length / max(turn, 1e-3)
-    return min(2.0 * BUS_LENGTH**2 / (8.0 * radius), MOST_SWEPT)
-
-
 class _Inside:
     """Internal lanes and links of a junction's passages."""
 
@@ -272,7 +255,7 @@ def _inner_lane(edge: SumoEdgeId, passage: Passage) -> NetLane:
         0,
         round(max(passage.length, LEAST_LENGTH), 4),
         passage.speed,
-        round(passage.movement.width + _swept(passage), 2),
+        round(passage.movement.width + swept_width(passage.movement, passage.length), 2),
         passage.allowed,
         passage.movement.shape,
         passage.type,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import shapely
 
+from odscen.convert.building.swept_paths import bent_aside
 from odscen.convert.model.net import NetJunction
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
 from odscen.convert.model.right_of_way import MOST_WIDTH, OPPOSING, wrapped
@@ -97,8 +98,9 @@ def waiting_places(
 
 
 def _clear(one: Movement, other: Movement) -> float:
-    """Metres between paths at which even a lorry that waits is not in the way of another."""
-    return max(MOST_WIDTH, min(WIDEST, 0.9 * min(one.width, other.width)))
+    """Metres between paths at which even a lorry that waits is not in the way of a bus."""
+    apart = max(MOST_WIDTH, min(WIDEST, 0.9 * min(one.width, other.width)))
+    return apart + bent_aside(other)
 
 
 def _comes_towards(one: Movement, other: Movement) -> bool:

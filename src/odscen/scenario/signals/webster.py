@@ -32,6 +32,9 @@ CRITICAL_GAP, FOLLOW_UP = 4.5, 2.5
 HARDEST_LEFT = 8.0
 """Passenger cars for one permissive left turn, at most: some turn when the green ends."""
 
+_ROUNDS = 8
+"""What gaps carry depends on the greens, and these on what it leaves: found in rounds."""
+
 SHORTEST_CYCLE, LONGEST_CYCLE = 40.0, 120.0
 """Seconds."""
 
@@ -54,11 +57,34 @@ class StageNeed(NamedTuple):
     fixed: bool = False
 
 
+class GapGreen(NamedTuple):
+    """Green through gaps of a lane that in other stages has it without giving way.
+
+    Attributes
+    ----------
+    stage
+        Number of the stage.
+    share
+        Part of its saturation flow that a lane has through gaps.
+    blocked
+        Flow ratio of the oncoming queue that leaves none.
+    """
+
+    stage: int
+    share: float
+    blocked: float
+
+
 class LaneNeed(NamedTuple):
-    """Flow ratio of a lane at the stop line, and the stages (by number) in which it has green."""
+    """Flow ratio of a lane at the stop line, and the stages (by number) in which it has green.
+
+    ``gaps`` are those in which a protected-permissive turn gives way; what they carry its
+    protected ``stages`` need not.
+    """
 
     ratio: float
     stages: tuple[int, ...]
+    gaps: tuple[GapGreen, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,16 +131,28 @@ def left_turn_equivalent(opposing: float, saturation: float = SATURATION_FLOW) -
     return min(max(saturation / filtered, PROTECTED_LEFT), HARDEST_LEFT)
 
 
-def critical_ratios(lanes: Sequence[LaneNeed], stages: int) -> tuple[float, ...]:
+def critical_ratios(
+    lanes: Sequence[LaneNeed], stages: int, *, spare: float = 1.0
+) -> tuple[float, ...]:
     """Flow ratio of each stage that its critical lane needs.
 
     Lanes with green in one stage come first; what one with several still lacks is divided among
-    those stages in proportion to what they have.
+    those stages in proportion to what they have. Protected-permissive turns come last, with what
+    the gaps in the green of others do not carry (HCM 7th edition, chapter 31).
+
+    Parameters
+    ----------
+    spare
+        Share of the cycle that a stage has as green, over its flow ratio.
     """
     ratios = [0.0] * stages
-    for lane in sorted(lanes, key=lambda one: (len(one.stages), -one.ratio)):
+    for lane in sorted(lanes, key=lambda one: (len(one.gaps), len(one.stages), -one.ratio)):
         had = sum(ratios[stage] for stage in lane.stages)
-        lack = lane.ratio - had
+        filtered = sum(
+            max(ratios[n] * spare - blocked, 0.0) / (1.0 - blocked) * share
+            for n, share, blocked in lane.gaps
+        )
+        lack = lane.ratio - had - filtered
         if not lane.stages or lack <= 0.0:
             continue
         for stage in lane.stages:
@@ -142,12 +180,15 @@ def webster(
         Seconds of a cycle that is given.
     """
     ratios = critical_ratios(lanes, len(stages))
-    served = [not stage.fixed and ratio > 0.0 for stage, ratio in zip(stages, ratios, strict=True)]
-    lost = between + sum(
-        -stage.more if green else stage.least for stage, green in zip(stages, served, strict=True)
-    )
-    total = sum(ratios)
-    wanted = (1.5 * lost + 5.0) / (1.0 - total) if total < 1.0 else math.inf
+    lost = _lost_time(stages, ratios, between)
+    wanted = _wanted(lost, sum(ratios))
+    if any(lane.gaps for lane in lanes):
+        for _ in range(_ROUNDS):
+            length = min(max(wanted if cycle is None else cycle, bounds[0]), bounds[1])
+            spare = max((1.0 - lost / length) / sum(ratios), 1.0) if any(ratios) else 1.0
+            ratios = critical_ratios(lanes, len(stages), spare=spare)
+            lost = _lost_time(stages, ratios, between)
+            wanted = _wanted(lost, sum(ratios))
     if cycle is None:
         cycle = min(max(wanted, bounds[0]), bounds[1])
         cycle = float(math.ceil(cycle - 1e-9))
@@ -155,6 +196,18 @@ def webster(
     cycle = max(cycle, least)
     greens = divided_greens(stages, ratios, cycle - between)
     return Splits(cycle, greens, ratios, lost, wanted)
+
+
+def _lost_time(stages: Sequence[StageNeed], ratios: Sequence[float], between: float) -> float:
+    """Seconds of a cycle in which no stage with traffic has green."""
+    return between + sum(
+        -stage.more if ratio > 0.0 and not stage.fixed else stage.least
+        for stage, ratio in zip(stages, ratios, strict=True)
+    )
+
+
+def _wanted(lost: float, total: float) -> float:
+    return (1.5 * lost + 5.0) / (1.0 - total) if total < 1.0 else math.inf
 
 
 def divided_greens(

@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError
 from odscen.scenario.signals.green_wave import GreenWindow, WaveLight
-from odscen.sumo.calibrate.turning_volumes import Turn, turns_of
+from odscen.sumo.calibrate.turning_volumes import DRIVEN, Turn, turns_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.results.records.light_programs import ProgramPhase
     from odscen.sumo.realize.sumo_map import SumoMap
-
-DRIVEN = "passenger"
-"""SUMO's class of the vehicles that a corridor is for."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,11 @@ from odscen.scenario.signals.webster import (
     HEAVY,
     PROTECTED_LEFT,
     RIGHT_TURN,
+    GapGreen,
     LaneNeed,
     left_turn_equivalent,
 )
-from odscen.sumo.calibrate.turning_volumes import TurnVolume, turns_of
+from odscen.sumo.calibrate.turning_volumes import DRIVEN, TurnVolume, turns_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -56,6 +57,8 @@ class LaneLoad:
     blocked
         Flow ratio of the oncoming queue that its permissive turns wait for: as long as that moves
         off, there are no gaps (HCM, permitted left turns: unsaturated green).
+    gaps
+        Of protected-permissive turns: part of ``saturation`` that they have where they give way.
     """
 
     lane: str
@@ -64,16 +67,38 @@ class LaneLoad:
     saturation: float
     links: tuple[int, ...]
     blocked: float = 0.0
+    gaps: float | None = None
 
     @property
     def ratio(self) -> float:
-        """Flow ratio: share of the cycle that it needs as green."""
-        return self.blocked + (1.0 - self.blocked) * self.volume / self.saturation
+        """Flow ratio: share of the cycle that it needs as green without giving way, if it has."""
+        ratio = self.volume / self.saturation
+        return ratio if self.gaps is not None else self.blocked + (1.0 - self.blocked) * ratio
 
     def green(self, phases: Sequence[ProgramPhase]) -> float:
         """Seconds of a cycle in which all movements that use it have green."""
         shown = (phase for phase in phases if all(phase.state[n] in "Gg" for n in self.links))
         return sum(phase.seconds for phase in shown)
+
+    def degree(self, phases: Sequence[ProgramPhase]) -> float | None:
+        """Degree of saturation (v/c); ``None`` if its movements never have green together."""
+        cycle = sum(phase.seconds for phase in phases)
+        share = self.green(phases) / cycle
+        if self.gaps is not None:
+            yields = [p for p in phases if any(p.state[n] == "g" for n in self.links)]
+            filtered = sum(phase.seconds for phase in yields) / cycle
+            unsaturated = max(filtered - self.blocked, 0.0) / (1.0 - self.blocked)
+            share += unsaturated * self.gaps - filtered
+        return self.ratio / share if share > 0.0 else None
+
+
+class _Stream(NamedTuple):
+    """Vehicles an hour of one turn, and the links that they may take."""
+
+    links: tuple[int, ...]
+    turn: Turn
+    vehicles: float
+    heavy: float
 
 
 class LightDemand:
@@ -98,6 +123,7 @@ class LightDemand:
         saturation: float,
     ) -> None:
         self._light, self._view, self._phases = light, view, phases
+        self._net = sumo_map.net
         self._base = saturation
         self._near_side = "left" if sumo_map.net.lefthand else "right"
         self._turns = turns_of(light, sumo_map)
@@ -111,7 +137,8 @@ class LightDemand:
         found = []
         for turn, links in self._turns.items():
             one = self._view.movements[links[0]]
-            found.append(MovementVolume(one.name, one.turn, *self._volumes[turn]))
+            volume = self._volumes[turn]
+            found.append(MovementVolume(one.name, one.turn, volume.vehicles, volume.heavy))
         return tuple(found)
 
     def needs(self) -> tuple[LaneNeed, ...]:
@@ -119,6 +146,16 @@ class LightDemand:
         stages = [phase for phase in self._phases if phase.stage]
         found = []
         for lane in self.lanes:
+            if lane.gaps is not None:
+                shown = [{phase.state[n] for n in lane.links} for phase in stages]
+                free = tuple(number for number, letters in enumerate(shown) if letters == {"G"})
+                gaps = tuple(
+                    GapGreen(number, lane.gaps, lane.blocked)
+                    for number, letters in enumerate(shown)
+                    if "g" in letters
+                )
+                found.append(LaneNeed(lane.ratio, free, gaps))
+                continue
             for quorum in (all, any):
                 green = tuple(
                     number
@@ -135,17 +172,14 @@ class LightDemand:
         work: dict[str, float] = defaultdict(float)
         cars: dict[str, float] = defaultdict(float)
         links: dict[str, set[int]] = defaultdict(set)
-        for turn, own in sorted(self._turns.items(), key=lambda item: (len(item[1]), item[0])):
-            volume = self._volumes[turn]
-            if not volume.vehicles:
-                continue
-            weight = 1.0 + (HEAVY - 1.0) * volume.heavy / volume.vehicles
-            needs = {n: weight * self._equivalent(n) / self._base for n in own}
+        for stream in sorted(self._streams(), key=lambda one: (len(one.links), one.turn)):
+            weight = 1.0 + (HEAVY - 1.0) * stream.heavy / stream.vehicles
+            needs = {n: weight * self._equivalent(n) / self._base for n in stream.links}
             for _ in range(_SHARES):
-                n = min(own, key=lambda n: (work[self._light.links[n].source] + needs[n], n))
+                n = min(needs, key=lambda n: (work[self._light.links[n].source] + needs[n], n))
                 lane = self._light.links[n].source
-                work[lane] += volume.vehicles / _SHARES * needs[n]
-                cars[lane] += volume.vehicles / _SHARES
+                work[lane] += stream.vehicles / _SHARES * needs[n]
+                cars[lane] += stream.vehicles / _SHARES
                 links[lane].add(n)
         loads = [
             LaneLoad(
@@ -155,11 +189,35 @@ class LightDemand:
             )
             for lane in sorted(cars, key=lambda lane: min(links[lane]))
         ]  # fmt: skip
-        return tuple(replace(load, blocked=self._blocked(load, loads)) for load in loads)
+        return tuple(
+            replace(load, blocked=self._blocked(load, loads), gaps=self._gaps(load))
+            for load in loads
+        )
+
+    def _streams(self) -> list[_Stream]:
+        """Vehicles by the lanes that are open to them: bicycles take theirs, if there is one."""
+        found = []
+        for turn, own in self._turns.items():
+            volume, lanes = self._volumes[turn], self._net.lanes
+            driven = tuple(n for n in own if lanes[self._light.links[n].source].allows(DRIVEN))
+            beside = tuple(n for n in own if n not in driven)
+            apart = volume.bicycles if driven and beside else 0.0
+            found += [
+                _Stream(driven or own, turn, volume.vehicles - apart, volume.heavy),
+                _Stream(beside, turn, apart, 0.0),
+            ]
+        return [one for one in found if one.vehicles > 0.0]
+
+    def _gaps(self, load: LaneLoad) -> float | None:
+        """What a lane of protected-permissive turns alone carries through gaps, as a share."""
+        if not all(self._both(n) for n in load.links):
+            return None
+        across = max(self._opposing(n) for n in load.links)
+        return PROTECTED_LEFT / left_turn_equivalent(across, self._base)
 
     def _blocked(self, load: LaneLoad, loads: Sequence[LaneLoad]) -> float:
-        """Flow ratio of the queue that a lane of permissive turns alone waits for."""
-        if not all(self._permissive(n) for n in load.links):
+        """Flow ratio of the queue that a lane of turns through gaps alone waits for."""
+        if not all(self._permissive(n) or self._both(n) for n in load.links):
             return 0.0
         before = {other for n in load.links for other in self._given_way(n)}
         return max((one.ratio for one in loads if before & set(one.links)), default=0.0)
@@ -176,9 +234,17 @@ class LightDemand:
 
     def _permissive(self, link: int) -> bool:
         """Whether a turn across has the green that gives way in all of its stages."""
-        turn = self._view.movements[link].turn
-        letters = {phase.state[link] for phase in self._phases if phase.stage}
-        return turn not in {"straight", self._near_side} and "g" in letters and "G" not in letters
+        return self._letters(link) == {"g"}
+
+    def _both(self, link: int) -> bool:
+        """Whether a turn across gives way in some of its stages and is protected in others."""
+        return self._letters(link) == {"g", "G"}
+
+    def _letters(self, link: int) -> set[str]:
+        """Greens of a turn across in its stages; none of other movements."""
+        if self._view.movements[link].turn in {"straight", self._near_side}:
+            return set()
+        return {phase.state[link] for phase in self._phases if phase.stage} & {"g", "G"}
 
     def _given_way(self, link: int) -> set[int]:
         """Movements that have green together with one that gives way to them."""

@@ -133,14 +133,10 @@ def timed_light(
     between = sum(phase.seconds for phase in phases if not phase.stage)
     splits = webster(needs, demand.needs(), between=between, bounds=bounds, cycle=cycle)
     new = with_greens(phases, splits.greens)
-    lanes = []
-    for load in demand.lanes:
-        green = load.green(new)
-        share = green / splits.cycle
-        lanes.append(TimedLane(load, green, load.ratio / share if share else None))
+    lanes = tuple(TimedLane(load, load.green(new), load.degree(new)) for load in demand.lanes)
     before = light_times(shown, timing, begin)
     times = replace(before, green=splits.greens, cycle=splits.cycle)
-    return TimedLight(times, before, splits, demand.movements, tuple(lanes))
+    return TimedLight(times, before, splits, demand.movements, lanes)
 
 
 def light_times(shown: LightProgram, timing: JunctionTiming | None, begin: float) -> LightTimes:
@@ -190,6 +186,8 @@ def stage_needs(
     their ``min_green``, or 8 s (less where the stage has less), and 7 s with a crossing.
     """
     own = {stage.id: stage.min_green for stage in timing.stages} if timing else {}
+    letters = list(zip(*(phase.state for phase in phases if phase.stage), strict=True))
+    both = {n for n, shown in enumerate(letters) if {"g", "G"} <= set(shown)}
     found = []
     for number, phase in enumerate(phases):
         if not phase.stage:
@@ -203,18 +201,22 @@ def stage_needs(
         least = min(LEAST_GREEN, phase.seconds) if given is None else given
         if green - cars:
             least = max(least, min(WALK_GREEN, phase.seconds))
-        more = _green_beside(phases[number + 1 :], cars) + _green_beside(
-            phases[:number][::-1], cars
+        shown = {n: "G" if n in both and phase.state[n] == "G" else "Gg" for n in cars}
+        more = _green_beside(phases[number + 1 :], shown) + _green_beside(
+            phases[:number][::-1], shown
         )
         found.append(StageNeed(least, more))
     return tuple(found)
 
 
-def _green_beside(phases: Sequence[ProgramPhase], links: set[int]) -> float:
-    """Seconds in which links keep their green in the phases next to a stage."""
+def _green_beside(phases: Sequence[ProgramPhase], shown: Mapping[int, str]) -> float:
+    """Seconds in which links keep their greens (letters) in the phases next to a stage.
+
+    A protected-permissive turn that is protected in the stage does not keep that by giving way.
+    """
     seconds = 0.0
     for phase in phases:
-        if phase.stage or any(phase.state[n] not in "Gg" for n in links):
+        if phase.stage or any(phase.state[n] not in greens for n, greens in shown.items()):
             break
         seconds += phase.seconds
     return seconds

@@ -28,6 +28,9 @@ HOUR = 3600.0
 _STEP = 300.0
 """Seconds between the hours among which the busiest one is looked for."""
 
+DRIVEN = "passenger"
+"""Class of vehicles that lanes for cars are open to."""
+
 HEAVY_CATEGORIES = frozenset({Category.TRUCK, Category.BUS})
 
 
@@ -39,10 +42,11 @@ class Turn(NamedTuple):
 
 
 class TurnVolume(NamedTuple):
-    """Vehicles an hour, and how many of them are trucks and buses."""
+    """Vehicles an hour, and how many of them are trucks and buses, and bicycles."""
 
     vehicles: float
     heavy: float
+    bicycles: float = 0.0
 
 
 class PlannedVehicle(NamedTuple):
@@ -124,13 +128,19 @@ def turning_volumes(
     begin, end = begin or 0.0, duration if end is None else end
     every: Counter[Turn] = Counter()
     heavy: Counter[Turn] = Counter()
+    bicycles: Counter[Turn] = Counter()
     for one in vehicles:
         if begin <= one.depart < end:
             every.update(one.turns)
             if one.category in HEAVY_CATEGORIES:
                 heavy.update(one.turns)
+            elif one.category == Category.BICYCLE:
+                bicycles.update(one.turns)
     hours = (end - begin) / HOUR
-    found = {turn: TurnVolume(every[turn] / hours, heavy[turn] / hours) for turn in sorted(every)}
+    found = {
+        turn: TurnVolume(every[turn] / hours, heavy[turn] / hours, bicycles[turn] / hours)
+        for turn in sorted(every)
+    }
     return Volumes(begin, end, found)
 
 
