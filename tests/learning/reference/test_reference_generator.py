@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import json
+
 import numpy as np
 import pytest
 
@@ -14,7 +17,12 @@ from odscen.learning.reference.reference_generator import (
     ReferenceGenerator,
     shipped_model,
 )
-from odscen.learning.reference.traffic_model import model_bytes, model_from_bytes, speed_class
+from odscen.learning.reference.traffic_model import (
+    VERSION,
+    model_bytes,
+    model_from_bytes,
+    speed_class,
+)
 from odscen.learning.traffic_snapshots import LightView, SignalAhead, no_lights
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.placing.region import Region
@@ -41,6 +49,16 @@ def test_the_weights_are_small_and_say_what_they_were_trained_on() -> None:
     assert model_bytes(model_from_bytes(data, file=WEIGHTS)) == data
     with pytest.raises(InputError, match="no model"):
         model_from_bytes(data[:2000], file="cut.npz")
+
+
+def test_weights_of_another_version_are_refused_with_both_versions() -> None:
+    buffer = io.BytesIO()
+    with np.load(io.BytesIO(model_bytes(shipped_model()))) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    head = json.loads(str(arrays["about"][0])) | {"version": VERSION - 1}
+    np.savez(buffer, allow_pickle=False, **arrays | {"about": np.array([json.dumps(head)])})
+    with pytest.raises(InputError, match=f"version is {VERSION - 1}; .* reads {VERSION}"):
+        model_from_bytes(buffer.getvalue(), file="old.npz")
 
 
 def test_it_places_about_as_many_as_are_wanted_and_nearly_all_pass_the_check() -> None:
