@@ -10,6 +10,17 @@ import pytest
 from tests.cli.conftest import SHIPPED, odscen
 
 
+@pytest.fixture
+def in_the_foreground():
+    """Let commands hear SIGINT, even if these tests run in the background of a shell.
+
+    There it is ignored, also by all that is started.
+    """
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -36,6 +47,7 @@ def test_the_same_map_can_be_added_several_times_at_once(tmp_path):
     assert [path.name for path in (tmp_path / "maps").iterdir()] == ["roundabout"]
 
 
+@pytest.mark.usefixtures("in_the_foreground")
 @pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a POSIX terminal does")
 def test_an_interrupted_run_leaves_nothing(workspace, tmp_path):
     w = ("--workspace", workspace)
@@ -61,6 +73,7 @@ def test_an_interrupted_run_leaves_nothing(workspace, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("in_the_foreground")
 @pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a POSIX terminal does")
 def test_a_long_run_that_is_interrupted_says_how_to_go_on_and_does(workspace, tmp_path):
     w = ("--workspace", workspace)
