@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map, map_of
 from odscen.base.errors import InputError
@@ -225,12 +225,14 @@ def generate(
 
     placer = None if generator is None else Placer(open_generator(generator))
     config, map_name = settings.sampling, settings.map_name
+    statistics: dict[str, Any] = {}
     if map_name is not None:
         workspace.map(map_name)
-    statistics = {entry.name: entry.info["statistics"] for entry in workspace.maps()}
-    if not statistics:
-        msg = f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
-        raise InputError(msg)
+    else:  # all maps are read, which takes seconds where one of them is large
+        statistics = {entry.name: entry.info["statistics"] for entry in workspace.maps()}
+        if not statistics:
+            msg = f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
+            raise InputError(msg)
     paths = []
     for number in range(settings.count):
         seed = settings.seed + number
