@@ -26,6 +26,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn, Self
 
+from odscen.sumo.worker import simulate
 from odscen.sumo.worker.warm_imports import import_all
 
 IDLE = 60.0
@@ -114,8 +115,6 @@ def _work(
     request: dict[str, Any], said_to: int, stdout: int, stderr: int, kept: list[int]
 ) -> NoReturn:
     """Become the process of a simulation."""
-    from odscen.sumo.worker import simulate
-
     code = 1
     try:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)

@@ -132,10 +132,11 @@ def _run_slices(plan: Plan, folder: Path, send: Send, how: Sequence[str]) -> End
         def run(how: Sequence[str]) -> End:
             return _run_slice(plan, folder, send, completion, how)
 
-        if not slice_processes.POSSIBLE:
-            return run(how)
-        import_all()
-        end = slice_processes.in_processes(how, run)
+        if slice_processes.POSSIBLE:
+            import_all()
+            end = slice_processes.in_processes(how, run)
+        else:
+            end = run(how)
         if end.code == COMPLETER_GONE:
             raise completion.gone()
         return end

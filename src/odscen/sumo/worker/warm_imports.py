@@ -19,10 +19,9 @@ def import_all() -> None:
     import lxml.etree
 
     from odscen.sumo.outputs import output_tables
-    from odscen.sumo.worker import simulate
     from odscen.sumo.worker.simulation import session
 
-    del lxml, output_tables, simulate
+    del lxml, output_tables
     session.import_libsumo()
     _ready_xerces()
 
