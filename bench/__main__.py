@@ -8,6 +8,8 @@ from __future__ import annotations
 import importlib
 import sys
 
+from bench.common import compile_modules
+
 ALL = (
     "startup",
     "lane_graph",
@@ -40,6 +42,7 @@ ALL = (
 
 
 def main() -> None:
+    compile_modules()
     names = sys.argv[1:]
     if len(names) > 1 and names[1].startswith("-"):
         names, sys.argv = names[:1], [f"bench {names[0]}", *names[1:]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import statistics
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,15 @@ def shared_maps() -> Path | None:
     given = os.environ.get("ODSCEN_TEST_MAPS")
     folder = Path(given) if given else Path(__file__).parents[2] / "shared" / "maps"
     return folder if folder.is_dir() else None
+
+
+def compile_modules() -> None:
+    """Have modules of processes that are started compiled once, as those of a package are.
+
+    Whatever ``PYTHONDONTWRITEBYTECODE`` says: with it each process compiles all that it imports.
+    """
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    os.environ["PYTHONPYCACHEPREFIX"] = str(Path(tempfile.gettempdir()) / "odscen-bench-compiled")
 
 
 def paired(

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import polars as pl
 
-from bench.common import shared_maps, without_output
+from bench.common import compile_modules, shared_maps, without_output
 from odscen.app.demand import demands
 from odscen.app.maps import load_map
 from odscen.app.running.reports import write_report
@@ -35,6 +35,7 @@ from odscen.sumo.folder import layout
 from odscen.sumo.folder.checkpoint import last_number, read_checkpoint
 from odscen.sumo.folder.recorded import trajectory_files
 from odscen.sumo.realize.run_settings import RunSettings
+from odscen.sumo.runner.forked_worker import worker_environment
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_folder import make_summary, write_run_folder
 from odscen.sumo.runner.worker_process import run_worker
@@ -127,12 +128,14 @@ def rows(files: list[Path]) -> int:
 
 
 def timed(config: Path) -> Spent:
-    """Time of bare ``sumo``."""
+    """Time of bare ``sumo``, with the allocator that odscen's has."""
     import sumo
 
     binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
     start = spent()
-    subprocess.run([binary, "-c", config], check=True, capture_output=True)
+    subprocess.run(
+        [binary, "-c", config], check=True, capture_output=True, env=worker_environment()
+    )
     return since(start)
 
 
@@ -165,6 +168,7 @@ if __name__ == "__main__":
     parser.add_argument("--full", nargs="?", const="", metavar="MAP")
     parser.add_argument("--rounds", type=int, default=1)
     given = parser.parse_args()
+    compile_modules()
     if given.full is None:
         main()
     else:

@@ -3,9 +3,8 @@
 Aim: at most 1.5 times the CPU of the pool, and one run alone at most 0.6 s. The pool has two
 processes that keep libsumo loaded and go through the same SUMO files, with the same outputs and
 the same allocator; it checks nothing and makes no figures. odscen's side has everything, from the
-start of ``odscen run``: with complete records, with figures, too, and with reports, too. Its
-modules are compiled, as those of an installed package are, whatever ``PYTHONDONTWRITEBYTECODE``
-says. ``--actors`` and ``--seconds`` measure larger runs by the same rule.
+start of ``odscen run``: with complete records, with figures, too, and with reports, too.
+``--actors`` and ``--seconds`` measure larger runs by the same rule.
 """
 
 from __future__ import annotations
@@ -138,8 +137,6 @@ def spent_by(command: list[str], *, given: str = "") -> tuple[float, float]:
     """CPU seconds of a command with all that it starts, and wall seconds."""
     # What a forked process takes is its server's, which the command waits for.
     environment = worker_environment() if given else dict(os.environ)
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)
-    environment["PYTHONPYCACHEPREFIX"] = str(Path(tempfile.gettempdir()) / "odscen-bench-compiled")
     before, start = os.times(), time.perf_counter()
     subprocess.run(
         command, check=True, capture_output=True, text=True, input=given, env=environment

@@ -13,6 +13,7 @@ import sumo
 from odscen.results.records.run_plan import Plan, PlannedActor
 from odscen.sumo.realize.measure_files import measures_xml
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
+from odscen.sumo.runner import long_runs, worker_process
 from odscen.sumo.runner.run_jobs import PreparedRun
 
 BIN = Path(sumo.SUMO_HOME) / "bin"
@@ -24,6 +25,12 @@ ROWS = ("A0B0 B0C0 C0C1", "A1B1 B1C1", "C2B2 B2A2 A2A1", "C0C1 C1C2", "B2B1 B1B0
 WALKS = ("A0B0 B0C0", "C1B1 B1A1", "B2B1 B1B0")
 
 Prepare = Callable[..., PreparedRun]
+
+
+def start_killed_workers(patch: pytest.MonkeyPatch) -> None:
+    """Have processes of long runs started as ``killed_worker``, though they might be forked."""
+    patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+    patch.setattr(long_runs, "is_ready", lambda: False)
 
 
 @pytest.fixture(scope="session")

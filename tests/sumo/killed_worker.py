@@ -4,7 +4,8 @@ Run in place of :mod:`odscen.sumo.worker.simulate`. With ``KILL_AFTER_SLICE`` it
 after that slice is complete. ``KILL_COMPLETER_AT`` and ``KILL_BOTH_AT`` are about the process that
 completes slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many
 bytes fail as on a full disk; with ``MEMORY_LEFT`` it gets so many bytes more than it has at first.
-Changes are counted in a file beside the run folder, as each slice has processes of its own.
+Changes are counted in a file beside the run folder, as each slice has a process of its own. With
+``SLICES_BY_EXEC`` these are not forked.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from odscen.sumo.folder.checkpoint import slice_folder
-from odscen.sumo.worker import completion
+from odscen.sumo.worker import completion, slice_processes
 from odscen.sumo.worker.simulate import main
 
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "open")
@@ -58,6 +59,8 @@ if __name__ == "__main__":
         kill_before_change(str(folder), last.is_dir)
     if "KILL_COMPLETER_AT" in os.environ or "KILL_BOTH_AT" in os.environ:
         completion.COMPLETER = "tests.sumo.killed_completer"
+    if "SLICES_BY_EXEC" in os.environ:
+        slice_processes.POSSIBLE = False
     if "FILE_LIMIT" in os.environ:
         limit = int(os.environ["FILE_LIMIT"])
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

@@ -134,8 +134,8 @@ def test_another_environment_has_a_server_of_its_own(
 
 def test_what_is_forked_brings_no_tables_along_and_finds_the_reader_of_sumo_ready() -> None:
     code = (
-        "import sys; from odscen.sumo.worker import fork_server as f; f._import_all();"
-        "print('polars' in sys.modules, 'libsumo' in sys.modules, f._ready_xerces())"
+        "import sys; from odscen.sumo.worker import warm_imports as w; w.import_all();"
+        "print('polars' in sys.modules, 'libsumo' in sys.modules, w._ready_xerces())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "True", "True"]

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,14 +22,14 @@ from odscen.sumo.folder.parts import check_room
 from odscen.sumo.folder.recorded import read_trajectories, recorded_files, trajectory_files
 from odscen.sumo.folder.run_sums import seal_start
 from odscen.sumo.realize.run_settings import RunSettings
-from odscen.sumo.runner import forecast, worker_process
+from odscen.sumo.runner import forecast, forked_worker
 from odscen.sumo.runner.allocator import fast_allocator
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.long_runs import resume, run_lock
 from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
 from odscen.sumo.worker.protocol import Command, Pace, Progress
 from odscen.workspace.store import Workspace
-from tests.sumo.conftest import SLICE, TYPES, UNTIL
+from tests.sumo.conftest import SLICE, TYPES, UNTIL, start_killed_workers
 
 TOWN = Path(__file__).parents[3] / "maps" / "town_5x5.xodr"
 TOWN_SLICE, TOWN_SLICES = 120.0, 3
@@ -53,7 +54,7 @@ def killed(
 ) -> str:
     """Run, interrupted by ``killed_worker``; what the runner says of it."""
     with monkeypatch.context() as patch:
-        patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+        start_killed_workers(patch)
         for name, value in environment.items():
             patch.setenv(name, str(value))
         result = run_prepared(long, run)
@@ -172,6 +173,60 @@ def test_a_run_of_which_only_the_completing_process_is_killed_says_so_and_resume
     assert results(run) == whole
 
 
+def test_slices_whose_processes_cannot_be_forked_are_the_same_bytes(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    assert killed(long, run, monkeypatch, SLICES_BY_EXEC=1) == ""
+    assert results(run) == whole
+
+
+def test_slices_below_the_process_that_forks_for_all_runs_are_the_same_bytes(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path
+) -> None:
+    forked_worker.get_ready()
+    try:
+        assert forked_worker.is_ready()
+        assert run_prepared(long, tmp_path / "run").status == "completed"
+    finally:
+        forked_worker._end_server()
+    assert results(tmp_path / "run") == whole
+
+
+def test_a_slice_whose_parent_is_killed_ends_and_the_run_resumes(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path
+) -> None:
+    """Killed as the system does when memory runs out: one process, without a word."""
+    run = tmp_path / "run"
+    killed_at: list[int] = []
+
+    def kill(_: Progress) -> None:
+        if not killed_at:
+            (host,) = children(os.getpid(), "odscen.sumo.worker.simulate")
+            killed_at.append(host)
+            os.kill(host, signal.SIGKILL)
+
+    result = run_prepared(long, run, progress=kill)
+    assert "ended by signal SIGKILL" in str(result.summary["error"])
+    assert not children(None, str(run))
+    resume(run)
+    assert results(run) == whole
+
+
+def children(parent: int | None, words: str) -> list[int]:
+    """Processes with such words in their command, of a parent or of any."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            command = (folder / "cmdline").read_text(encoding="utf-8")
+            above = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            continue
+        if words in command and parent in (None, above):
+            found.append(int(folder.name))
+    return found
+
+
 def test_what_was_written_is_completed_when_the_simulation_crashes(
     long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -239,7 +294,7 @@ def test_killed_while_it_is_resumed_a_run_still_ends_with_the_same_bytes(
     run = tmp_path / "run"
     killed(long, run, monkeypatch, KILL_AT=6)
     with monkeypatch.context() as patch:
-        patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+        start_killed_workers(patch)
         patch.setenv("KILL_BOTH_AT", str(change))
         assert resume(run).status == "failed"
     assert resume(run).status == "completed"

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from odscen.sumo.runner import worker_process
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.own_package import forget, install
+from tests.sumo.conftest import start_killed_workers
 from tests.sumo.runner.test_long_runs import results
 from tests.sumo.story_case import MIDDLE, document, node_at, prepared, read
 
@@ -60,7 +60,7 @@ def test_killed_after_any_slice_it_ends_with_the_same_bytes(
     alone, cut = tmp_path / "alone", tmp_path / "cut"
     assert run_prepared(prepared(scenario(), slice_length=4.0), alone).status == "completed"
     with monkeypatch.context() as patch:
-        patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+        start_killed_workers(patch)
         patch.setenv("KILL_AFTER_SLICE", str(number))
         assert run_prepared(prepared(scenario(), slice_length=4.0), cut).status == "failed"
     assert resume(cut).status == "completed"

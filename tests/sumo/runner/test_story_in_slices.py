@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from odscen.sumo.runner import worker_process
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.run_jobs import run_prepared
+from tests.sumo.conftest import start_killed_workers
 from tests.sumo.runner.test_long_runs import results
 from tests.sumo.story_case import document, node_at, prepared, read, walk_node_at
 
@@ -82,7 +82,7 @@ def test_killed_after_any_slice_a_run_with_rules_ends_with_the_same_bytes(
 ) -> None:
     run = tmp_path / "run"
     with monkeypatch.context() as patch:
-        patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+        start_killed_workers(patch)
         patch.setenv("KILL_AFTER_SLICE", str(number))
         assert run_prepared(story(), run).status == "failed"
     assert resume(run).status == "completed"

@@ -10,9 +10,9 @@ import pytest
 from odscen.results.records.run_plan import Plan
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import RunSettings
-from odscen.sumo.runner import worker_process
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.run_jobs import run_prepared
+from tests.sumo.conftest import start_killed_workers
 from tests.sumo.runner.test_long_runs import results
 from tests.sumo.story_case import (
     Told,
@@ -128,7 +128,7 @@ def test_killed_on_the_road_and_resumed_it_ends_with_the_same_bytes(
     alone, cut = tmp_path / "alone", tmp_path / "cut"
     assert run_prepared(sliced(), alone).status == "completed"
     with monkeypatch.context() as patch:
-        patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+        start_killed_workers(patch)
         patch.setenv("KILL_AFTER_SLICE", str(number))
         assert run_prepared(sliced(), cut).status == "failed"
     assert resume(cut).status == "completed"

@@ -43,6 +43,7 @@ from odscen.sumo.folder.run_sums import (
     unseal_interrupted,
 )
 from odscen.sumo.realize.run_settings import RunSettings
+from odscen.sumo.runner.forked_worker import is_ready
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
     make_summary,
@@ -191,7 +192,14 @@ def _resume_from(
     live: Companion | None,
 ) -> Run:
     limit = prepared.settings.time_limit
-    ended = run_worker(folder, progress=progress, time_limit=limit, live=live, keep=(lock,))
+    ended = run_worker(
+        folder,
+        progress=progress,
+        time_limit=limit,
+        live=live,
+        keep=(lock,),
+        forked=live is None and is_ready(),
+    )
     clear_parts(folder)  # a torn one takes room that what follows may need
     summary = make_summary(prepared, folder, ended)
     summary["slices"] = _slices(folder)

@@ -115,7 +115,7 @@ def run_worker(
         File descriptors that the process inherits.
     forked
         Whether its process may be forked by one that has done the imports; not for a run that is
-        live or in slices.
+        live.
     results
         Makes the results of a small run from what a forked process has left: to that, all that
         Python does is dear, and the first table costs as much as the simulation.

@@ -18,8 +18,19 @@ if TYPE_CHECKING:
 COMPLETER = "odscen.sumo.worker.completer"
 
 
+class CompleterGoneError(SimulationError):
+    """The process that completes slices has ended before its time."""
+
+    def __init__(self, code: int | None = None) -> None:
+        ended = "has ended" if code is None else f"has ended with exit code {code}"
+        super().__init__(
+            f"the process that completes what was recorded {ended}; "
+            "the memory may have been too small"
+        )
+
+
 class Completion:
-    """Completes a slice; what it needs to know of those before it reads while SUMO simulates."""
+    """Completes slices; what it needs to know of those before it reads while SUMO simulates."""
 
     def __init__(self, run: Path) -> None:
         self._connection, theirs = Pipe()
@@ -45,6 +56,8 @@ class Completion:
 
         Raises
         ------
+        CompleterGoneError
+            Without the exit code, which only the process that has started it can know.
         SimulationError, OSError
             If it could not be completed.
         """
@@ -60,18 +73,15 @@ class Completion:
         """
         self._ask(None)
 
+    def gone(self) -> CompleterGoneError:
+        """Say how the process has ended that this one has started."""
+        return CompleterGoneError(self._process.wait())
+
     def _ask(self, what: Written | None) -> None:
         try:
             self._connection.send(what)
             error = self._connection.recv()
         except (EOFError, OSError):
-            raise self._gone() from None
+            raise CompleterGoneError from None
         if error is not None:
             raise error
-
-    def _gone(self) -> SimulationError:
-        code = self._process.wait()
-        return SimulationError(
-            f"the process that completes what was recorded has ended with exit code {code}; "
-            "the memory may have been too small"
-        )

@@ -14,7 +14,6 @@ The process ends when the socket is closed, or when it has had nothing to do for
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import json
 import os
@@ -27,22 +26,20 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn, Self
 
+from odscen.sumo.worker import simulate
+from odscen.sumo.worker.warm_imports import import_all
+
 IDLE = 60.0
 """Wall seconds without a run after which the process ends, for it holds 110 MB."""
 MOST_DESCRIPTORS = 8
 _MOST_BYTES = 1 << 16
-_XERCES = "libxerces-c-3"
-_INITIALIZE = (
-    "_ZN11xercesc_3_216XMLPlatformUtils10InitializeEPKcS2_PNS_12PanicHandlerEPNS_13MemoryManagerE"
-)
-"""``xercesc::XMLPlatformUtils::Initialize(locale, home, handler, memory)``."""
 
 
 def main() -> None:
     """Import what simulations need, then fork one for each message."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.disable()  # what is imported stays
-    _import_all()
+    import_all()
     gc.collect()
     gc.freeze()  # forked processes need not go through it, nor copy it
     gc.enable()
@@ -52,37 +49,6 @@ def main() -> None:
             if not data:
                 return
             children.start(json.loads(data), descriptors, control)
-
-
-def _import_all() -> None:
-    # Not polars: what is here each fork has to be given, and tables are made elsewhere.
-    import lxml.etree
-
-    from odscen.sumo.outputs import output_tables
-    from odscen.sumo.worker import simulate
-    from odscen.sumo.worker.simulation import session
-
-    del lxml, output_tables, simulate
-    session.import_libsumo()
-    _ready_xerces()
-
-
-def _ready_xerces() -> bool:
-    """Have the XML reader that SUMO uses make its tables of characters, which are always the same.
-
-    Each fork would make them, which takes a tenth of a short simulation. It is SUMO's own first
-    call, and counted there: to make it again is nothing. Where its library is another one, or built
-    in, nothing is done, and the answer is false.
-    """
-    with suppress(OSError, AttributeError):
-        maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace")
-        paths = {line.split(maxsplit=5)[-1] for line in maps.splitlines() if _XERCES in line}
-        for path in paths:
-            initialize = getattr(ctypes.CDLL(path), _INITIALIZE)
-            initialize.argtypes, initialize.restype = [ctypes.c_char_p] * 4, None
-            initialize(b"en_US", None, None, None)  # what it is called with by default
-        return bool(paths)
-    return False
 
 
 class _Children:
@@ -132,23 +98,23 @@ class _Children:
         self, request: dict[str, Any], descriptors: list[int], control: socket.socket
     ) -> None:
         """Fork a process that runs a plan."""
-        said_to, stdout, stderr, *_ = descriptors
+        said_to, stdout, stderr, *kept = descriptors
         pid = os.fork()
         if not pid:
             for other in (*self._said_to.values(), self._ended, self._wake):
                 os.close(other)
             signal.set_wakeup_fd(-1)
             control.detach()  # it is stdin, which is replaced
-            _work(request, said_to, stdout, stderr)
+            _work(request, said_to, stdout, stderr, kept)
         self._said_to[pid] = said_to
         for descriptor in descriptors[1:]:
             os.close(descriptor)
 
 
-def _work(request: dict[str, Any], said_to: int, stdout: int, stderr: int) -> NoReturn:
+def _work(
+    request: dict[str, Any], said_to: int, stdout: int, stderr: int, kept: list[int]
+) -> NoReturn:
     """Become the process of a simulation."""
-    from odscen.sumo.worker import simulate
-
     code = 1
     try:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
@@ -157,6 +123,8 @@ def _work(request: dict[str, Any], said_to: int, stdout: int, stderr: int) -> No
         for target, source in ((0, os.open(os.devnull, os.O_RDONLY)), (1, stdout), (2, stderr)):
             os.dup2(source, target)
             os.close(source)
+        for descriptor in kept:  # what completes slices holds them open, too
+            os.set_inheritable(descriptor, True)
         if request["cwd"] is not None:
             os.chdir(request["cwd"])
         os.write(said_to, f"pid {os.getpid()}\n".encode())

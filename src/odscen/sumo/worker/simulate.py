@@ -9,9 +9,10 @@ says goes to ``sumo.log``. With a :class:`~odscen.sumo.worker.protocol.Pace` as 
 run can be watched and takes commands on its stdin; with a
 :class:`~odscen.sumo.worker.protocol.Lockstep` it makes each step when it is asked to.
 
-If the plan says so, it makes one slice of the run (see :mod:`odscen.sumo.worker.slices`) and then
-begins anew for the next one: ``exec`` gives it a fresh memory under the same number, with the same
-files open. Commands that it has heard and not obeyed follow the pace as arguments.
+If the plan says so, the run is made in slices (see :mod:`odscen.sumo.worker.slices`), each in a
+process with a fresh memory: forked by this one (see :mod:`odscen.sumo.worker.slice_processes`) or,
+where that is not possible, by ``exec``, under the same number and with the same files open.
+Commands that one has heard and not obeyed follow the pace as arguments of the next.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ import gc
 import os
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from odscen.base.atomic_folders import in_use
 from odscen.base.errors import OdscenError
@@ -41,6 +43,8 @@ from odscen.sumo.outputs.output_tables import (
     make_results,
     outputs_to,
 )
+from odscen.sumo.worker import slice_processes
+from odscen.sumo.worker.completion import CompleterGoneError, Completion
 from odscen.sumo.worker.lockstep import LockstepWatch
 from odscen.sumo.worker.output_capture import captured_output
 from odscen.sumo.worker.protocol import (
@@ -55,16 +59,30 @@ from odscen.sumo.worker.protocol import (
     encode,
 )
 from odscen.sumo.worker.simulation.session import open_session
+from odscen.sumo.worker.slice_processes import End
 from odscen.sumo.worker.slices import run_slice
 from odscen.sumo.worker.steering import Steering
 from odscen.sumo.worker.stepping import Stepper
+from odscen.sumo.worker.warm_imports import import_all
 from odscen.sumo.worker.watch import Watch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Iterator, Sequence
 
     from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
     from odscen.sumo.worker.story.story_run import StoryRun
+
+FAILED = 3
+COMPLETER_GONE = 4
+"""Exit codes."""
+_FAILURES = (OdscenError, OSError, MemoryError)
+
+
+class Send(Protocol):
+    """Sends a message, and bytes after it."""
+
+    def __call__(self, message: Message, payload: bytes = b"") -> None:
+        """Send it."""
 
 
 def main() -> int:
@@ -85,61 +103,115 @@ def run_plan(plan_file: Path, how: Sequence[str] = (), *, raw: bool = False) -> 
             stdout.buffer.flush()
 
         try:
-            gc.disable()  # takes as long as the reading itself
-            plan = Plan.from_json(plan_file.read_text(encoding="utf-8"))
-            gc.freeze()  # the plan stays, and need not be gone through again and again
-            gc.enable()
-            watch = _watch(plan, folder, how, send) if how else None
-            done = simulate(plan, folder, send, watch, raw=raw)
-            if done is not None:
-                send(done)
-        except OdscenError as error:
-            send(Failed(str(error)))
-            return 3
-        except OSError as error:
-            send(Failed(system_words(error)))
-            return 3
-        except MemoryError:
-            send(Failed(NO_MEMORY))
-            return 3
-    if done is None:
-        _begin_anew(watch)
-    return 0
+            plan = _read_plan(plan_file)
+            if plan.slice_length is None:
+                watch = _watch(plan, folder, how, send) if how else None
+                send(simulate(plan, folder, send, watch, raw=raw))
+                return 0
+            end = _run_slices(plan, folder, send, how)
+        except _FAILURES as error:
+            send(Failed(_words(error)))
+            return FAILED
+    if end.following is not None:
+        _begin_anew(end.following)
+    return end.code
+
+
+def _read_plan(plan_file: Path) -> Plan:
+    gc.disable()  # takes as long as the reading itself
+    plan = Plan.from_json(plan_file.read_text(encoding="utf-8"))
+    gc.freeze()  # the plan stays, and need not be gone through again and again
+    gc.enable()
+    return plan
+
+
+def _run_slices(plan: Plan, folder: Path, send: Send, how: Sequence[str]) -> End:
+    """Run all slices that are left, or the next one where processes cannot be forked."""
+    with Completion(folder) as completion:
+
+        def run(how: Sequence[str]) -> End:
+            return _run_slice(plan, folder, send, completion, how)
+
+        if slice_processes.POSSIBLE:
+            import_all()
+            end = slice_processes.in_processes(how, run)
+        else:
+            end = run(how)
+        if end.code == COMPLETER_GONE:
+            raise completion.gone()
+        return end
+
+
+def _run_slice(
+    plan: Plan, folder: Path, send: Send, completion: Completion, how: Sequence[str]
+) -> End:
+    try:
+        watch = _watch(plan, folder, how, send) if how else None
+        with _stepper(plan, folder, send, watch) as stepper:
+            done = run_slice(plan, folder, stepper, completion)
+    except CompleterGoneError:
+        return End(COMPLETER_GONE)
+    except _FAILURES as error:
+        send(Failed(_words(error)))
+        return End(FAILED)
+    if done is not None:
+        send(done)
+        return End(0)
+    following = watch.steering.hand_over() if isinstance(watch, Watch) else []
+    return End(0, [encode(one) for one in following])
+
+
+def _words(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return NO_MEMORY
+    return system_words(error) if isinstance(error, OSError) else str(error)
 
 
 def simulate(
     plan: Plan,
     folder: Path,
-    send: Callable[[Message], None],
+    send: Send,
     watch: Watch | LockstepWatch | None = None,
     *,
     raw: bool = False,
-) -> Done | None:
-    """Run the simulation in ``folder`` and write its results.
+) -> Done:
+    """Run the simulation in ``folder`` in one piece and write its results.
 
     Parameters
     ----------
     raw
         Whether the results of a small run may be left to be made from what it returns.
 
-    Returns
-    -------
-    ``None`` if that was a slice, and others follow.
-
     Raises
     ------
     SimulationError
         If SUMO refuses to start or stops with an error.
     """
+    start = time.perf_counter()
+    sumo = folder / SUMO_FOLDER
+    arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(folder, sumo)]
+    with _stepper(plan, folder, send, watch) as stepper:
+        with open_session(arguments) as session:
+            now = stepper.run(session, plan.until)
+            lengths = session.lanes.lengths()
+        left = None
+        if raw and are_small(folder):
+            left = Left(lengths, stepper.recorder.hand_over())
+        else:
+            make_results(folder, plan, stepper.recorder.events, lengths)
+        return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped, left)
+
+
+@contextmanager
+def _stepper(
+    plan: Plan, folder: Path, send: Send, watch: Watch | LockstepWatch | None
+) -> Iterator[Stepper]:
     stepper = Stepper(plan, send, watch, _story(plan, folder), _behaviour(plan, folder))
     try:
-        if plan.slice_length is not None:
-            return run_slice(plan, folder, stepper)
-        done = _in_one_piece(plan, folder, stepper, raw=raw)
+        yield stepper
     finally:
         if stepper.behaviour is not None:
             stepper.behaviour.close()
-    return done
 
 
 def _story(plan: Plan, folder: Path) -> StoryRun | None:
@@ -160,32 +232,14 @@ def _behaviour(plan: Plan, folder: Path) -> BehaviourRun | None:
     return BehaviourRun.in_folder(folder, plan)
 
 
-def _begin_anew(watch: Watch | LockstepWatch | None) -> None:
+def _begin_anew(following: Sequence[str]) -> None:
     """Become a fresh process that runs the next slice."""
     own = len(sys.orig_argv) - len(sys.argv) + 2  # as it was started, up to the plan
-    how = watch.steering.hand_over() if isinstance(watch, Watch) else []
-    arguments = [sys.executable, *sys.orig_argv[1:own], *map(encode, how)]
+    arguments = [sys.executable, *sys.orig_argv[1:own], *following]
     os.execv(sys.executable, arguments)  # noqa: S606 - no shell is wanted
 
 
-def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper, *, raw: bool) -> Done:
-    start = time.perf_counter()
-    sumo = folder / SUMO_FOLDER
-    arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(folder, sumo)]
-    with open_session(arguments) as session:
-        now = stepper.run(session, plan.until)
-        lengths = session.lanes.lengths()
-    left = None
-    if raw and are_small(folder):
-        left = Left(lengths, stepper.recorder.hand_over())
-    else:
-        make_results(folder, plan, stepper.recorder.events, lengths)
-    return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped, left)
-
-
-def _watch(
-    plan: Plan, folder: Path, how: Sequence[str], send: Callable[[Message, bytes], None]
-) -> Watch | LockstepWatch:
+def _watch(plan: Plan, folder: Path, how: Sequence[str], send: Send) -> Watch | LockstepWatch:
     start, *heard = map(decode, how)
     if isinstance(start, Lockstep):
         return LockstepWatch(plan, start, sys.stdin.fileno(), send)

@@ -4,8 +4,8 @@ Going on after loading a state is not what SUMO would have done without saving: 
 goes through the same reloads, interrupted or not. Nor does SUMO do the same with the same state in
 every process: who yields inside a junction depends on the order of addresses in memory, which a
 network that was loaded before has disturbed. So each slice has a process of its own, interrupted or
-not (see :mod:`odscen.sumo.worker.simulate`), and a run that goes on from slice ``k`` ends with the
-same results as one that was never interrupted. At each boundary SUMO closes its outputs.
+not (see :mod:`odscen.sumo.worker.slice_processes`), and a run that goes on from slice ``k`` ends
+with the same results as one that was never interrupted. At each boundary SUMO closes its outputs.
 
 Another process tidies and completes the slice.
 """
@@ -30,7 +30,6 @@ from odscen.sumo.folder.checkpoint import (
 from odscen.sumo.folder.parts import check_room
 from odscen.sumo.outputs.output_tables import outputs_to
 from odscen.sumo.worker.completer import Written
-from odscen.sumo.worker.completion import Completion
 from odscen.sumo.worker.protocol import Done
 from odscen.sumo.worker.route_slices import RouteSlices
 from odscen.sumo.worker.simulation.session import open_session
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from odscen.results.records.run_plan import Plan
+    from odscen.sumo.worker.completion import Completion
     from odscen.sumo.worker.simulation.session import Session
     from odscen.sumo.worker.stepping import Stepper
 
@@ -49,7 +49,7 @@ _SAVING = (
 )  # fmt: skip
 
 
-def run_slice(plan: Plan, run: Path, stepper: Stepper) -> Done | None:
+def run_slice(plan: Plan, run: Path, stepper: Stepper, completion: Completion) -> Done | None:
     """Run the next slice of a long run; ``None`` if others follow, else the results are written.
 
     Raises
@@ -69,14 +69,13 @@ def run_slice(plan: Plan, run: Path, stepper: Stepper) -> Done | None:
         if stepper.behaviour is not None:
             stepper.behaviour.restore(done.driven)
     routes = RouteSlices(run / layout.SUMO_FOLDER / layout.ROUTES_FILE)
-    with Completion(run) as completion:
-        if done is None or not done.last:
-            written = _RunningSlice(plan, run, done, routes).run(stepper)
-            completion.complete(written)
-            done = written.checkpoint
-        if not done.last:
-            return None
-        completion.write_results()
+    if done is None or not done.last:
+        written = _RunningSlice(plan, run, done, routes).run(stepper)
+        completion.complete(written)
+        done = written.checkpoint
+    if not done.last:
+        return None
+    completion.write_results()
     return Done(done.time, done.steps, done.wall_seconds, done.stopped)
 
 

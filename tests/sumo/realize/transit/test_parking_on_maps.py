@@ -16,11 +16,11 @@ from odscen.sumo.folder.measured import read_parking
 from odscen.sumo.folder.recorded import read_stays, read_trips
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import RunSettings
-from odscen.sumo.runner import worker_process
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.parking_case import PLACES, parking_scenario, parking_town
+from tests.sumo.conftest import start_killed_workers
 from tests.sumo.runner.test_long_runs import results
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ def test_a_run_in_slices_that_is_killed_and_resumed_ends_with_the_same_bytes(
     for after in (1, 2):
         cut = tmp_path / f"after{after}"
         with monkeypatch.context() as patch:
-            patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+            start_killed_workers(patch)
             patch.setenv("KILL_AFTER_SLICE", str(after))
             run_prepared(made, cut)
         resume(cut)

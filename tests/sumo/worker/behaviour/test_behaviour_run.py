@@ -13,11 +13,11 @@ import pytest
 from odscen.base.errors import InputError
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor, DrivingKind
 from odscen.sumo.realize.run_settings import RunSettings
-from odscen.sumo.runner import worker_process
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour
+from tests.sumo.conftest import start_killed_workers
 from tests.sumo.story_case import MIDDLE, document, entry, loaded, node_at
 from tests.sumo.worker.behaviour.models import HERE
 
@@ -175,7 +175,7 @@ def test_a_long_run_that_was_killed_ends_with_the_same_bytes(
     door: dict[str, Any] = {"name": "idm", "options": {"spread": 0.1}}
     whole = driven(tmp_path / "whole", slices=2.0, until=6.0, **door)
     with monkeypatch.context() as patch:
-        patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+        start_killed_workers(patch)
         patch.setenv("KILL_AFTER_SLICE", "2")
         assert driven(tmp_path / "killed", slices=2.0, until=6.0, **door).status == "failed"
     assert resume(tmp_path / "killed").status == "completed"
