@@ -121,6 +121,36 @@ def option_values(
     return found
 
 
+def values_for(
+    found: Any, given: Mapping[str, OptionValue], *, name: str, others: bool = False
+) -> dict[str, OptionValue]:
+    """Values that a class is made with, checked and completed; what is no class takes none.
+
+    Parameters
+    ----------
+    name
+        Of the class, as an error says it.
+    others
+        Leave what a class does not offer to the class, unchecked.
+
+    Raises
+    ------
+    InputError
+        If there is no such option, a value is not possible or missing, or what the class says of
+        its options is no schema.
+    """
+    is_class = isinstance(found, type)
+    try:
+        options = options_of(found) if is_class else ()
+        known = {one.name for one in options}
+        left = {key for key in given if key not in known} if others and is_class else set()
+        checked = option_values(options, {key: v for key, v in given.items() if key not in left})
+    except InputError as error:
+        error.element = name
+        raise
+    return {**given, **checked}
+
+
 def _option(name: str, schema: Any) -> OfferedOption:
     kind = schema.get("type") if isinstance(schema, dict) else None
     choices = schema.get("enum", ()) if isinstance(schema, dict) else ()
