@@ -73,13 +73,15 @@ def offered(
 def options_of(made_by: Any) -> tuple[OfferedOption, ...]:
     """Options that a class has; none if it says nothing of them.
 
+    An attribute ``options`` that is nothing like a schema, such as a method, is the class's own.
+
     Raises
     ------
     InputError
         If what it says is no schema of plain values.
     """
-    said = getattr(made_by, "options", None)
-    if said is None:
+    said: Any = getattr(made_by, "options", None)
+    if not _is_offer(said):
         some = fields(made_by) if is_dataclass(made_by) else ()
         schemas = {one.name: one.metadata[_SCHEMA] for one in some if _SCHEMA in one.metadata}
         return tuple(_option(name, schema) for name, schema in schemas.items())
@@ -149,6 +151,15 @@ def values_for(
         error.element = name
         raise
     return {**given, **checked}
+
+
+def _is_offer(said: Any) -> bool:
+    """Whether an attribute is meant as a schema, perhaps as a wrong one."""
+    if not isinstance(said, dict):
+        return hasattr(said, "model_json_schema")
+    if "properties" in said or "$schema" in said or said.get("type") == "object":
+        return True
+    return any(isinstance(one, dict) and one.get("type") in _KINDS for one in said.values())
 
 
 def _option(name: str, schema: Any) -> OfferedOption:
