@@ -12,7 +12,8 @@ from odscen.base.errors import (
     WorkspaceError,
 )
 from odscen.workspace import map_build
-from odscen.workspace.store import Workspace, check_name, name_from_file
+from odscen.workspace.folder_names import check_name, name_from_file
+from odscen.workspace.store import Workspace
 
 SHIPPED = Path(__file__).parents[2] / "maps"
 SMALL = SHIPPED / "t_junction_signs.xodr"

@@ -15,7 +15,7 @@ from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
-from odscen.workspace.store import plain_name
+from odscen.workspace.folder_names import plain_name
 from odscen.workspace.wastebasket import SCENARIO_SUFFIX
 
 if TYPE_CHECKING:

@@ -111,7 +111,7 @@ def add(
 
 def names_for(files: list[Path], name: str | None) -> list[str]:
     """Names for the maps; files of the same name in one call also get their folder's name."""
-    from odscen.workspace.store import name_from_file
+    from odscen.workspace.folder_names import name_from_file
 
     if name is not None:
         return [name]

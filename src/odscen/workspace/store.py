@@ -8,7 +8,6 @@ before they become paths.
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.workspace.allowances import BY_SIZE
 from odscen.workspace.asset_catalogue import assets_in
+from odscen.workspace.folder_names import check_name, is_name, name_from_file
 from odscen.workspace.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.workspace.map_files import read_map_file
 
@@ -42,37 +42,9 @@ ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"
 PATIENCE = 600.0
 """Wall seconds to wait for another process that builds the same map."""
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
-
 ProgressCallback = Callable[[str, float], None]
 """Called with what is being done and the share done, 0 to 1, again and again while nothing changes
 too. What it raises ends the work, and nothing is left of it."""
-
-
-def check_name(name: str, *, what: str = "map") -> str:
-    """Return ``name`` if it can name a folder everywhere, else raise :class:`InputError`."""
-    if not _NAME.fullmatch(name):
-        msg = (
-            f"{what} name {name!r} cannot be used: letters, digits, '_', '-' and '.', "
-            "starting with a letter or digit, at most 64"
-        )
-        raise InputError(msg)
-    return name
-
-
-def is_name(name: str) -> bool:
-    """Whether :func:`check_name` takes it."""
-    return _NAME.fullmatch(name) is not None
-
-
-def name_from_file(path: Path) -> str:
-    """Map name for a file: its stem, with everything unusual replaced by ``_``."""
-    return plain_name(path.stem) or "map"
-
-
-def plain_name(text: str) -> str:
-    """Text as it can name a folder everywhere, perhaps empty: the unusual replaced by ``_``."""
-    return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("._-")[:64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +128,7 @@ class Workspace:
     def _is_map(self, name: str) -> bool:
         folder = self.root / "maps" / name
         files = (INFO_FILE, XODR_FILE)
-        return bool(_NAME.fullmatch(name)) and any((folder / one).is_file() for one in files)
+        return is_name(name) and any((folder / one).is_file() for one in files)
 
     def _has(self, name: str) -> bool:
         """Whether there is such a map; asked for each run of many, and does not look at others."""

@@ -14,7 +14,7 @@ from odscen.base.shown import printable
 from odscen.scenario.document.json_form import loads
 from odscen.workspace.allowances import for_import
 from odscen.workspace.child_process import work_in_child
-from odscen.workspace.store import check_name, name_from_file
+from odscen.workspace.folder_names import check_name, name_from_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

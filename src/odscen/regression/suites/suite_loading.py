@@ -19,7 +19,7 @@ from odscen.results.judging.expectations import needs_criticality
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.asset_catalogue import shipped_assets
-from odscen.workspace.store import name_from_file
+from odscen.workspace.folder_names import name_from_file
 
 if TYPE_CHECKING:
     from odscen.app.running.runs import CheckedRun

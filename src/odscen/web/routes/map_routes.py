@@ -42,8 +42,8 @@ from odscen.web.wire.map_messages import (
     SemanticsInfo,
 )
 from odscen.web.wire.media_types import SVG
+from odscen.workspace.folder_names import check_name, name_from_file
 from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
