@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from odscen.workspace.converters import GivenNetwork
 
 BUILDER = "12"
-"""Raised whenever what a map folder contains changes; older folders are then rebuilt."""
+"""Raised whenever what a map folder contains changes; older folders are rebuilt when opened."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"
 
@@ -45,6 +46,11 @@ PATIENCE = 600.0
 ProgressCallback = Callable[[str, float], None]
 """Called with what is being done and the share done, 0 to 1, again and again while nothing changes
 too. What it raises ends the work, and nothing is left of it."""
+
+
+def is_outdated(entry: MapEntry) -> bool:
+    """Whether an older odscen has built a map, so that it is rebuilt when it is opened."""
+    return bool(entry.info["builder"] != BUILDER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,21 +141,32 @@ class Workspace:
         return name in self._map_folders() and self._is_map(name)
 
     def maps(self) -> list[MapEntry]:
-        """All maps that can be used, sorted by name."""
+        """All maps that can be used, as :meth:`stored` gives them, sorted by name."""
         return self.catalogue()[0]
 
     def catalogue(self) -> tuple[list[MapEntry], list[BrokenMap]]:
-        """All maps, sorted by name: those that can be used, and those that cannot, with why."""
+        """All maps, sorted by name: those that can be used, and those that cannot, with why.
+
+        They are as :meth:`stored` gives them: listing builds nothing.
+        """
         entries, broken = [], []
         for name in self.map_names():
             try:
-                entries.append(self.map(name))
+                entries.append(self.stored(name))
             except OdscenError as error:
                 broken.append(BrokenMap(name, str(error)))
         return entries, broken
 
-    def map(self, name: str) -> MapEntry:
-        """One map by name; rebuilt first if an older odscen has built it.
+    def first_map(self, fits: Callable[[MapEntry], bool]) -> MapEntry | None:
+        """Open the first map by name that fits, as it is stored, and is not damaged."""
+        for one in self.maps():
+            if fits(one):
+                with suppress(DamagedError):
+                    return self.map(one.name)
+        return None
+
+    def stored(self, name: str) -> MapEntry:
+        """One map by name as it is stored: to be listed or compared, as it may be outdated.
 
         Raises
         ------
@@ -160,10 +177,25 @@ class Workspace:
         """
         if not self._has(name):
             raise NotFoundError("map", name, self.map_names())
-        entry = read_entry(self.root / "maps" / name)
-        if entry.info["builder"] != BUILDER:
-            return self.add_map(entry.checked("xodr"), name=name, settings=entry.conversion)
-        return entry
+        return read_entry(self.root / "maps" / name)
+
+    def map(self, name: str) -> MapEntry:
+        """Open one map by name; rebuilt first if an older odscen has built it.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        DamagedError
+            If it is broken.
+        OdscenError
+            If it is outdated and cannot be rebuilt, as of :meth:`add_map`.
+        """
+        entry = self.stored(name)
+        if not is_outdated(entry):
+            return entry
+        content, file = entry.read("xodr"), str(entry.info["source"])
+        return self.add_map_content(content, file=file, name=name, settings=entry.conversion)
 
     def map_for(self, name: str, sha256: str) -> MapEntry:
         """Map that a scenario refers to: of the same content, and of the same name if it can be.
@@ -184,9 +216,9 @@ class Workspace:
             else:
                 if entry.sha256 == sha256:
                     return entry
-        for other in self.maps():
-            if other.sha256 == sha256:
-                return other
+        other = self.first_map(lambda one: one.sha256 == sha256)
+        if other is not None:
+            return other
         if broken is not None:
             raise broken
         if not self._has(name):
@@ -263,7 +295,7 @@ class Workspace:
             same = built if built and built.sha256 == digest(content) else None
             if settings.converter is None:
                 settings = replace(settings, converter=same.converter if same else "odscen")
-            if same and (same.conversion, same.info["builder"]) == (settings, BUILDER):
+            if same and same.conversion == settings and not is_outdated(same):
                 return same
             kept = same is not None and same.converter == settings.converter == "file"
             given = same.given() if same and kept else None

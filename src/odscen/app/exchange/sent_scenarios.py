@@ -161,9 +161,9 @@ def _added(
 ) -> tuple[MapEntry, bool]:
     """The map of this content; added if there is none."""
     sha256 = digest(sent.content)
-    for one in workspace.maps():
-        if one.sha256 == sha256:
-            return one, False
+    there = workspace.first_map(lambda one: one.sha256 == sha256)
+    if there is not None:
+        return there, False
     stem = name_from_file(Path(sent.name))
     name, number, taken = stem, 1, workspace.map_names()
     while name in taken:
