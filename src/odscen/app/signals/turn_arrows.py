@@ -74,6 +74,19 @@ class TurnArrow(NamedTuple):
         """Whether the volumes ask for an arrow."""
         return self.vehicles * self.opposing > PRODUCTS[min(max(self.lanes, 1), 3)]
 
+    def to_words(self) -> str:
+        """What it has got, as a sentence."""
+        return (
+            f"Junction {self.junction}: the {self.turn} turn from {self.approach} has got an arrow "
+            f"({self.vehicles:.0f} vehicles an hour across {self.opposing:.0f})."
+        )
+
+
+def arrow_words(arrows: Sequence[TurnArrow]) -> tuple[str, ...]:
+    """Say of each turn that it has got an arrow, or that none has."""
+    none = "No turn has got an arrow: none that needs one has a lane for itself and a stage left."
+    return tuple(arrow.to_words() for arrow in arrows) or (none,)
+
 
 def with_turn_arrows(
     workspace: Workspace,
