@@ -63,7 +63,7 @@ export function LaneTools({ shown }: { shown: ShownUse }) {
                   onChange={setSpan}
                 />
               )}
-              <Text size="xs" aria-live="polite">
+              <Text size="xs" aria-live="polite" data-hint={pointed === null || undefined}>
                 {pointed ? (
                   <Trans>
                     Lane {pointed.lane}: {pointed.value}
