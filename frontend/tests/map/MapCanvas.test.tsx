@@ -45,7 +45,7 @@ function Followed({ begin }: { begin: View | undefined }) {
 
 test("the place of a link is shown also if a road user is followed before the map is there", async () => {
   // Nothing is drawn here.
-  vi.stubGlobal("Path2D", class {});
+  vi.stubGlobal("Path2D", vi.fn());
   vi.spyOn(HTMLElement.prototype, "getBoundingClientRect").mockReturnValue(new DOMRect(0, 0, 800, 600));
   show(<Followed begin={{ x: 30, y: 40, scale: 15 }} />);
   await waitFor(() => expect(screen.getByRole("application").dataset["view"]).toBe("30 40 15"));
