@@ -54,12 +54,12 @@ export function parseKept(hash: string): Kept {
   const others: KeptView[] = [];
   for (let n = 2; n < 2 + MOST_OTHERS && query.has(`at${n}`); n++) {
     const place = parsePlace(query.get(`at${n}`));
-    const [followed, colours, ways] = ["chosen", "by", "lanes"].map((key) => query.get(`${key}${n}`));
+    const [followed, colours, lanes] = ["chosen", "by", "lanes"].map((key) => query.get(`${key}${n}`));
     others.push({
       ...(place && { at: place }),
       ...(followed && { followed }),
       ...(colours && { by: colours }),
-      ...(ways && { lanes: ways }),
+      ...(lanes && { lanes }),
     });
   }
   if (others.length > 0) kept.others = others;
