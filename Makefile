@@ -89,10 +89,11 @@ fuzz: $(READY) $(PAGE)
 check-wheel: $(READY)
 	$(BIN)/python -m tools.check_wheel
 
-# Pictures of every view for docs/, light and dark, and those of measures and templates.
+# Pictures of every view for docs/, light and dark, and those of measures, templates and a sweep.
 screenshots: $(READY) $(PAGE) chromium
 	$(BIN)/python -m tools.measure_pictures
 	$(BIN)/python -m tools.template_pictures
+	$(BIN)/python -m tools.sweep_pictures
 	$(BIN)/python -m tools.screenshots
 
 # Rewrites golden files and the published schema from what the code does now; read the diff.

@@ -67,6 +67,10 @@ class _Outcome(NamedTuple):
     collisions: float
 
 
+DIGITS = _Outcome(0, 0, 0, 1, 1)
+"""Decimals that are printed: one collision in two seeds is 0.5, which would round to 0."""
+
+
 def main() -> None:
     try:
         import carla  # noqa: F401
@@ -184,7 +188,10 @@ class _MapBench:
             modes.append(WALKED)
         for lights in modes:
             outcomes = [self._run(name, departs, seeds, lights) for name in self._files]
-            values = [" / ".join(f"{v:.0f}" for v in some) for some in zip(*outcomes, strict=True)]
+            values = [
+                " / ".join(f"{value:.{digits}f}" for value in some)
+                for digits, some in zip(DIGITS, zip(*outcomes, strict=True), strict=True)
+            ]
             print(f"| {self._label} | {lights} | {level} | {' | '.join(values)} |", flush=True)
             ratios.append(outcomes[0].delay / max(outcomes[1].delay, 0.1))
         return ratios

@@ -1,13 +1,16 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from odscen.app.scenarios import generate, read_scenario, scenario_files
 from odscen.base.errors import InputError, NotFoundError
+from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.store import BUILDER, Workspace
+from odscen.workspace.store import BUILDER, Workspace, is_outdated
 from tests.app.conftest import CROSSING, MAPS
 
 
@@ -39,6 +42,31 @@ def test_a_map_that_is_named_is_the_only_one_that_is_read(
     assert about.read_text() == older
     (same,) = generate(workspace, settings=settings, out=tmp_path / "same")
     assert path.read_bytes() == same.read_bytes()
+
+
+def test_maps_are_built_anew_only_if_their_statistics_decide_which_is_drawn(
+    tmp_path: Path,
+) -> None:
+    store = Workspace.open(tmp_path)
+    for name in (CROSSING, "roundabout"):
+        about = store.add_map(MAPS / f"{name}.xodr").folder / "map.json"
+        (about.parent / "SHA256SUMS").unlink()
+        older = json.loads(about.read_text()) | {"builder": "1"}
+        older["statistics"]["crosswalks"] = 99
+        about.write_text(json.dumps(older))
+
+    def drawn(**maps: Any) -> tuple[str, list[bool]]:
+        """Name of the map that is drawn, and which are of the older odscen then."""
+        config = SamplingConfig.model_validate({"maps": maps})
+        (path,) = generate(store, settings=GenerationSettings(config=config, seed=1, fill=0.1))
+        return read_scenario(path).map.name, [is_outdated(one) for one in store.maps()]
+
+    assert drawn(names=["round*"]) == ("roundabout", [False, True])
+    assert drawn(names=["round*"], where={"crosswalks": {"max": 50}}) == (
+        "roundabout",
+        [False, True],
+    )
+    assert drawn(where={"crosswalks": {"max": 50}})[1] == [False, False]
 
 
 def test_a_map_that_is_not_there_is_refused_before_anything_is_written(

@@ -118,10 +118,15 @@ def test_a_second_view_has_its_own_place_colours_and_road_user_and_a_reload_keep
     assert len(once) >= 3
     assert {path: asked[path] for path in once} == dict.fromkeys(once, 1)
 
+    view(user, 2).get_by_role("textbox", name="Colour the lanes by").click()
+    user.page.get_by_role("option", name="Flow", exact=True).click()
+    expect(speeds).to_contain_text("Lanes: Flow")
     before = shown(user, 1), shown(user, 2)
-    user.page.wait_for_function("() => /chosen2=.*by2=speed/.test(location.hash)")
+    user.page.wait_for_function("() => /chosen2=.*by2=speed&lanes2=flow/.test(location.hash)")
     user.page.reload()
     expect(speeds).to_contain_text("60 km/h and more")
+    expect(speeds).to_contain_text("Lanes: Flow")
+    expect(plain).not_to_contain_text("Lanes")
     for name, number in ((one, 1), (other, 2)):
         expect(view(user, number).get_by_role("figure")).to_contain_text(f"Speed of {name}: ")
         assert shown(user, number) == pytest.approx(before[number - 1], abs=NEAR)
@@ -255,5 +260,13 @@ def test_two_views_are_stacked_in_a_narrow_window_and_axe_finds_nothing(
     assert stacked[0]["x"] == stacked[1]["x"]
     assert stacked[1]["y"] >= stacked[0]["y"] + stacked[0]["height"]
     assert min(one["height"] for one in stacked if one) > 300
+    map_of(user, 2).area.focus()
+    head = user.page.get_by_role("banner").bounding_box()
+    first, second = (map_of(user, number).area.bounding_box() for number in (1, 2))
+    assert head
+    assert first
+    assert second
+    assert first["y"] >= head["y"] + head["height"], "nothing of the first lies under the head"
+    assert second["y"] + second["height"] <= NARROW["height"] + 1
     view(user, 2).get_by_role("button", name="Close this view: View 2 of 2").click()
     expect(user.map.area).to_have_count(1)

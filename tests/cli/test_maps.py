@@ -78,6 +78,24 @@ def test_add_reports_refusals_by_element_and_adds_the_others(tmp_path):
     assert left == {"roundabout"}, "nothing half-written is left"
 
 
+def test_a_map_of_an_earlier_odscen_is_listed_as_outdated_until_it_is_used(tmp_path):
+    good = SHIPPED / "t_junction_signs.xodr"
+    odscen("maps", "add", good, "--workspace", tmp_path)
+    about = tmp_path / "maps" / "t_junction_signs" / "map.json"
+    (about.parent / "SHA256SUMS").unlink()
+    older = json.loads(about.read_text()) | {"builder": "1"}
+    del older["network"]
+    about.write_text(json.dumps(older))
+    done = odscen("maps", "list", "--workspace", tmp_path)
+    assert "outdated: t_junction_signs: an earlier odscen has built it" in done.err
+    assert json.loads(about.read_text()) == older
+    (row,) = odscen("maps", "list", "--json", "--workspace", tmp_path).json["maps"]
+    assert row["outdated"] is True
+    assert odscen("maps", "show", "t_junction_signs", "--workspace", tmp_path).code == 0
+    (row,) = odscen("maps", "list", "--json", "--workspace", tmp_path).json["maps"]
+    assert row["outdated"] is False
+
+
 def test_files_of_the_same_name_also_get_their_folders(tmp_path):
     text = (SHIPPED / "t_junction_signs.xodr").read_text(encoding="utf-8")
     files = []

@@ -252,3 +252,26 @@ def test_a_damaged_map_is_listed_as_broken_and_hides_no_other(
         assert broken["problem"]
     assert client.delete("/api/maps/torn").status_code == 200
     assert client.get("/api/broken-maps").json() == []
+
+
+def test_maps_of_an_older_odscen_are_listed_and_previewed_as_they_are_and_built_when_opened(
+    tmp_path: Path,
+) -> None:
+    store = Workspace.open(tmp_path)
+    about = store.add_map(SHIPPED / "t_junction_signs.xodr").folder / "map.json"
+    (about.parent / "SHA256SUMS").unlink()
+    older = json.loads(about.read_text()) | {"builder": "1"}
+    about.write_text(json.dumps(older))
+    with TestClient(create_app(store), base_url="http://localhost") as client:
+        (row,) = client.get("/api/maps").json()
+        assert row["name"] == "t_junction_signs"
+        assert client.get("/api/broken-maps").json() == []
+        assert client.get(row["preview"]).status_code == 200
+        assert json.loads(about.read_text())["builder"] == "1"
+        assert client.get("/api/maps/t_junction_signs").json()["source"] == row["source"]
+        assert json.loads(about.read_text())["builder"] != "1"
+        del older["network"]  # as very old ones are
+        (about.parent / "SHA256SUMS").unlink()
+        about.write_text(json.dumps(older))
+        assert client.get("/api/maps").json() == [row]
+        assert json.loads(about.read_text())["builder"] != "1"

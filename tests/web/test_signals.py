@@ -332,3 +332,22 @@ def test_lights_are_timed_after_the_demand_and_programs_go_out_and_come_back(
     alone = post(client, name, "signal-times/corridor", junctions=[JUNCTION])
     assert alone.status_code == 422
     assert "needs two traffic lights" in alone.json()["error"]["message"]
+
+
+def test_turns_get_arrows_before_lights_are_timed_if_that_is_asked_for(
+    client: TestClient, workspace: Workspace
+) -> None:
+    name = saved(workspace, scenario(None, vehicles=900.0, walkers=0.0, until=120.0), "busy")
+    timed = post(client, name, "signal-times/webster", turn_arrows=True).json()
+    said = f"Junction {JUNCTION}: the left turn from r1 has got an arrow ("
+    assert timed["notes"][0].startswith(said)
+    (timing,) = timed["state"]["document"]["signals"]["junctions"]
+    assert len(timing["stages"]) == 4
+    assert sum(not stage["permissive"] for stage in timing["stages"]) == 2
+    version = {"version": timed["state"]["version"]}
+    undone = client.post(f"/api/scenarios/{name}/undo", json=version).json()
+    assert undone["document"]["signals"]["junctions"] == [], "one step for undo"
+    quiet = saved(workspace, scenario(None, vehicles=200.0, walkers=0.0, until=120.0), "quiet")
+    few = post(client, quiet, "signal-times/webster", turn_arrows=True).json()
+    assert few["notes"][0].startswith("No turn has got an arrow: ")
+    assert few["notes"][1].startswith(f"Junction {JUNCTION}: cycle ")

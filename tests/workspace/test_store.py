@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from odscen.app.removal import remove
+from odscen.base.checksums import sums_of, write_sums
 from odscen.base.errors import (
     DamagedError,
     InputError,
@@ -11,8 +12,9 @@ from odscen.base.errors import (
     OpenDriveError,
     WorkspaceError,
 )
-from odscen.workspace import map_build
-from odscen.workspace.store import Workspace, check_name, name_from_file
+from odscen.workspace import guarded_build, map_build
+from odscen.workspace.folder_names import check_name, name_from_file
+from odscen.workspace.store import Workspace, is_outdated
 
 SHIPPED = Path(__file__).parents[2] / "maps"
 SMALL = SHIPPED / "t_junction_signs.xodr"
@@ -78,13 +80,54 @@ def test_a_map_is_found_by_its_content_under_another_name(workspace):
     assert workspace.map_for("renamed", entry.sha256) == entry
 
 
-def test_a_map_of_an_older_builder_is_built_again(tmp_path):
-    store = Workspace.open(tmp_path)
-    entry = store.add_map(SMALL)
-    (entry.folder / "SHA256SUMS").unlink()
+def outdate(entry):
+    """Let a map be that of an older odscen."""
     old = {**entry.info, "builder": "0"}
     (entry.folder / "map.json").write_text(json.dumps(old), encoding="utf-8")
-    assert store.map("t_junction_signs").info["builder"] != "0"
+    write_sums(entry.folder, sums_of(entry.folder))
+
+
+def test_a_map_of_an_older_builder_is_built_again_when_opened_not_when_listed(
+    tmp_path, monkeypatch
+):
+    store = Workspace.open(tmp_path)
+    small = store.add_map(SMALL)
+    other = store.add_map(SHIPPED / "roundabout.xodr")
+    outdate(small)
+    with monkeypatch.context() as patch:
+        patch.setattr(guarded_build, "build_in_child", lambda *_args, **_more: pytest.fail("built"))
+        assert [(one.name, is_outdated(one)) for one in store.maps()] == [
+            ("roundabout", False),
+            ("t_junction_signs", True),
+        ]
+        assert store.map_for("renamed", other.sha256) == other
+        assert is_outdated(store.stored("t_junction_signs"))
+    opened = store.map("t_junction_signs")
+    assert not is_outdated(opened)
+    assert not is_outdated(store.stored("t_junction_signs"))
+    assert {**opened.info, "build_seconds": 0} == {**small.info, "build_seconds": 0}
+
+
+def test_an_outdated_map_that_is_found_by_its_content_is_built_again(tmp_path):
+    store = Workspace.open(tmp_path)
+    entry = store.add_map(SMALL)
+    outdate(entry)
+    assert store.map_for("renamed", entry.sha256) == entry
+    outdate(entry)
+    assert store.first_map(lambda one: one.sha256 == entry.sha256) == entry
+    assert store.first_map(lambda one: one.sha256 == "") is None
+
+
+def test_an_outdated_map_that_is_damaged_is_listed_but_not_found(tmp_path):
+    store = Workspace.open(tmp_path)
+    entry = store.add_map(SMALL, name="a")
+    same = store.add_map(SMALL, name="b")
+    outdate(entry)
+    flip(entry.path("xodr"))
+    assert [one.name for one in store.maps()] == ["a", "b"]
+    assert store.first_map(lambda one: one.sha256 == same.sha256) == same
+    with pytest.raises(DamagedError, match="odscen doctor --repair builds map 'a' anew"):
+        store.map("a")
 
 
 def test_folders_in_the_making_are_not_maps(tmp_path):

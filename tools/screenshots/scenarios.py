@@ -159,9 +159,13 @@ def timed(workspace: Workspace) -> None:
 
 
 def swept(workspace: Workspace) -> None:
-    """Save the cut-in of the template with two parameters."""
+    """Save the cut-in of the guide, of 20 s."""
+    _save(workspace, SWEPT, edits.set_simulation(cut_in(workspace), duration=20.0))
+
+
+def cut_in(workspace: Workspace) -> Scenario:
+    """The cut-in of the template with two parameters."""
     scenario = template_scenario(workspace, SWEPT, WEAVE, values={}, name=SWEPT)
-    scenario = edits.set_simulation(scenario, duration=20.0)
     for name, value, unit, low, high, places in (
         ("ttc", 2.0, "s", 0.4, 4.0, ("rules/cut-in/when/ttc/below",)),
         ("challenger_speed", 11.0, "m/s", 5.0, 15.0, (
@@ -174,7 +178,7 @@ def swept(workspace: Workspace) -> None:
         )
         for place in places:
             scenario = edits.set_formula(scenario, place=place, formula=f"${name}")
-    _save(workspace, SWEPT, scenario)
+    return scenario
 
 
 def _save(workspace: Workspace, name: str, scenario: Scenario) -> None:

@@ -8766,6 +8766,8 @@ export interface components {
         /**
          * WebsterWish
          * @description Lights to be timed after the demand: all, or these junctions.
+         *
+         *     With ``turn_arrows`` turns get a protected stage first where the volumes ask for it.
          */
         WebsterWish: {
             /** Version */
@@ -8775,6 +8777,11 @@ export interface components {
              * @default []
              */
             junctions?: string[];
+            /**
+             * Turn Arrows
+             * @default false
+             */
+            turn_arrows?: boolean;
         };
         /**
          * WholeDay

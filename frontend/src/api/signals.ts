@@ -39,10 +39,11 @@ export const signals = {
       path: { name, junction },
       body: { version },
     }),
-  webster: (name: string, version: number, junctions: readonly string[]) =>
+  /** Times lights after the demand; all if no junction is named. */
+  webster: (name: string, version: number, junctions: readonly string[], arrows: boolean) =>
     call("post", "/api/scenarios/{name}/signal-times/webster", {
       path: { name },
-      body: { version, junctions: [...junctions] },
+      body: { version, junctions: [...junctions], turn_arrows: arrows },
     }),
   corridor: (name: string, version: number, wish: CorridorWish) =>
     call("post", "/api/scenarios/{name}/signal-times/corridor", {

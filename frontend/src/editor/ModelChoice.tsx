@@ -1,5 +1,4 @@
 import { Alert, Checkbox, NumberInput, Select, Text, TextInput } from "@mantine/core";
-
 import { Plural } from "@lingui/react/macro";
 
 import type { Chosen, Offered, OfferedOption, OptionValue } from "../api/models";

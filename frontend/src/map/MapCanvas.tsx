@@ -108,6 +108,8 @@ export function MapCanvas({
   const renderer = useRef<MapRenderer | null>(null);
   const view = useRef<View>({ x: 0, y: 0, scale: 1 });
   const size = useRef<Size>({ width: 1, height: 1 });
+  // Others may move the map before it is placed; that it is, the view does not tell.
+  const placed = useRef(false);
   const least = useRef(0.01);
   const drag = useRef<Drag | null>(null);
   // What a drag draws, pixels: two corners of a rectangle, or the points of a line.
@@ -142,7 +144,6 @@ export function MapCanvas({
     if (!layers.current || !host.current) return;
     const made = new CanvasRenderer(layers.current, drawing, graph, picker);
     renderer.current = made;
-    let first = view.current.scale === 1;
     const measure = (): void => {
       const box = host.current?.getBoundingClientRect();
       if (!box || box.width < 2) return;
@@ -150,10 +151,10 @@ export function MapCanvas({
       made.setSize(size.current, window.devicePixelRatio || 1);
       least.current = fit(drawing.bounds, size.current).scale * 0.6;
       const at = place.read();
-      if (first && at) apply(at);
-      else if (first) showAll();
-      else made.setView(view.current);
-      first = false;
+      if (placed.current) made.setView(view.current);
+      else if (at) apply(at);
+      else showAll();
+      placed.current = true;
     };
     const observer = new ResizeObserver(measure);
     observer.observe(host.current);

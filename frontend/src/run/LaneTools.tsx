@@ -4,10 +4,9 @@ import { Trans } from "@lingui/react/macro";
 
 import { nth } from "../lists";
 import { span as spanText } from "../ui/words";
-import { type LanesBy, QUANTITIES } from "./laneUse";
+import { LANES_BY, type LanesBy, QUANTITIES } from "./laneUse";
 import type { ShownUse } from "./useLaneUse";
 
-const BY: readonly LanesBy[] = ["speed", "delay", "density", "flow"];
 const NOTHING = "nothing";
 /** Room for the longest choice, and for each letter of the word before it and its edges, pixels. */
 const [VALUE, LETTER, EDGES] = [158, 6.5, 20];
@@ -31,7 +30,7 @@ export function LaneTools({ shown }: { shown: ShownUse }) {
         allowDeselect={false}
         data={[
           { value: NOTHING, label: t({ message: "Plain", context: "lanes without colours" }) },
-          ...BY.map((value) => ({ value, label: QUANTITIES()[value].word })),
+          ...LANES_BY.map((value) => ({ value, label: QUANTITIES()[value].word })),
         ]}
         value={by ?? NOTHING}
         onChange={(next) => choose(next === NOTHING ? null : (next as LanesBy))}
@@ -64,7 +63,7 @@ export function LaneTools({ shown }: { shown: ShownUse }) {
                   onChange={setSpan}
                 />
               )}
-              <Text size="xs" aria-live="polite">
+              <Text size="xs" aria-live="polite" data-hint={pointed === null || undefined}>
                 {pointed ? (
                   <Trans>
                     Lane {pointed.lane}: {pointed.value}

@@ -92,7 +92,10 @@ export function RunMap({
   const { replay } = player;
   const handle = handleOf(id);
   const frame = useRef<HTMLDivElement>(null);
-  const laneUse = useLaneUse(lanes, loaded);
+  const measured = !live && replayable;
+  const laneUse = useLaneUse(lanes, loaded, measured ? sight.lanes : null, (next) =>
+    views.colourLanes(id, next),
+  );
   const name = list.length > 1 ? viewName(list.findIndex((one) => one.id === id) + 1, list.length) : null;
   const what = live ? t`Live view of the run` : t`Recording of the run`;
   const place = useMemo<KeptPlace>(
@@ -180,7 +183,7 @@ export function RunMap({
             />
           }
         >
-          {!live && replayable && <LaneTools shown={laneUse} />}
+          {measured && <LaneTools shown={laneUse} />}
           {followed && speeds.length > 1 && (
             <SpeedChart
               name={followed}

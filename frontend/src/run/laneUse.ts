@@ -7,8 +7,28 @@ import { roadUnit, unitFor } from "../language/units";
 import { nth } from "../lists";
 import { ticks } from "./scale";
 
+export const LANES_BY = ["speed", "delay", "density", "flow"] as const;
 /** What the colour of a lane says. */
-export type LanesBy = "speed" | "delay" | "density" | "flow";
+export type LanesBy = (typeof LANES_BY)[number];
+
+/** What a view shows of lanes: over the intervals from the first up to before the last, or the whole run. */
+export interface LaneSight {
+  by: LanesBy;
+  span: readonly [number, number] | null;
+}
+
+/** As a link has it: `delay`, or `delay,2,5`; null if that is nothing that can be shown. */
+export function laneSight(text = ""): LaneSight | null {
+  const [word, ...span] = text.split(",");
+  const by = LANES_BY.find((one) => one === word);
+  if (!by) return null;
+  const [from = NaN, to = NaN] = span.map(Number);
+  const some = [from, to].every(Number.isInteger) && from >= 0 && from < to;
+  return { by, span: some ? [from, to] : null };
+}
+
+/** Inverse of {@link laneSight}. */
+export const laneSightText = ({ by, span }: LaneSight): string => [by, ...(span ?? [])].join(",");
 
 /**
  * From dark to light, distinct for the colour-blind too: viridis of Matplotlib at equal distances, without

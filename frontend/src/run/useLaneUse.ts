@@ -7,7 +7,16 @@ import type { LoadedGraph } from "../map/loaded";
 import type { Pointed } from "../map/MapCanvas";
 import type { LaneColors } from "../map/scene";
 import { reasonOf } from "../ui/reason";
-import { boundsOf, classOf, type LanesBy, LaneUse, sequential, valueText, wordsOf } from "./laneUse";
+import {
+  boundsOf,
+  classOf,
+  type LanesBy,
+  type LaneSight,
+  LaneUse,
+  sequential,
+  valueText,
+  wordsOf,
+} from "./laneUse";
 
 /** Metres from the middle of a lane up to which a point is on it. */
 const ON_LANE = 3;
@@ -75,16 +84,26 @@ export function useLaneData(run: string, loaded: LoadedGraph | null): LaneData {
   return useMemo(() => ({ use, rings, failure, ask }), [use, rings, failure, ask]);
 }
 
-/** What one view shows of it. */
-export function useLaneUse({ use, rings, failure, ask }: LaneData, loaded: LoadedGraph | null): ShownUse {
-  const [by, choose] = useState<LanesBy | null>(null);
-  const [chosen, setSpan] = useState<readonly [number, number] | null>(null);
+/** What one view shows of it: `sight` of a run that has lane data, changed by `show`. */
+export function useLaneUse(
+  { use, rings, failure, ask }: LaneData,
+  loaded: LoadedGraph | null,
+  sight: LaneSight | null,
+  show: (next: LaneSight | null) => void,
+): ShownUse {
+  const by = sight?.by ?? null;
   const [node, setNode] = useState<number | null>(null);
   useEffect(() => {
     if (by !== null) ask();
   }, [by, ask]);
 
-  const [from, to] = chosen ?? [0, use?.intervals ?? 0];
+  const last = use?.intervals ?? 0;
+  // A link may be about another length of the run.
+  const [from, to] = sight?.span && sight.span[1] <= last ? sight.span : [0, last];
+  const choose = (next: LanesBy | null): void => show(next && { by: next, span: sight?.span ?? null });
+  const setSpan = (span: readonly [number, number]): void => {
+    if (by) show({ by, span: span[0] === 0 && span[1] === last ? null : span });
+  };
   const bounds = useMemo(() => (use && by ? boundsOf(use.values(by)) : null), [use, by]);
   const values = useMemo(() => (use && by ? use.values(by, from, to) : null), [use, by, from, to]);
   const legend = useMemo(

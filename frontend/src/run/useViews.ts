@@ -3,6 +3,7 @@ import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } fro
 import type { MapHandle } from "../map/MapCanvas";
 import type { View } from "../map/view";
 import { keep, type Kept } from "../ui/kept";
+import type { LaneSight } from "./laneUse";
 import type { ColourBy } from "./tint";
 import { added, changed, closed, keptOf, openedViews, type RunSight, type RunViews } from "./views";
 
@@ -17,6 +18,7 @@ export interface ViewsOfRun {
   close: (id: number) => void;
   follow: (id: number, user: string | null) => void;
   colour: (id: number, by: ColourBy) => void;
+  colourLanes: (id: number, lanes: LaneSight | null) => void;
   /** Takes in what part of the map a view shows. */
   moved: (id: number, at: View) => void;
   /** The view that is to have the focus, as the one that had it was opened or closed; new at each time. */
@@ -61,6 +63,10 @@ export function useViews(linked: Kept): ViewsOfRun {
     [],
   );
   const colour = useCallback((id: number, by: ColourBy) => setViews((old) => changed(old, id, { by })), []);
+  const colourLanes = useCallback(
+    (id: number, lanes: LaneSight | null) => setViews((old) => changed(old, id, { lanes })),
+    [],
+  );
   const moved = useCallback((id: number, at: View) => {
     // A map that is taken away may still report a frame later.
     if (!newest.current.list.some((one) => one.id === id)) return;
@@ -71,7 +77,7 @@ export function useViews(linked: Kept): ViewsOfRun {
   const used = list.find(({ id }) => id === views.used) ?? list[0];
   if (!used) throw new Error("a run has no view");
   return useMemo(
-    () => ({ list, used, handleOf, use, add, close, follow, colour, moved, focus }),
-    [list, used, handleOf, use, add, close, follow, colour, moved, focus],
+    () => ({ list, used, handleOf, use, add, close, follow, colour, colourLanes, moved, focus }),
+    [list, used, handleOf, use, add, close, follow, colour, colourLanes, moved, focus],
   );
 }

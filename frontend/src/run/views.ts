@@ -1,5 +1,6 @@
 import type { View } from "../map/view";
 import type { Kept } from "../ui/kept";
+import { laneSight, type LaneSight, laneSightText } from "./laneUse";
 import { type ColourBy, isColourBy } from "./tint";
 
 /** One of the views of a run. */
@@ -10,6 +11,8 @@ export interface RunSight {
   followed: string | null;
   /** What the colours of its road users say. */
   by: ColourBy;
+  /** What the colours of lanes say, once the run has ended; null for nothing. */
+  lanes: LaneSight | null;
   /** Where it was opened; null for where the scenario takes place. */
   begin: View | null;
 }
@@ -24,13 +27,14 @@ export interface RunViews {
 export const MOST_VIEWS = 2;
 
 /** The views that a link asks for. */
-export function openedViews({ at, chosen, by, others = [] }: Kept): RunViews {
-  const all = [{ at, followed: chosen?.[0], by }, ...others].slice(0, MOST_VIEWS);
+export function openedViews({ at, chosen, by, lanes, others = [] }: Kept): RunViews {
+  const all = [{ at, followed: chosen?.[0], by, lanes }, ...others].slice(0, MOST_VIEWS);
   return {
     list: all.map((one, id) => ({
       id,
       followed: one.followed ?? null,
       by: isColourBy(one.by) ? one.by : "kind",
+      lanes: laneSight(one.lanes),
       begin: one.at ?? null,
     })),
     used: 0,
@@ -39,15 +43,21 @@ export function openedViews({ at, chosen, by, others = [] }: Kept): RunViews {
 
 /** What a link keeps of views; `places` has by id where they are now. */
 export function keptOf({ list }: RunViews, places: ReadonlyMap<number, View>): Kept {
-  const [first, ...others] = list.map(({ id, followed, by, begin }) => {
+  const [first, ...others] = list.map(({ id, followed, by, lanes, begin }) => {
     const at = places.get(id) ?? begin;
-    return { ...(at && { at }), ...(followed && { followed }), ...(by !== "kind" && { by }) };
+    return {
+      ...(at && { at }),
+      ...(followed && { followed }),
+      ...(by !== "kind" && { by }),
+      ...(lanes && { lanes: laneSightText(lanes) }),
+    };
   });
   // What is not there takes away what the address has, but for a place that is not known yet.
   return {
     ...(first?.at && { at: first.at }),
     chosen: first?.followed ? [first.followed] : [],
     by: first?.by,
+    lanes: first?.lanes,
     others,
   };
 }
@@ -75,5 +85,5 @@ export function closed(views: RunViews, id: number): RunViews {
 export const changed = (
   { list, used }: RunViews,
   id: number,
-  part: Partial<Pick<RunSight, "followed" | "by">>,
+  part: Partial<Pick<RunSight, "followed" | "by" | "lanes">>,
 ): RunViews => ({ list: list.map((one) => (one.id === id ? { ...one, ...part } : one)), used });

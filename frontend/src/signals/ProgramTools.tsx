@@ -214,6 +214,7 @@ export function TimingTools({
   const { name, time } = editing;
   const [busy, setBusy] = useState(false);
   const [result, setResult] = useState<TimingResult | null>(null);
+  const [arrows, setArrows] = useState(false);
   const ask = async (call: (version: number) => Promise<TimedSignals>): Promise<void> => {
     setBusy(true);
     setResult(await time(call));
@@ -229,7 +230,7 @@ export function TimingTools({
           size="compact-sm"
           variant="default"
           loading={busy}
-          onClick={() => void ask((version) => signals.webster(name, version, [junction]))}
+          onClick={() => void ask((version) => signals.webster(name, version, [junction], arrows))}
         >
           <Trans>Time it after the demand (Webster)</Trans>
         </Button>
@@ -238,12 +239,19 @@ export function TimingTools({
             size="compact-sm"
             variant="default"
             loading={busy}
-            onClick={() => void ask((version) => signals.webster(name, version, []))}
+            onClick={() => void ask((version) => signals.webster(name, version, [], arrows))}
           >
             <Trans>Time all {junctions.length} lights</Trans>
           </Button>
         )}
       </Group>
+      <Switch
+        size="sm"
+        label={t`With arrows for turns where the volumes ask for them`}
+        description={t`Turns across oncoming traffic with a lane for themselves get a protected stage, too.`}
+        checked={arrows}
+        onChange={({ currentTarget: { checked } }) => setArrows(checked)}
+      />
       {junctions.length > 1 && (
         <Corridor
           junctions={junctions}

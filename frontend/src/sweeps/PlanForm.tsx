@@ -34,6 +34,8 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
   const fault = faultOf(form);
   const cases = countOf(form);
   const wish = useMemo(() => wishOf(scenario, form), [scenario, form]);
+  const newest = useRef(wish);
+  newest.current = wish;
   const failed = (error: unknown): void => {
     setFailure(reasonOf(error));
     setBusy(null);
@@ -41,10 +43,17 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
   const plan = (): void => {
     setBusy("plan");
     setFailure(null);
-    sweeps.plan(wish).then((found) => {
-      setPlanned(found);
-      setBusy(null);
-    }, failed);
+    // One case runs for the answer; if the form has changed meanwhile, that is about another sweep.
+    sweeps.plan(wish).then(
+      (found) => {
+        if (newest.current === wish) setPlanned(found);
+        setBusy(null);
+      },
+      (error: unknown) => {
+        if (newest.current === wish) failed(error);
+        else setBusy(null);
+      },
+    );
   };
   const start = (): void => {
     setBusy("start");

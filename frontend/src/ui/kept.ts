@@ -12,6 +12,8 @@ export interface Kept {
   time?: number;
   /** What the colours of road users say. */
   by?: string;
+  /** What those of lanes say, and of which part of a run. */
+  lanes?: string;
   /** Further views of the same, in their order; the first one is described above. */
   others?: readonly KeptView[];
 }
@@ -21,6 +23,7 @@ export interface KeptView {
   at?: View;
   followed?: string;
   by?: string;
+  lanes?: string;
 }
 
 /** Milliseconds for which the address may lag behind. */
@@ -46,14 +49,17 @@ export function parseKept(hash: string): Kept {
   if (Number.isFinite(time)) kept.time = time;
   const by = query.get("by");
   if (by) kept.by = by;
+  const lanes = query.get("lanes");
+  if (lanes) kept.lanes = lanes;
   const others: KeptView[] = [];
   for (let n = 2; n < 2 + MOST_OTHERS && query.has(`at${n}`); n++) {
     const place = parsePlace(query.get(`at${n}`));
-    const [followed, colours] = [query.get(`chosen${n}`), query.get(`by${n}`)];
+    const [followed, colours, lanes] = ["chosen", "by", "lanes"].map((key) => query.get(`${key}${n}`));
     others.push({
       ...(place && { at: place }),
       ...(followed && { followed }),
       ...(colours && { by: colours }),
+      ...(lanes && { lanes }),
     });
   }
   if (others.length > 0) kept.others = others;
@@ -71,18 +77,20 @@ const placeText = ({ x, y, scale }: View): string =>
   `${x.toFixed(2)},${y.toFixed(2)},${Number(scale.toPrecision(5))}`;
 
 /** Inverse of {@link parseKept}, put behind the path of an address. */
-export function withKept(hash: string, { at, step, chosen, time, by, others = [] }: Kept): string {
+export function withKept(hash: string, { at, step, chosen, time, by, lanes, others = [] }: Kept): string {
   const query = new URLSearchParams();
   if (at) query.set("at", placeText(at));
   if (step) query.set("step", step);
   if (chosen && chosen.length <= MOST_CHOSEN) for (const id of chosen) query.append("chosen", id);
   if (time !== undefined) query.set("time", time.toFixed(1));
   if (by) query.set("by", by);
+  if (lanes) query.set("lanes", lanes);
   others.forEach((other, k) => {
     // Also without a place it is there.
     query.set(`at${k + 2}`, other.at ? placeText(other.at) : "");
     if (other.followed) query.set(`chosen${k + 2}`, other.followed);
     if (other.by) query.set(`by${k + 2}`, other.by);
+    if (other.lanes) query.set(`lanes${k + 2}`, other.lanes);
   });
   const text = query.toString().replaceAll("%2C", ",");
   return text ? `${pathOf(hash)}?${text}` : pathOf(hash);

@@ -1,5 +1,6 @@
 // @vitest-environment happy-dom
 import { act, renderHook, screen, waitFor } from "@testing-library/react";
+import { useState } from "react";
 import { afterEach, expect, test, vi } from "vitest";
 
 import type { RunLanes } from "../../src/api/runs";
@@ -11,7 +12,17 @@ import { EMPTY_SCENE } from "../../src/map/scene";
 import { SceneLayer } from "../../src/map/sceneLayer";
 import { writtenPath, writtenPicture } from "../../src/map/svg";
 import { LaneTools } from "../../src/run/LaneTools";
-import { boundsOf, classOf, LaneUse, sequential, valueText, wordsOf } from "../../src/run/laneUse";
+import {
+  boundsOf,
+  classOf,
+  type LaneSight,
+  laneSight,
+  laneSightText,
+  LaneUse,
+  sequential,
+  valueText,
+  wordsOf,
+} from "../../src/run/laneUse";
 import { Legend } from "../../src/run/Legend";
 import { type ShownUse, useLaneData, useLaneUse } from "../../src/run/useLaneUse";
 import { graph } from "../example";
@@ -94,7 +105,10 @@ const at = (x: number) => ({ x, y: 0, reach: 1, shift: false });
 
 test("lanes have the colour of their value, and one that is pointed at says it", async () => {
   const asked = server({ "/api/runs/r/lanes": LANES });
-  const { result } = renderHook(() => useLaneUse(useLaneData("r", loaded), loaded));
+  const { result } = renderHook(() => {
+    const [sight, show] = useState<LaneSight | null>(null);
+    return useLaneUse(useLaneData("r", loaded), loaded, sight, show);
+  });
   expect(asked).toEqual([]);
   expect(result.current.colors).toBeNull();
   act(() => result.current.choose("flow"));
@@ -112,6 +126,25 @@ test("lanes have the colour of their value, and one that is pointed at says it",
   expect(result.current.colors?.rings.flat()).toHaveLength(1);
   act(() => result.current.choose("speed"));
   expect(asked).toHaveLength(1);
+});
+
+test("a link may name a part of the run; one that is too long for it is the whole run", async () => {
+  server({ "/api/runs/r/lanes": LANES });
+  const of = (span: readonly [number, number]) =>
+    renderHook(() => useLaneUse(useLaneData("r", loaded), loaded, { by: "flow", span }, vi.fn()));
+  const [one, long] = [of([1, 2]), of([1, 9])];
+  await waitFor(() => expect(long.result.current.colors).not.toBeNull());
+  await waitFor(() => expect(one.result.current.colors).not.toBeNull());
+  expect(one.result.current.span).toEqual([1, 2]);
+  expect(long.result.current.span).toEqual([0, 2]);
+  for (const text of ["delay", "flow,2,5"]) {
+    const sight = laneSight(text);
+    expect(sight && laneSightText(sight)).toBe(text);
+  }
+  for (const odd of ["flow,5,2", "flow,-1,2", "flow,0.5,2", "flow,1", "flow,x,y"])
+    expect(laneSight(odd)).toEqual({ by: "flow", span: null });
+  expect(laneSight("smell,1,2")).toBeNull();
+  expect(laneSight()).toBeNull();
 });
 
 test("a drawing has the lanes in their colours below everything else", () => {

@@ -18,9 +18,9 @@ const PLACE = { x: 10, y: 20, scale: 4 };
 const FAR = { x: -3, y: 7.25, scale: 0.5 };
 
 test("a link without views opens one, at the place and with the road user that it names", () => {
-  expect(openedViews({}).list).toEqual([{ id: 0, followed: null, by: "kind", begin: null }]);
-  expect(openedViews({ at: PLACE, chosen: ["car-1"], by: "delay" }).list).toEqual([
-    { id: 0, followed: "car-1", by: "delay", begin: PLACE },
+  expect(openedViews({}).list).toEqual([{ id: 0, followed: null, by: "kind", lanes: null, begin: null }]);
+  expect(openedViews({ at: PLACE, chosen: ["car-1"], by: "delay", lanes: "flow" }).list).toEqual([
+    { id: 0, followed: "car-1", by: "delay", lanes: { by: "flow", span: null }, begin: PLACE },
   ]);
   // What is no colouring is the plain one, and there are never more views than fit.
   const many = openedViews({ by: "smell", others: [{}, {}, {}] });
@@ -28,10 +28,11 @@ test("a link without views opens one, at the place and with the road user that i
 });
 
 test("a new view shows the same place in the same colours, follows nobody and is the one in use", () => {
-  const one = openedViews({ chosen: ["car-1"], by: "speed" });
+  const one = openedViews({ chosen: ["car-1"], by: "speed", lanes: "delay,1,3" });
   const two = added(one, 0, PLACE);
   expect(two.used).toBe(1);
-  expect(two.list[1]).toEqual({ id: 1, followed: null, by: "speed", begin: PLACE });
+  const lanes = { by: "delay", span: [1, 3] };
+  expect(two.list[1]).toEqual({ id: 1, followed: null, by: "speed", lanes, begin: PLACE });
   expect(added(two, 0, PLACE)).toBe(two);
 });
 
@@ -57,13 +58,14 @@ test("a link keeps how many views there are, what each shows and whom it follows
   const made = changed(added(openedViews({ chosen: ["a & b"] }), 0, PLACE), 1, {
     followed: "bus, 2",
     by: "speed",
+    lanes: { by: "density", span: [2, 5] },
   });
   const hash = withKept("#/run/s/r", keptOf(made, new Map([[0, FAR]])));
   expect(hash).toContain("at2=10.00,20.00,4&");
   const opened = openedViews(parseKept(hash));
   expect(opened.list).toEqual([
-    { id: 0, followed: "a & b", by: "kind", begin: FAR },
-    { id: 1, followed: "bus, 2", by: "speed", begin: PLACE },
+    { id: 0, followed: "a & b", by: "kind", lanes: null, begin: FAR },
+    { id: 1, followed: "bus, 2", by: "speed", lanes: { by: "density", span: [2, 5] }, begin: PLACE },
   ]);
 });
 
@@ -85,6 +87,10 @@ test("the address has views as they are opened, moved, used and closed", () => {
   act(() => result.current.moved(1, FAR));
   act(() => result.current.follow(1, "car-1"));
   expect(address()).toBe("#/run/s/r?at=10.00,20.00,4&at2=-3.00,7.25,0.5&chosen2=car-1");
+  act(() => result.current.colourLanes(0, { by: "flow", span: null }));
+  expect(address()).toContain("&lanes=flow&at2=");
+  act(() => result.current.colourLanes(0, null));
+  expect(address()).not.toContain("lanes");
   act(() => result.current.use(0));
   expect(result.current.used.id).toBe(0);
   act(() => result.current.close(0));

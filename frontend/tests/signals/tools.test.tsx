@@ -3,7 +3,7 @@ import { screen } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
 import type { PlacePick } from "../../src/editor/pick";
-import type { LightProgram } from "../../src/api/signals";
+import { type LightProgram, signals, type TimedSignals } from "../../src/api/signals";
 import type { SignalEditing, Timing } from "../../src/signals/editing";
 import { QueueLanes } from "../../src/signals/queues";
 import { detectorNames } from "../../src/map/detectorMarks";
@@ -121,6 +121,23 @@ test("lights are timed by buttons, and what came of it is said", async () => {
   );
   const href = screen.getByRole("link", { name: "Export for SUMO" }).getAttribute("href");
   expect(href).toBe("/api/scenarios/one/signals.add.xml");
+});
+
+test("timing gives turns arrows, too, if that is switched on", async () => {
+  const webster = vi.spyOn(signals, "webster").mockResolvedValue({} as TimedSignals);
+  const editing = editable({
+    time: vi.fn(async (call) => {
+      await call(3);
+      return { notes: [], picture: "" };
+    }),
+  });
+  const { user } = show(panel(program(), editing, ["10", "11"]));
+  await user.click(await screen.findByRole("button", { name: "Time it after the demand (Webster)" }));
+  expect(webster).toHaveBeenLastCalledWith("one", 3, ["10"], false);
+  await user.click(screen.getByRole("switch", { name: /^With arrows for turns/ }));
+  await user.click(screen.getByRole("button", { name: "Time all 2 lights" }));
+  expect(webster).toHaveBeenLastCalledWith("one", 3, [], true);
+  webster.mockRestore();
 });
 
 test("detectors lie on the map where they are, filled if occupied, and are named once for all lanes", () => {

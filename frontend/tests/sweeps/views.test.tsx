@@ -2,7 +2,13 @@
 import { screen, waitFor, within } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
-import type { SweepCase, SweepCases, SweepInfo } from "../../src/api/sweeps";
+import {
+  type PlannedSweep,
+  type SweepCase,
+  type SweepCases,
+  type SweepInfo,
+  sweeps,
+} from "../../src/api/sweeps";
 import type { ScenarioDocument } from "../../src/api/types";
 import { prefer } from "../../src/language/preferences";
 import { CaseTable } from "../../src/sweeps/CaseTable";
@@ -153,6 +159,27 @@ test("a sweep tells what it takes before it starts, and a change of the form ask
     path: "/api/sweeps",
     body: { scenario: "s", vary: [{ parameter: "gap", low: 5, high: 50, steps: 7 }] },
   });
+});
+
+test("what a sweep takes is not said of a form that has changed while it was found out", async () => {
+  const swept: ScenarioDocument = {
+    ...scenario([actor("a")]),
+    parameters: { gap: { value: 20, unit: "m", min: 5, max: 50, description: "" } },
+  };
+  let answer: (found: PlannedSweep) => void = () => undefined;
+  const plan = vi.spyOn(sweeps, "plan").mockReturnValue(new Promise((done) => (answer = done)));
+  server({ "/api/figures": [] });
+  const { user } = show(<PlanForm scenario="s" document={swept} />);
+  await user.click(screen.getByRole("button", { name: "Plan the sweep" }));
+  await user.type(screen.getByRole("textbox", { name: "Values of gap" }), "0");
+  expect(screen.getByText("50 cases, each a run of 60 s.")).toBeDefined();
+  answer(planned);
+  await waitFor(() =>
+    expect(screen.getByRole("button", { name: "Plan the sweep" })).toHaveProperty("disabled", false),
+  );
+  expect(screen.queryByRole("button", { name: /^Run/ })).toBeNull();
+  expect(screen.queryByText(costOf(planned))).toBeNull();
+  plan.mockRestore();
 });
 
 test("a sweep that was stopped says so and can be resumed", async () => {

@@ -23,7 +23,7 @@ from odscen.learning.fill import Fill, FillRequest, fill_from_arrays, fill_from_
 from odscen.learning.fill_check import CheckedFill, checked_fill
 from odscen.learning.named_objects import named_object
 from odscen.learning.offered_models import installed_names, offered_models
-from odscen.learning.offered_options import OptionValue, option_values, options_of
+from odscen.learning.offered_options import OptionValue, values_for
 from odscen.scenario.document.named_random import stream
 
 if TYPE_CHECKING:
@@ -81,26 +81,18 @@ def open_generator(door: GeneratorDoor) -> Generator:
             msg = "options are for classes; those of another program go into its command"
             raise InputError(msg, element="generator")
         return _Command(_words(door.command), door.time_limit)
-    found = _found(door.name or "")
-    values = _values(found, door)
+    name = door.name or ""
+    found = _found(name)
+    values = values_for(found, door.options, name=name)
     try:
         made = found(**values) if isinstance(found, type) else found
     except Exception as error:  # whatever code from outside may raise
         msg = f"it cannot be made: {error!r}"
-        raise InputError(msg, element=door.name) from error
+        raise InputError(msg, element=name) from error
     if not callable(getattr(made, "fill", None)):
         msg = "it has no method `fill(graph, request, rng)`"
-        raise InputError(msg, element=door.name)
-    return _Guarded(made, door.name or "")
-
-
-def _values(found: Any, door: GeneratorDoor) -> dict[str, OptionValue]:
-    """Options that a class is made with; what is no class has none."""
-    try:
-        return option_values(options_of(found) if isinstance(found, type) else (), door.options)
-    except InputError as error:
-        error.element = door.name
-        raise
+        raise InputError(msg, element=name)
+    return _Guarded(made, name)
 
 
 def installed_generators() -> tuple[OfferedModel, ...]:

@@ -11,8 +11,8 @@ from odscen.base.errors import ConflictError, NotFoundError
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.run_status import going
 from odscen.sumo.runner.long_runs import about
+from odscen.workspace.folder_names import check_name
 from odscen.workspace.map_entry import MapEntry
-from odscen.workspace.store import check_name
 from odscen.workspace.wastebasket import SCENARIO_SUFFIX, Wastebasket
 
 if TYPE_CHECKING:

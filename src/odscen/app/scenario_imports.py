@@ -22,7 +22,7 @@ from odscen.interchange.openscenario_import.xosc_reader import (
     read_openscenario,
     report_without_map,
 )
-from odscen.workspace.store import name_from_file
+from odscen.workspace.folder_names import name_from_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable

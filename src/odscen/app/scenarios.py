@@ -12,10 +12,10 @@ from odscen.base.text_files import write_text
 from odscen.results.judging.criteria import criteria_problems
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
-from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
+from odscen.scenario.document.sampling_config import MapFilter, SamplingConfig, loads_config
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
-from odscen.workspace.store import plain_name
+from odscen.workspace.folder_names import plain_name
 from odscen.workspace.wastebasket import SCENARIO_SUFFIX
 
 if TYPE_CHECKING:
@@ -228,8 +228,8 @@ def generate(
     statistics: dict[str, Any] = {}
     if map_name is not None:
         workspace.map(map_name)
-    else:  # all maps are read, which takes seconds where one of them is large
-        statistics = {entry.name: entry.info["statistics"] for entry in workspace.maps()}
+    else:
+        statistics = _statistics(workspace, config.maps)
         if not statistics:
             msg = f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
             raise InputError(msg)
@@ -257,3 +257,19 @@ def generate(
         file = (out or workspace.scenarios) / f"{title}{SUFFIX}"
         paths.append(write_scenario(scenario, file))
     return paths
+
+
+def _statistics(workspace: Workspace, maps: MapFilter) -> dict[str, dict[str, Any]]:
+    """Statistics of all maps, by name; those that decide what is drawn are up to date.
+
+    Only maps whose statistics decide are opened: what an older odscen has built is then rebuilt.
+    """
+    from odscen.scenario.sampling.sampler import passes_by_name
+
+    by_statistics = bool(maps.where) or maps.weight_by is not None
+    return {
+        one.name: (
+            workspace.map(one.name) if by_statistics and passes_by_name(maps, one.name) else one
+        ).info["statistics"]
+        for one in workspace.maps()
+    }

@@ -8,7 +8,7 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.base.errors import ConflictError
 from odscen.scenario.templates.template_registry import find_template, place_template
-from odscen.workspace.store import check_name
+from odscen.workspace.folder_names import check_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

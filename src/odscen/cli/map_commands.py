@@ -111,7 +111,7 @@ def add(
 
 def names_for(files: list[Path], name: str | None) -> list[str]:
     """Names for the maps; files of the same name in one call also get their folder's name."""
-    from odscen.workspace.store import name_from_file
+    from odscen.workspace.folder_names import name_from_file
 
     if name is not None:
         return [name]
@@ -127,10 +127,10 @@ def names_for(files: list[Path], name: str | None) -> list[str]:
 @app.command("list")
 def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> None:
     """List the maps with their statistics."""
-    from odscen.workspace.store import Workspace
+    from odscen.workspace.store import Workspace, is_outdated
 
     entries, broken = Workspace.open(workspace).catalogue()
-    rows = [_row(entry) for entry in entries]
+    rows = [{**_row(entry), "outdated": is_outdated(entry)} for entry in entries]
     if as_json:
         print_json({"maps": rows, "broken": [asdict(one) for one in broken]})
     elif not rows and not broken:
@@ -155,6 +155,9 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
                 for row in rows
             ],
         )
+    for row in rows:
+        if row["outdated"]:
+            log(f"outdated: {row['name']}: an earlier odscen has built it; it is rebuilt when used")
     for one in broken:
         log(f"broken: {one.name}: {one.problem}")
 
@@ -314,8 +317,9 @@ def _figure(value: float) -> str:
 
 
 def _row(entry: MapEntry) -> dict[str, Any]:
-    keys = ("name", "sha256", "opendrive", "statistics", "graph", "network", "build_seconds")
-    return {key: entry.info[key] for key in keys}
+    keys = ("name", "sha256", "opendrive", "statistics", "graph", "build_seconds")
+    network = entry.info.get("network", {"converter": entry.converter})  # maps of 0.1 have none
+    return {**{key: entry.info[key] for key in keys}, "network": network}
 
 
 def _added(entry: MapEntry) -> str:

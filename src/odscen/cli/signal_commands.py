@@ -168,7 +168,7 @@ def webster(
     """Time lights after the demand: cycle and splits by Webster's method."""
     from odscen.app import scenarios
     from odscen.app.signals.signal_optimisation import time_signals
-    from odscen.app.signals.turn_arrows import with_turn_arrows
+    from odscen.app.signals.turn_arrows import arrow_words, with_turn_arrows
     from odscen.workspace.store import Workspace
 
     store = Workspace.open(workspace)
@@ -191,11 +191,8 @@ def webster(
         found = {"arrows": [arrow._asdict() for arrow in arrows]} if turn_arrows else {}
         print_json({"scenario": str(path), **timed.to_dict(), **found})
         return
-    for arrow in arrows:
-        log(
-            f"junction {arrow.junction}: the {arrow.turn} turn from {arrow.approach} has got an "
-            f"arrow ({arrow.vehicles:.0f} vehicles an hour across {arrow.opposing:.0f})"
-        )
+    for words in arrow_words(arrows) if turn_arrows else ():
+        log(words)
     for light in timed.lights:
         print_timed_light(light)
     for name in timed.without:

@@ -73,13 +73,15 @@ def offered(
 def options_of(made_by: Any) -> tuple[OfferedOption, ...]:
     """Options that a class has; none if it says nothing of them.
 
+    An attribute ``options`` that is nothing like a schema, such as a method, is the class's own.
+
     Raises
     ------
     InputError
         If what it says is no schema of plain values.
     """
-    said = getattr(made_by, "options", None)
-    if said is None:
+    said: Any = getattr(made_by, "options", None)
+    if not _is_offer(said):
         some = fields(made_by) if is_dataclass(made_by) else ()
         schemas = {one.name: one.metadata[_SCHEMA] for one in some if _SCHEMA in one.metadata}
         return tuple(_option(name, schema) for name, schema in schemas.items())
@@ -119,6 +121,45 @@ def option_values(
             raise InputError(msg)
         found[name] = _checked(one, value)
     return found
+
+
+def values_for(
+    found: Any, given: Mapping[str, OptionValue], *, name: str, others: bool = False
+) -> dict[str, OptionValue]:
+    """Values that a class is made with, checked and completed; what is no class takes none.
+
+    Parameters
+    ----------
+    name
+        Of the class, as an error says it.
+    others
+        Leave what a class does not offer to the class, unchecked.
+
+    Raises
+    ------
+    InputError
+        If there is no such option, a value is not possible or missing, or what the class says of
+        its options is no schema.
+    """
+    is_class = isinstance(found, type)
+    try:
+        options = options_of(found) if is_class else ()
+        known = {one.name for one in options}
+        left = {key for key in given if key not in known} if others and is_class else set()
+        checked = option_values(options, {key: v for key, v in given.items() if key not in left})
+    except InputError as error:
+        error.element = name
+        raise
+    return {**given, **checked}
+
+
+def _is_offer(said: Any) -> bool:
+    """Whether an attribute is meant as a schema, perhaps as a wrong one."""
+    if not isinstance(said, dict):
+        return hasattr(said, "model_json_schema")
+    if "properties" in said or "$schema" in said or said.get("type") == "object":
+        return True
+    return any(isinstance(one, dict) and one.get("type") in _KINDS for one in said.values())
 
 
 def _option(name: str, schema: Any) -> OfferedOption:

@@ -27,7 +27,7 @@ from odscen.scenario.document.json_form import dumps, loads
 from odscen.web import history
 from odscen.web.history import History
 from odscen.web.messages import ScenarioRow
-from odscen.workspace.store import check_name, is_name
+from odscen.workspace.folder_names import check_name, is_name
 from odscen.workspace.wastebasket import HISTORY, Wastebasket
 
 if TYPE_CHECKING:

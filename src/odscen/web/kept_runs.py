@@ -29,7 +29,7 @@ from odscen.web.wire.run_messages import (
     RunState,
 )
 from odscen.web.wire.summary_messages import RunSummary
-from odscen.workspace.store import check_name
+from odscen.workspace.folder_names import check_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

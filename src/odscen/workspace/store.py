@@ -8,8 +8,8 @@ before they become paths.
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +24,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.workspace.allowances import BY_SIZE
 from odscen.workspace.asset_catalogue import assets_in
+from odscen.workspace.folder_names import check_name, is_name, name_from_file
 from odscen.workspace.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.workspace.map_files import read_map_file
 
@@ -35,44 +36,21 @@ if TYPE_CHECKING:
     from odscen.workspace.converters import GivenNetwork
 
 BUILDER = "12"
-"""Raised whenever what a map folder contains changes; older folders are then rebuilt."""
+"""Raised whenever what a map folder contains changes; older folders are rebuilt when opened."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"
 
 PATIENCE = 600.0
 """Wall seconds to wait for another process that builds the same map."""
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
-
 ProgressCallback = Callable[[str, float], None]
 """Called with what is being done and the share done, 0 to 1, again and again while nothing changes
 too. What it raises ends the work, and nothing is left of it."""
 
 
-def check_name(name: str, *, what: str = "map") -> str:
-    """Return ``name`` if it can name a folder everywhere, else raise :class:`InputError`."""
-    if not _NAME.fullmatch(name):
-        msg = (
-            f"{what} name {name!r} cannot be used: letters, digits, '_', '-' and '.', "
-            "starting with a letter or digit, at most 64"
-        )
-        raise InputError(msg)
-    return name
-
-
-def is_name(name: str) -> bool:
-    """Whether :func:`check_name` takes it."""
-    return _NAME.fullmatch(name) is not None
-
-
-def name_from_file(path: Path) -> str:
-    """Map name for a file: its stem, with everything unusual replaced by ``_``."""
-    return plain_name(path.stem) or "map"
-
-
-def plain_name(text: str) -> str:
-    """Text as it can name a folder everywhere, perhaps empty: the unusual replaced by ``_``."""
-    return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("._-")[:64]
+def is_outdated(entry: MapEntry) -> bool:
+    """Whether an older odscen has built a map, so that it is rebuilt when it is opened."""
+    return bool(entry.info["builder"] != BUILDER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,28 +134,39 @@ class Workspace:
     def _is_map(self, name: str) -> bool:
         folder = self.root / "maps" / name
         files = (INFO_FILE, XODR_FILE)
-        return bool(_NAME.fullmatch(name)) and any((folder / one).is_file() for one in files)
+        return is_name(name) and any((folder / one).is_file() for one in files)
 
     def _has(self, name: str) -> bool:
         """Whether there is such a map; asked for each run of many, and does not look at others."""
         return name in self._map_folders() and self._is_map(name)
 
     def maps(self) -> list[MapEntry]:
-        """All maps that can be used, sorted by name."""
+        """All maps that can be used, as :meth:`stored` gives them, sorted by name."""
         return self.catalogue()[0]
 
     def catalogue(self) -> tuple[list[MapEntry], list[BrokenMap]]:
-        """All maps, sorted by name: those that can be used, and those that cannot, with why."""
+        """All maps, sorted by name: those that can be used, and those that cannot, with why.
+
+        They are as :meth:`stored` gives them: listing builds nothing.
+        """
         entries, broken = [], []
         for name in self.map_names():
             try:
-                entries.append(self.map(name))
+                entries.append(self.stored(name))
             except OdscenError as error:
                 broken.append(BrokenMap(name, str(error)))
         return entries, broken
 
-    def map(self, name: str) -> MapEntry:
-        """One map by name; rebuilt first if an older odscen has built it.
+    def first_map(self, fits: Callable[[MapEntry], bool]) -> MapEntry | None:
+        """Open the first map by name that fits, as it is stored, and is not damaged."""
+        for one in self.maps():
+            if fits(one):
+                with suppress(DamagedError):
+                    return self.map(one.name)
+        return None
+
+    def stored(self, name: str) -> MapEntry:
+        """One map by name as it is stored: to be listed or compared, as it may be outdated.
 
         Raises
         ------
@@ -188,10 +177,25 @@ class Workspace:
         """
         if not self._has(name):
             raise NotFoundError("map", name, self.map_names())
-        entry = read_entry(self.root / "maps" / name)
-        if entry.info["builder"] != BUILDER:
-            return self.add_map(entry.checked("xodr"), name=name, settings=entry.conversion)
-        return entry
+        return read_entry(self.root / "maps" / name)
+
+    def map(self, name: str) -> MapEntry:
+        """Open one map by name; rebuilt first if an older odscen has built it.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        DamagedError
+            If it is broken.
+        OdscenError
+            If it is outdated and cannot be rebuilt, as of :meth:`add_map`.
+        """
+        entry = self.stored(name)
+        if not is_outdated(entry):
+            return entry
+        content, file = entry.read("xodr"), str(entry.info["source"])
+        return self.add_map_content(content, file=file, name=name, settings=entry.conversion)
 
     def map_for(self, name: str, sha256: str) -> MapEntry:
         """Map that a scenario refers to: of the same content, and of the same name if it can be.
@@ -212,9 +216,9 @@ class Workspace:
             else:
                 if entry.sha256 == sha256:
                     return entry
-        for other in self.maps():
-            if other.sha256 == sha256:
-                return other
+        other = self.first_map(lambda one: one.sha256 == sha256)
+        if other is not None:
+            return other
         if broken is not None:
             raise broken
         if not self._has(name):
@@ -291,7 +295,7 @@ class Workspace:
             same = built if built and built.sha256 == digest(content) else None
             if settings.converter is None:
                 settings = replace(settings, converter=same.converter if same else "odscen")
-            if same and (same.conversion, same.info["builder"]) == (settings, BUILDER):
+            if same and same.conversion == settings and not is_outdated(same):
                 return same
             kept = same is not None and same.converter == settings.converter == "file"
             given = same.given() if same and kept else None

@@ -20,7 +20,7 @@ from odscen.base.atomic_folders import discard
 from odscen.base.errors import ConflictError, NotFoundError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
-from odscen.workspace.store import check_name
+from odscen.workspace.folder_names import check_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

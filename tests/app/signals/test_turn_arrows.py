@@ -16,6 +16,7 @@ from odscen.app.signals.turn_arrows import PRODUCTS, with_turn_arrows
 from odscen.base.errors import InputError
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import MapReference
+from odscen.sumo.calibrate.turning_volumes import planned_vehicles, turning_volumes
 from odscen.workspace.store import Workspace
 from tests.signal_case import (
     JUNCTION,
@@ -77,6 +78,27 @@ def test_turns_get_an_arrow_where_the_product_of_volumes_asks_for_it(workspace: 
     assert arrow <= set(stages[0].permissive), "the arrow lags"
     lefts = {m for g in timing(new).groups if g.id in arrow for m in g.movements}
     assert lefts == {"r1 left", "r3 left"}
+
+
+def test_all_who_drive_against_a_turn_are_counted_whichever_lanes_they_may_take(
+    workspace: Workspace,
+) -> None:
+    """Lanes for bicycles beside those for cars carry the same turns, and not all of them meet."""
+    one = main_road(workspace, 700.0, 200.0)
+    _, arrows = with_turn_arrows(workspace, one)
+    sumo = load_map(workspace.map("signal_crossing")).sumo
+    vehicles = [*planned_vehicles(one, sumo)]
+    volumes = turning_volumes(vehicles, duration=one.simulation.duration).by_turn
+    legs = {
+        f"r{n}": {t: v.vehicles for t, v in volumes.items() if t.source == f"{n}.1.f"}
+        for n in (1, 3)
+    }
+    opposite = {"r1": "r3", "r3": "r1"}
+    for arrow in arrows:
+        against = sum(legs[opposite[arrow.approach]].values())
+        mates = next(a.vehicles for a in arrows if a.approach == opposite[arrow.approach])
+        assert arrow.opposing == pytest.approx(against - mates), "straight on and to the right"
+        assert arrow.vehicles in legs[arrow.approach].values()
 
 
 def test_with_few_vehicles_the_light_keeps_the_program_of_the_map(workspace: Workspace) -> None:

@@ -14,7 +14,7 @@ from odscen.base.shown import printable
 from odscen.scenario.document.json_form import loads
 from odscen.workspace.allowances import for_import
 from odscen.workspace.child_process import work_in_child
-from odscen.workspace.store import check_name, name_from_file
+from odscen.workspace.folder_names import check_name, name_from_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -161,9 +161,9 @@ def _added(
 ) -> tuple[MapEntry, bool]:
     """The map of this content; added if there is none."""
     sha256 = digest(sent.content)
-    for one in workspace.maps():
-        if one.sha256 == sha256:
-            return one, False
+    there = workspace.first_map(lambda one: one.sha256 == sha256)
+    if there is not None:
+        return there, False
     stem = name_from_file(Path(sent.name))
     name, number, taken = stem, 1, workspace.map_names()
     while name in taken:

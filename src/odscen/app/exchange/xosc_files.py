@@ -210,9 +210,9 @@ def given_map(workspace: Workspace, given: str) -> MapEntry:
 
 def known_or_added(workspace: Workspace, file: Path) -> MapEntry:
     """The map of the workspace that has the content of a file; added if there is none."""
-    content = read_given(file)
-    same = [one for one in workspace.maps() if one.sha256 == digest(content)]
-    return same[0] if same else workspace.add_map(file)
+    sha256 = digest(read_given(file))
+    there = workspace.first_map(lambda one: one.sha256 == sha256)
+    return workspace.add_map(file) if there is None else there
 
 
 def bare_map(named: str) -> str:

@@ -34,7 +34,7 @@ from odscen.sumo.calibrate.turning_volumes import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Sequence
     from collections.abc import Set as AbstractSet
     from pathlib import Path
 
@@ -43,6 +43,9 @@ if TYPE_CHECKING:
     from odscen.scenario.edits.turn_treatment import CrossingTurn
     from odscen.scenario.signals.light import Light
     from odscen.workspace.store import Workspace
+
+_Counts = list[tuple[frozenset[int], float]]
+"""Movements of each turn, one for each of its lanes, and its vehicles an hour."""
 
 PRODUCTS = {1: 50_000.0, 2: 90_000.0, 3: 110_000.0}
 """Turning times opposing vehicles (each an hour) by opposing lanes, from which on a turn is
@@ -73,6 +76,19 @@ class TurnArrow(NamedTuple):
     def product_reached(self) -> bool:
         """Whether the volumes ask for an arrow."""
         return self.vehicles * self.opposing > PRODUCTS[min(max(self.lanes, 1), 3)]
+
+    def to_words(self) -> str:
+        """What it has got, as a sentence."""
+        return (
+            f"Junction {self.junction}: the {self.turn} turn from {self.approach} has got an arrow "
+            f"({self.vehicles:.0f} vehicles an hour across {self.opposing:.0f})."
+        )
+
+
+def arrow_words(arrows: Sequence[TurnArrow]) -> tuple[str, ...]:
+    """Say of each turn that it has got an arrow, or that none has."""
+    none = "No turn has got an arrow: none that needs one has a lane for itself and a stage left."
+    return tuple(arrow.to_words() for arrow in arrows) or (none,)
 
 
 def with_turn_arrows(
@@ -116,12 +132,11 @@ def with_turn_arrows(
     arrows: list[TurnArrow] = []
     for number in lights:
         view = loaded.lights[number]
-        counts = {
-            link: volumes[turn].vehicles / len(links)
+        counts = [
+            (frozenset(links), volumes[turn].vehicles)
             for turn, links in turns_of(loaded.sumo.lights[number], loaded.sumo).items()
             if turn in volumes
-            for link in links
-        }
+        ]
         driven = {
             n
             for n, link in enumerate(loaded.sumo.lights[number].links)
@@ -176,7 +191,7 @@ def _protected(timing: JunctionTiming, view: Light, arrow: TurnArrow) -> bool:
 
 
 def _asked(
-    view: Light, counts: Mapping[int, float], driven: AbstractSet[int], *, across: str
+    view: Light, counts: _Counts, driven: AbstractSet[int], *, across: str
 ) -> list[TurnArrow]:
     """Turns whose volumes ask for an arrow, and their opposites that can share it."""
     turns = {t.approach: t for t in crossing_turns(view) if t.turn == across and t.alone}
@@ -189,14 +204,19 @@ def _asked(
     return [loads[name][0] for name in turns if name in asked]
 
 
+def _vehicles(counts: _Counts, movements: Collection[int]) -> float:
+    """All vehicles of the turns that have one of these movements, whichever lane they take."""
+    return sum(vehicles for links, vehicles in counts if not links.isdisjoint(movements))
+
+
 def _meet(view: Light, one: CrossingTurn, other: CrossingTurn) -> bool:
     return any((min(i, j), max(i, j)) in view.met for i in one.movements for j in other.movements)
 
 
 def _load(
-    view: Light, turn: CrossingTurn, counts: Mapping[int, float], driven: AbstractSet[int]
+    view: Light, turn: CrossingTurn, counts: _Counts, driven: AbstractSet[int]
 ) -> tuple[TurnArrow, str]:
-    """What a turn has to find gaps for, and the approach from which most of it comes."""
+    """What a turn has to find gaps for, and the approach from which most lanes of it come."""
     before = {
         n
         for meeting in view.meetings
@@ -206,10 +226,10 @@ def _load(
     }
     straight = [n for n in sorted(before) if view.movements[n].turn == "straight"]
     lanes = {view.movements[n].lanes[0] for n in straight if n in driven}
-    opposite = view.movements[straight[0]].approach if straight else ""
+    approaches = [view.movements[n].approach for n in straight]
+    opposite = max(dict.fromkeys(approaches), key=approaches.count, default="")
     arrow = TurnArrow(
         view.names[0], turn.approach, turn.turn,
-        sum(counts.get(n, 0.0) for n in turn.movements),
-        sum(counts.get(n, 0.0) for n in before), len(lanes),
+        _vehicles(counts, turn.movements), _vehicles(counts, before), len(lanes),
     )  # fmt: skip
     return arrow, opposite

@@ -19,7 +19,7 @@ from odscen.results.judging.expectations import needs_criticality
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.asset_catalogue import shipped_assets
-from odscen.workspace.store import name_from_file
+from odscen.workspace.folder_names import name_from_file
 
 if TYPE_CHECKING:
     from odscen.app.running.runs import CheckedRun
@@ -121,8 +121,9 @@ def map_before(entry: MapEntry, digest: str, workspace: Workspace | None) -> Map
     """
     if not digest or entry.sha256.startswith(digest):
         return entry
-    known = () if workspace is None else workspace.maps()
-    return next((one for one in known if one.sha256.startswith(digest)), None)
+    if workspace is None:
+        return None
+    return workspace.first_map(lambda one: one.sha256.startswith(digest))
 
 
 class _SuiteMaps:
@@ -188,9 +189,9 @@ class _SuiteMaps:
         except OSError as error:
             raise InputError(error.strerror or str(error), file=str(source)) from error
         sha256 = hashlib.sha256(content).hexdigest()
-        for entry in workspace.maps():
-            if (entry.sha256, entry.conversion) == (sha256, wished):
-                return entry
+        there = workspace.first_map(lambda one: (one.sha256, one.conversion) == (sha256, wished))
+        if there is not None:
+            return there
         free = name not in workspace.map_names()
         new = name if free else f"{name[:40]}-{sha256[:8]}-{wished.converter}"
         return workspace.add_map(source, name=new, settings=wished)

@@ -82,6 +82,13 @@ def choose_map(maps: MapFilter, statistics: Mapping[str, Mapping[str, Any]], *, 
     return draw_key(weights, stream(seed, "map"))
 
 
+def passes_by_name(maps: MapFilter, name: str) -> bool:
+    """Whether a map of that name may be drawn, if its statistics allow it, too."""
+    return any(fnmatchcase(name, one) for one in maps.names) and not any(
+        fnmatchcase(name, one) for one in maps.exclude
+    )
+
+
 def sample_roi(
     graph: MapGraph,
     size: int,
@@ -207,9 +214,7 @@ def _numbers(statistics: Mapping[str, Any]) -> dict[str, float]:
 
 def _map_weight(maps: MapFilter, name: str, statistics: Mapping[str, float]) -> float:
     """Weight of a map, 0 if it does not pass the filter; a missing number passes no bounds."""
-    if not any(fnmatchcase(name, pattern) for pattern in maps.names):
-        return 0.0
-    if any(fnmatchcase(name, pattern) for pattern in maps.exclude):
+    if not passes_by_name(maps, name):
         return 0.0
     for statistic, bounds in maps.where.items():
         value = statistics.get(statistic)

@@ -29,7 +29,7 @@ from starlette.responses import Response, StreamingResponse
 
 from odscen.workspace.allowances import for_large_document
 from odscen.workspace.child_process import work_in_child
-from odscen.workspace.store import is_name
+from odscen.workspace.folder_names import is_name
 from odscen.workspace.wastebasket import SCENARIO_SUFFIX
 
 if TYPE_CHECKING:

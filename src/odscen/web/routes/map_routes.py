@@ -13,7 +13,7 @@ from starlette.responses import Response
 
 from odscen.app.maps import load_map
 from odscen.base.categories import DEFAULT_BODY
-from odscen.base.errors import ConflictError, DamagedError
+from odscen.base.errors import ConflictError, DamagedError, OdscenError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.scenario.demand.day_profiles import BUILT_IN
 from odscen.web.jobs import JobResult
@@ -42,8 +42,9 @@ from odscen.web.wire.map_messages import (
     SemanticsInfo,
 )
 from odscen.web.wire.media_types import SVG
+from odscen.workspace.folder_names import check_name, name_from_file
 from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import check_name, name_from_file
+from odscen.workspace.store import is_outdated
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,7 +93,7 @@ def show_map(name: str, shared: Shared) -> MapDetails:
 @router.get("/maps/{name}/preview.svg", response_class=Response, responses=SVG)
 def preview(name: str, shared: Shared) -> Response:
     """Drawing of the map as SVG."""
-    content = shared.workspace.map(name).read("preview")
+    content = shared.workspace.stored(name).read("preview")
     headers = {"Content-Security-Policy": _DRAWING, "Cache-Control": "no-cache"}
     return Response(content, media_type="image/svg+xml", headers=headers)
 
@@ -220,7 +221,7 @@ def _refuse_other(shared: Shared, name: str, content: IO[bytes]) -> None:
     if name not in shared.workspace.map_names():
         return
     try:
-        there = shared.workspace.map(name)
+        there = shared.workspace.stored(name)
     except DamagedError:
         return  # adding it builds it anew
     content.seek(0)
@@ -236,9 +237,19 @@ def _catalogue(shared: Shared) -> Iterator[MapInfo | BrokenMapInfo]:
         try:
             yield _map_info(entry)
         except (AttributeError, KeyError, TypeError, ValueError):
-            problem = "its map.json is damaged; add the map again"
-            yield BrokenMapInfo(name=entry.name, problem=problem)
+            yield _rebuilt(shared, entry)
     yield from (BrokenMapInfo(name=one.name, problem=one.problem) for one in broken)
+
+
+def _rebuilt(shared: Shared, entry: MapEntry) -> MapInfo | BrokenMapInfo:
+    """A map that does not say what is listed: rebuilt if it is too old for that, else damaged."""
+    if is_outdated(entry):
+        try:
+            return _map_info(shared.workspace.map(entry.name))
+        except OdscenError as error:
+            return BrokenMapInfo(name=entry.name, problem=str(error))
+    problem = "its map.json is damaged; add the map again"
+    return BrokenMapInfo(name=entry.name, problem=problem)
 
 
 def _map_info(entry: MapEntry) -> MapInfo:

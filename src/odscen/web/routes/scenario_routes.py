@@ -57,7 +57,7 @@ from odscen.web.wire.document_changes import (
 )
 from odscen.web.wire.media_types import Responses
 from odscen.web.wire.plan_messages import PlannedColumns
-from odscen.workspace.store import check_name, name_from_file
+from odscen.workspace.folder_names import check_name, name_from_file
 
 if TYPE_CHECKING:
     from odscen.scenario.placing.region import Region

@@ -21,6 +21,7 @@ from odscen.app.signals.signal_views import (
     group_pairs,
     program_origin,
 )
+from odscen.app.signals.turn_arrows import arrow_words, with_turn_arrows
 from odscen.base.errors import InputError, NotFoundError
 from odscen.results.records.light_programs import programs_from_json, stage_spans
 from odscen.results.report.signals.signal_charts import plan_chart, plan_scale
@@ -126,12 +127,16 @@ def webster(name: str, wish: WebsterWish, shared: Shared) -> TimedSignalsState:
     """Time lights after the demand: cycle and splits by Webster's method."""
     scenario = shared.drafts.get(name).scenario
     # Made before the drafts are locked; a change meanwhile is another version, and refused.
+    notes: tuple[str, ...] = ()
+    if wish.turn_arrows:
+        scenario, arrows = with_turn_arrows(shared.workspace, scenario, junctions=wish.junctions)
+        notes = arrow_words(arrows)
     timed = time_signals(shared.workspace, scenario, junctions=wish.junctions)
     draft = shared.drafts.change(
         name, wish.version, "Time lights after the demand", lambda _: timed.scenario
     )
     state = state_of(shared, draft)
-    return TimedSignalsState(state=state, notes=list(timed.to_words()), picture="")
+    return TimedSignalsState(state=state, notes=[*notes, *timed.to_words()], picture="")
 
 
 @router.post("/scenarios/{name}/signal-times/corridor")

@@ -19,7 +19,7 @@ from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.scenario.document.validation import validated
 from odscen.web.studies.study_messages import MOST_PAGE_RUNS, StudyInfo, StudyProblem
 from odscen.web.studies.under_way import OneAtATime, UnderWay
-from odscen.workspace.store import check_name, plain_name
+from odscen.workspace.folder_names import check_name, plain_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -27,7 +27,7 @@ from odscen.scenario.sweeps.sweep_plan import plan_from_data
 from odscen.sumo.folder import layout
 from odscen.web.studies.under_way import OneAtATime, UnderWay
 from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
-from odscen.workspace.store import check_name
+from odscen.workspace.folder_names import check_name
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -190,9 +190,13 @@ class CycleWish(OfVersion):
 
 
 class WebsterWish(OfVersion):
-    """Lights to be timed after the demand: all, or these junctions."""
+    """Lights to be timed after the demand: all, or these junctions.
+
+    With ``turn_arrows`` turns get a protected stage first where the volumes ask for it.
+    """
 
     junctions: tuple[str, ...] = ()
+    turn_arrows: bool = False
 
 
 class CorridorWish(OfVersion):

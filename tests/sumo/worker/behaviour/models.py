@@ -78,3 +78,18 @@ class Keeper(Nobody):
                 msg = f"it was shown {before.time:g} s and sees {seen.time:g} s"
                 raise ValueError(msg)
         return DrivingAction(speed=np.zeros(len(seen))), np.zeros(len(seen), dtype=bool)
+
+
+class Unrelated(Nobody):
+    """Keeps its keyword arguments in an attribute that happens to be called ``options``."""
+
+    options: Any = ("eager", "calm")
+
+    def __init__(self, **options: Any) -> None:
+        self.options = options
+
+
+class Misdescribed(Nobody):
+    """Offers an option, but not as a property of an object."""
+
+    options: Any = {"gap": {"type": "number"}}  # noqa: RUF012 - as people write it

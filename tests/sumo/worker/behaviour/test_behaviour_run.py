@@ -191,6 +191,10 @@ def test_a_long_run_that_was_killed_ends_with_the_same_bytes(
     [
         (BehaviourDoor(name="imm"), "there is no behaviour 'imm'; 'idm' and 'imitation' ship"),
         (BehaviourDoor(name="idm", options={"hedway": 1.0}), "it cannot be made"),
+        (
+            BehaviourDoor(name=f"{HERE}:Misdescribed"),
+            f"^{HERE}:Misdescribed: its `options` are no JSON Schema",
+        ),
         (BehaviourDoor(name="odscen:Workspace"), "cannot be made|has no method"),
         (BehaviourDoor(name="nowhere.py:Driver"), "cannot be imported"),
         (BehaviourDoor(command="no-such-program x"), "there is no such program"),
@@ -202,6 +206,11 @@ def test_a_model_that_cannot_be_made_is_refused_before_the_run(
 ) -> None:
     with pytest.raises(InputError, match=words):
         open_behaviour(door, 0)
+
+
+def test_an_attribute_called_options_that_offers_nothing_is_the_models_own() -> None:
+    door = BehaviourDoor(name=f"{HERE}:Unrelated", options={"gap": 2.0})
+    assert vars(open_behaviour(door, 0)) == {"options": {"gap": 2.0}}
 
 
 def test_in_meso_nobody_is_driven() -> None:

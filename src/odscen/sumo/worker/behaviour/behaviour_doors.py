@@ -18,7 +18,7 @@ from odscen.base.errors import InputError, NotFoundError
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.learning.named_objects import named_object
 from odscen.learning.offered_models import installed_names, offered_models
-from odscen.learning.offered_options import option_values, options_of
+from odscen.learning.offered_options import values_for
 from odscen.sumo.worker.behaviour.piped_driver import PipedDriver, SocketDriver
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
         return PipedDriver(_words(door.command), seed, door.time_limit)
     name = door.name or ""
     found = _found(name)
-    options = _keywords(found, door.options, name) if isinstance(found, type) else {}
+    options = values_for(found, door.options, name=name, others=True)
     try:
         made = found(**options) if isinstance(found, type) else found
     except Exception as error:  # whatever code from outside may raise
@@ -94,25 +94,8 @@ def chosen_behaviour(name: str, options: Mapping[str, OptionValue]) -> Behaviour
     if name not in known:
         what = "behaviour model"
         raise NotFoundError(what, name, known)
-    values = _values(_found(name), options, name)
+    values = values_for(_found(name), options, name=name)
     return BehaviourDoor(name=name, options={one: values[one] for one in options})
-
-
-def _values(found: Any, given: Mapping[str, OptionValue], name: str) -> dict[str, OptionValue]:
-    try:
-        return option_values(options_of(found) if isinstance(found, type) else (), given)
-    except InputError as error:
-        error.element = name
-        raise
-
-
-def _keywords(
-    found: type, given: Mapping[str, OptionValue], name: str
-) -> Mapping[str, OptionValue]:
-    """Keyword arguments of a class: those that it offers are checked, the others left to it."""
-    offered = {one.name for one in options_of(found)}
-    checked = _values(found, {key: v for key, v in given.items() if key in offered}, name)
-    return {**given, **checked}
 
 
 def _words(command: str) -> tuple[str, ...]:

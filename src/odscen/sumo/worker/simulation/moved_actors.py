@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.sumo.worker.simulation.lane_lines import LaneLines
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -19,8 +21,6 @@ _NEAR = 12.0
 """Metres around a place in which SUMO looks for its lane."""
 _FREE, _ON_FOOT = 2, 6
 """``keepRoute``: exactly there, off the route and the road as well; of persons seen by drivers."""
-_AHEAD = 600.0
-"""Metres that a line of lanes is followed."""
 _NOWHERE = 1e8
 _INSIDE = 0.1
 """Metres that a body has to be over a lane to be on it."""
@@ -40,8 +40,6 @@ LIGHT_BITS = {
 
 _MORE = ("getAcceleration", "getDistance", "getLaneID", "getLateralLanePosition")
 """Getters of :class:`SeenVehicle` beyond how it moves, in its order."""
-
-Shape = tuple[tuple[float, float], ...]
 
 
 class SeenVehicle(NamedTuple):
@@ -81,6 +79,8 @@ class MovedActors:
     ----------
     knows
         Says whether SUMO has a vehicle or person of a name, on the road or not.
+    lane_lines
+        Where lanes lead.
     """
 
     def __init__(
@@ -92,6 +92,7 @@ class MovedActors:
         knows: Callable[[str], bool],
     ) -> None:
         self.knows = knows
+        self.lane_lines = LaneLines(sumo, lanes)
         self._position = native("vehicle", "getPosition")
         self._angle, self._speed = native("vehicle", "getAngle"), native("vehicle", "getSpeed")
         self._more = tuple(native("vehicle", getter) for getter in _MORE)
@@ -344,39 +345,12 @@ class MovedActors:
         at = self._sumo.simulation.convert2D(edge, pos, lane)
         return (
             math.dist(at, (x, y))
-            > (self.lane_width(self._in_order(edge)[lane]) + width) / 2.0 - _INSIDE
+            > (self.lane_width(self._lanes.in_order(edge)[lane]) + width) / 2.0 - _INSIDE
         )
 
     def light_letter(self, light: str, link: int) -> str:
         """What a link of a traffic light shows."""
         return str(self._sumo.trafficlight.getRedYellowGreenState(light)[link])
-
-    def side_lines(self, vehicle: str, by: int) -> tuple[Shape, ...]:
-        """Centre lines of the lanes ``by`` lanes beside that of a vehicle, on either side of it."""
-        one = self._sumo.vehicle
-        own = one.getLaneID(vehicle)
-        if not own:
-            return ()
-        lanes = self._in_order(self._sumo.lane.getEdgeID(own))
-        kind, row = one.getVehicleClass(vehicle), lanes.index(own)
-        rows = {row + by, row - by}
-        return tuple(
-            self._line(vehicle, lanes[n], kind)
-            for n in sorted(rows)
-            if 0 <= n < len(lanes) and self._lanes.admits(lanes[n], kind)
-        )
-
-    def lines(self, vehicle: str) -> tuple[Shape, ...]:
-        """Centre lines of all lanes of its edge that a vehicle may use, and of where they lead."""
-        one = self._sumo.vehicle
-        own = one.getLaneID(vehicle)
-        if not own:
-            return ()
-        kind = one.getVehicleClass(vehicle)
-        lanes = self._in_order(self._sumo.lane.getEdgeID(own))
-        return tuple(
-            self._line(vehicle, lane, kind) for lane in lanes if self._lanes.admits(lane, kind)
-        )
 
     def bodies_near(self, lane: str) -> list[tuple[str, bool]]:
         """Vehicles and persons on the edge of a lane, with whether each is a person."""
@@ -389,28 +363,3 @@ class MovedActors:
         """Pairs that SUMO itself has seen collide in the last step."""
         found = self._sumo.simulation.getCollisions()
         return {frozenset((one.collider, one.victim)) for one in found}
-
-    def _in_order(self, edge: str) -> list[str]:
-        """Lanes of an edge from the outermost on; SUMO numbers them so."""
-        return sorted(self._lanes.of_edge[edge], key=lambda lane: (len(lane), lane))
-
-    def _line(self, vehicle: str, lane: str, kind: str) -> Shape:
-        """Centre line of a lane and of those that it leads to, along the route if it does."""
-        lanes, one = self._sumo.lane, self._sumo.vehicle
-        route = set(one.getRoute(vehicle)[max(one.getRouteIndex(vehicle), 0) :])
-        line, metres = list(lanes.getShape(lane)), lanes.getLength(lane)
-        while metres < _AHEAD:
-            links = [link for link in lanes.getLinks(lane) if self._lanes.admits(link[0], kind)]
-            if not links:
-                break
-            onward = [link for link in links if lanes.getEdgeID(link[0]) in route]
-            link = (onward or links)[0]
-            inside = link[4]
-            while inside:
-                line += lanes.getShape(inside)
-                metres += lanes.getLength(inside)
-                inside = next((one[4] for one in lanes.getLinks(inside)), "")
-            lane = link[0]
-            line += lanes.getShape(lane)
-            metres += lanes.getLength(lane)
-        return tuple(line)

@@ -26,6 +26,10 @@ class RoadLanes:
             lanes[edge_of(name)].append(name)
         return dict(lanes)
 
+    def in_order(self, edge: str) -> list[str]:
+        """Lanes of an edge from the outermost on; SUMO numbers them so."""
+        return sorted(self.of_edge[edge], key=lambda lane: (len(lane), lane))
+
     @cached_property
     def internal(self) -> frozenset[str]:
         """Lanes for vehicles inside junctions: those that connections lead over."""

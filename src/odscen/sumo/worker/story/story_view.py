@@ -163,7 +163,7 @@ class StoryView:
     def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
         """Centre line of the lane ``by`` lanes to the left of an actor's."""
         own = self._there(actor)
-        for shape in self._road.side_lines(actor, by):
+        for shape in self._road.lane_lines.beside(actor, by):
             line = tuple((x - self._offset[0], y - self._offset[1]) for x, y in shape)
             left = -beside(line, (own.x, own.y)).left
             if by == 0 or (left > 0.0) == (by > 0):
@@ -174,7 +174,7 @@ class StoryView:
         """Centre line of the lane beside an actor, or its own, that leads to a place."""
         point = self.place(place)
         found = []
-        for shape in self._road.lines(actor):
+        for shape in self._road.lane_lines.own(actor):
             line = tuple((x - self._offset[0], y - self._offset[1]) for x, y in shape)
             along, left = beside(line, point)
             if 0.0 <= along <= line_length(line) and abs(left) < _ON_LANE:
