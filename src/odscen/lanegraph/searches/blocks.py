@@ -29,6 +29,9 @@ _MOST_GATES = 12
 _SHARE = 8
 """Of a graph may be in its largest block one node in so many; else it is searched as a whole."""
 
+_ALONE = 3
+"""Starts in one block, one after another, that are searched from by themselves."""
+
 
 class Outset(NamedTuple):
     """How far it is from a node.
@@ -106,6 +109,7 @@ class Blocks:
         if self.are_of_use:
             self.within = np.stack([self._from_gate(turn) for turn in range(most)])
             self.between = self._between_gates()
+            self._beyond: tuple[int, int, FloatArray | None] = (-1, 0, None)
 
     def outset(self, row: int) -> Outset:
         """Search from one row on."""
@@ -116,7 +120,7 @@ class Blocks:
         )
         ahead = slice(*self._leaving[home : home + 2].tolist())
         to_gates = nearby[self._tail[ahead] - first] + self._metres[ahead]
-        return Outset(home, first, nearby, self._to_gates(self._entered[ahead], to_gates))
+        return Outset(home, first, nearby, self._to_gates(home, self._entered[ahead], to_gates))
 
     def _from_gate(self, turn: int) -> FloatArray:
         """Metres to each row from one of the gates of its block, shape ``(N,)``; one search."""
@@ -133,15 +137,32 @@ class Blocks:
         entered = self._entered[edge].astype(np.int32)
         return shortest_edges(len(self.gates), gate.astype(np.int32), entered, metres)
 
-    def _to_gates(self, entered: Rows, lengths: FloatArray) -> FloatArray:
-        """Metres from a start to every gate, when it is so far to those of the next blocks."""
-        count, between = len(self.gates), self.between
-        leads = np.isfinite(lengths)
-        gates, number = np.unique(entered[leads], return_inverse=True)
+    def _to_gates(self, home: int, entered: Rows, lengths: FloatArray) -> FloatArray:
+        """Metres to every gate from a row of a block, from which it is so far to the next blocks.
+
+        Starts mostly come block by block. Once some have come from one, what lies beyond is
+        searched from each gate that follows it, and holds for all that are to come.
+        """
+        last, asked, trees = self._beyond  # other threads may ask for theirs
+        asked = asked + 1 if last == home else 1
+        gates, number = np.unique(entered, return_inverse=True)
         shortest = np.full(len(gates), np.inf)
-        np.minimum.at(shortest, number, lengths[leads])
+        np.minimum.at(shortest, number, lengths)
+        if asked > _ALONE and (last != home or trees is None):
+            trees = csgraph.dijkstra(self.between, indices=gates) if len(gates) else None
+        elif last != home:
+            trees = None
+        self._beyond = (home, asked, trees)
+        if trees is not None:
+            return np.asarray((trees + shortest[:, np.newaxis]).min(axis=0))
+        leads = np.isfinite(shortest)
+        return self._from_several(gates[leads], shortest[leads])
+
+    def _from_several(self, gates: Rows, lengths: FloatArray) -> FloatArray:
+        """Metres to every gate from a place from which it is so far to some of them."""
+        count, between = len(self.gates), self.between
         matrix = square(
-            np.concatenate([between.data, shortest]),
+            np.concatenate([between.data, lengths]),
             np.concatenate([between.indices, gates.astype(np.int32)]),
             np.append(between.indptr, np.int32(len(between.data) + len(gates))),
         )
@@ -164,3 +185,10 @@ def square(data: FloatArray, indices: Rows, starts: Rows) -> sparse.csr_matrix[n
 
     count = len(starts) - 1
     return sparse.csr_matrix((data, indices, starts), shape=(count, count))
+
+
+def spans(begins: Rows, ends: Rows) -> Rows:
+    """Numbers of some spans, one after another: from each begin on, its end excluded."""
+    sizes = ends - begins
+    shift = np.repeat(begins - (np.cumsum(sizes) - sizes), sizes)
+    return np.asarray(np.arange(len(shift)) + shift)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.lanegraph.searches.blocks import square
+from odscen.lanegraph.searches.blocks import spans, square
 from odscen.lanegraph.searches.graph_searches import csgraph
 
 if TYPE_CHECKING:
@@ -96,18 +96,16 @@ class CorridorPaths:
         wanted = np.array(sorted(corridor))
         begins, ends = blocks.first[wanted], blocks.first[wanted + 1]
         places = np.cumsum(ends - begins) - (ends - begins)
-        spans = list(zip(begins.tolist(), ends.tolist(), strict=True))
-        parts = [slice(*every.indptr[list(span)].tolist()) for span in spans]
-        columns = np.concatenate([every.indices[part] for part in parts])
-        metres = np.concatenate([every.data[part] for part in parts])
-        degree = np.concatenate([np.diff(every.indptr[a : b + 1]) for a, b in spans])
+        rows = spans(begins, ends)
+        edges = spans(every.indptr[begins], every.indptr[ends])
+        columns, metres = every.indices[edges], every.data[edges]
         shift = np.full(len(blocks.first), -2 * len(blocks.node))
         shift[wanted] = places - begins
         heads = columns + shift[blocks.block[columns]]
-        tails = np.repeat(np.arange(len(degree)), degree)
+        tails = np.repeat(np.arange(len(rows)), every.indptr[rows + 1] - every.indptr[rows])
         inside = heads >= 0
         heads, tails, metres = heads[inside], tails[inside], metres[inside]
-        counts = np.bincount(tails, minlength=len(degree))
+        counts = np.bincount(tails, minlength=len(rows))
         matrix = square(metres, heads, np.append(0, np.cumsum(counts)))
         start, goal = (row + int(shift[blocks.block[row]]) for row in (start, goal))
         distances, predecessors = csgraph.dijkstra(
@@ -116,15 +114,15 @@ class CorridorPaths:
         path = _path(predecessors, goal)
         if _is_tied(path, distances, tails, heads, metres):
             return None
-        rows = np.repeat(begins - places, ends - begins)[path] + path
-        return Way(float(distances[goal]), blocks.node[rows])
+        return Way(float(distances[goal]), blocks.node[rows[path]])
 
 
 def _path(predecessors: Rows, goal: int) -> Rows:
-    before: list[int] = predecessors.tolist()
-    steps = [goal]
-    while (step := before[steps[-1]]) >= 0:
+    before = predecessors.item
+    steps, step = [goal], before(goal)
+    while step >= 0:
         steps.append(step)
+        step = before(step)
     return np.array(steps[::-1])
 
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.lanegraph.searches.blocks import spans
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -93,10 +95,9 @@ class FarthestNodes:
 
     def on(self, lanes: Rows) -> LaneNodes:
         """What :meth:`by_search` looks at, made once for some lanes."""
-        blocks, first = self._blocks, self._bounds[lanes]
-        sizes = self._bounds[lanes + 1] - first
+        blocks, begins, ends = self._blocks, self._bounds[lanes], self._bounds[lanes + 1]
+        nodes, sizes = spans(begins, ends), ends - begins
         starts = np.cumsum(sizes) - sizes
-        nodes = np.arange(int(sizes.sum())) + np.repeat(first - starts, sizes)
         rows, block = blocks.row[nodes], self.block_of[nodes]
         begin, stop = blocks.gates_of[block], blocks.gates_of[block + 1]
         turns = np.arange(int((stop - begin).max(initial=0)))[:, np.newaxis]
