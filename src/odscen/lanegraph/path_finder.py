@@ -244,12 +244,14 @@ class PathFinder:
     def are_candidates(self, spawns: Sequence[int], goals: Sequence[int]) -> list[bool]:
         """Say of many spawns at once whether the goal in its place :meth:`is_candidate`."""
         is_much = len(spawns) * len(self.nodes) >= _MANY
-        found = []
-        for spawn, goal in zip(spawns, goals, strict=True):
+        found = [False] * len(spawns)
+        # In the order of the map, as starts of one block are searched from together.
+        for place in sorted(range(len(spawns)), key=spawns.__getitem__):
+            spawn, goal = spawns[place], goals[place]
             known: bool | None = None
             if is_much and self._rings is not None and self._is_closed(spawn) and self._holds(goal):
                 known = self._rings.is_goal(*self._local[[spawn, goal]].tolist())
-            found.append(self.is_candidate(spawn, goal) if known is None else known)
+            found[place] = self.is_candidate(spawn, goal) if known is None else known
         return found
 
     def _ends_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
