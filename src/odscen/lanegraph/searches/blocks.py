@@ -29,8 +29,10 @@ _MOST_GATES = 12
 _SHARE = 8
 """Of a graph may be in its largest block one node in so many; else it is searched as a whole."""
 
-_ALONE = 3
-"""Starts in one block, one after another, that are searched from by themselves."""
+_ALONE = 2
+"""Starts in a block that are searched from by themselves."""
+_BLOCKS_KEPT = 8
+"""Blocks that starts came from last."""
 
 
 class Outset(NamedTuple):
@@ -109,7 +111,7 @@ class Blocks:
         if self.are_of_use:
             self.within = np.stack([self._from_gate(turn) for turn in range(most)])
             self.between = self._between_gates()
-            self._beyond: tuple[int, int, FloatArray | None] = (-1, 0, None)
+            self._beyond: dict[int, tuple[int, FloatArray | None]] = {}
 
     def outset(self, row: int) -> Outset:
         """Search from one row on."""
@@ -143,20 +145,28 @@ class Blocks:
         Starts mostly come block by block. Once some have come from one, what lies beyond is
         searched from each gate that follows it, and holds for all that are to come.
         """
-        last, asked, trees = self._beyond  # other threads may ask for theirs
-        asked = asked + 1 if last == home else 1
         gates, number = np.unique(entered, return_inverse=True)
         shortest = np.full(len(gates), np.inf)
         np.minimum.at(shortest, number, lengths)
-        if asked > _ALONE and (last != home or trees is None):
-            trees = csgraph.dijkstra(self.between, indices=gates) if len(gates) else None
-        elif last != home:
-            trees = None
-        self._beyond = (home, asked, trees)
+        trees = self._trees_beyond(home, gates)
         if trees is not None:
             return np.asarray((trees + shortest[:, np.newaxis]).min(axis=0))
         leads = np.isfinite(shortest)
         return self._from_several(gates[leads], shortest[leads])
+
+    def _trees_beyond(self, home: int, gates: Rows) -> FloatArray | None:
+        """Metres from each of the gates that follow a block to all; ``None`` for its first starts.
+
+        Other threads may ask for theirs.
+        """
+        beyond = self._beyond
+        asked, trees = beyond.pop(home, (0, None))
+        if asked >= _ALONE and trees is None and len(gates):
+            trees = csgraph.dijkstra(self.between, indices=gates)
+        for gone in [*beyond][: max(len(beyond) - _BLOCKS_KEPT + 1, 0)]:
+            beyond.pop(gone, None)
+        beyond[home] = (asked + 1, trees)
+        return trees
 
     def _from_several(self, gates: Rows, lengths: FloatArray) -> FloatArray:
         """Metres to every gate from a place from which it is so far to some of them."""

@@ -63,9 +63,8 @@ class CorridorPaths:
         """Blocks that a shortest path can lead through; none if there is no path."""
         blocks = self._blocks
         outset, last = blocks.outset(start), int(blocks.block[goal])
-        metres: list[float] = outset.gates.tolist()
         begin, stop = blocks.gates_of[last : last + 2].tolist()
-        ends = [metres[k] + float(blocks.within[k - begin, goal]) for k in range(begin, stop)]
+        ends = [float(outset.gates[k] + blocks.within[k - begin, goal]) for k in range(begin, stop)]
         best = min(ends, default=math.inf)
         if outset.home == last:
             best = min(best, float(outset.nearby[goal - outset.first]))
@@ -73,17 +72,18 @@ class CorridorPaths:
             return set()
         slack = best * blocks.rounding
         near = [begin + k for k, length in enumerate(ends) if length <= best + slack]
-        return {outset.home, last, *self._blocks_before(near, metres, slack)}
+        return {outset.home, last, *self._blocks_before(near, outset.gates, slack)}
 
-    def _blocks_before(self, near: list[int], metres: list[float], slack: float) -> list[int]:
+    def _blocks_before(self, near: list[int], gates: FloatArray, slack: float) -> list[int]:
         """Blocks of some gates, and of those on the shortest paths to there."""
         first, before, lengths = self._back
+        metres = gates.item
         seen, open_ = set(near), near
         while open_:
             gate = open_.pop()
-            most = metres[gate] + slack
+            most = metres(gate) + slack
             for k in range(first[gate], first[gate + 1]):
-                if (other := before[k]) not in seen and metres[other] + lengths[k] <= most:
+                if (other := before[k]) not in seen and metres(other) + lengths[k] <= most:
                     seen.add(other)
                     open_.append(other)
         blocks = self._blocks
