@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.lanegraph.searches.corridor_paths import Way
-    from odscen.lanegraph.searches.ring_goals import Goals
+    from odscen.lanegraph.searches.ring_goals import GoalsOfStart
 
 _FEW = 64
 """Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
@@ -222,7 +222,7 @@ class PathFinder:
 
     def each_candidates(
         self, spawns: Sequence[int], among: Callable[[int], BoolArray] | None = None
-    ) -> Iterator[Goals]:
+    ) -> Iterator[GoalsOfStart]:
         """Yield the goal candidates of many spawns; the same, sooner on a large map.
 
         Parameters
@@ -265,7 +265,7 @@ class PathFinder:
 
     @cached_property
     def _rings(self) -> RingGoals | None:
-        """Goals of spawns that reach no end; ``None`` where they are found by a search of all."""
+        """GoalsOfStart of spawns that reach no end; ``None`` where they are found by a search of all."""
         if self._blocks is None:
             return None
         return RingGoals(
