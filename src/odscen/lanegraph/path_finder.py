@@ -265,7 +265,7 @@ class PathFinder:
 
     @cached_property
     def _rings(self) -> RingGoals | None:
-        """GoalsOfStart of spawns that reach no end; ``None`` where they are found by a search of all."""
+        """Goals of spawns that reach no end; ``None`` where they are found by a search of all."""
         if self._blocks is None:
             return None
         return RingGoals(

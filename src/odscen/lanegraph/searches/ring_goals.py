@@ -1,4 +1,4 @@
-"""GoalsOfStart of starts from which no end is reached, on a large graph: of each lane the farthest node.
+"""Goals of starts from which no end is reached, on a large graph: of each lane the farthest node.
 
 A town that is closed has one such goal on each of its lanes, and many starts: what they have in
 common is found once, and of each start only the goals that somebody takes.
@@ -29,7 +29,7 @@ the mask of their goals."""
 
 
 class GoalsOfStart(Protocol):
-    """GoalsOfStart of one start, ascending, as nodes of the map."""
+    """Goals of one start, ascending, as nodes of the map."""
 
     def __len__(self) -> int:
         """How many there are."""
@@ -70,7 +70,7 @@ class _LanesAhead(NamedTuple):
 
 
 class RingGoals:
-    """GoalsOfStart of many starts; made once for a graph.
+    """Goals of many starts; made once for a graph.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class RingGoals:
         self._known: dict[tuple[int, int], _LanesAhead] = {}
 
     def of(self, start: int, allowed: BoolArray | None) -> GoalsOfStart:
-        """GoalsOfStart of a node from which no end is reached.
+        """Goals of a node from which no end is reached.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class RingGoals:
 
 
 class _LaneGoals:
-    """GoalsOfStart of one start: which node of a lane it is, is found when it is asked for."""
+    """Goals of one start: which node of a lane it is, is found when it is asked for."""
 
     def __init__(
         self, goals: RingGoals, start: int, allowed: BoolArray | None, lanes: BoolArray
