@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -37,15 +38,22 @@ PEER = worker_environment()
 
 
 class Cost(NamedTuple):
-    """Of a command with all that it has started: seconds, and bytes."""
+    """Of a command with all that it has started: seconds, bytes, and the mean load of the machine.
+
+    The load is that of all processes, of other work too.
+    """
 
     wall: float
     cpu: float
     memory: int
+    load: float
     code: int
 
     def __str__(self) -> str:
-        return f"{self.wall:.0f} s, {self.cpu:.1f} CPU s, {self.memory / 1e6:,.0f} MB"
+        return (
+            f"{self.wall:.0f} s, {self.cpu:.1f} CPU s, {self.memory / 1e6:,.0f} MB "
+            f"(load {self.load:.0f})"
+        )
 
 
 def main() -> None:
@@ -98,16 +106,17 @@ def driven(name: str, workspace: Path, folder: Path, vehicles: int, seconds: flo
     sampled = measured(
         [*COMMAND, "generate", "--map", name, "--config", str(config), "--out", str(out), *given]
     )
+    print(f"  {vehicles:,} vehicles, {seconds:g} s: sampled {sampled}", flush=True)
     (scenario,) = out.glob("*.scenario.json")
     ours = measured([*COMMAND, "run", str(scenario), "--out", str(out), "--no-report", *given])
+    print(f"    odscen {ours}", flush=True)
     (run,) = (path.parent for path in out.glob(f"*/{layout.SUMO_FOLDER}"))
     plan = json.loads((run / layout.PLAN_FILE).read_text(encoding="utf-8"))
     bare = Path(shutil.copytree(run / layout.SUMO_FOLDER, out / "bare"))
     peer = measured([str(binary()), "-c", str(bare / layout.CONFIG_FILE)], environment=PEER)
-    ratio = ours.cpu / peer.cpu
     print(
-        f"  {len(plan['actors']):,} vehicles, {seconds:g} s: sampled {sampled}; odscen {ours}; "
-        f"sumo {peer}; ratio of CPU {ratio:.2f}, of memory {ours.memory / peer.memory:.1f}"
+        f"    sumo {peer}; {len(plan['actors']):,} in the plan; ratio of CPU "
+        f"{ours.cpu / peer.cpu:.2f}, of memory {ours.memory / peer.memory:.1f}"
         f"{'' if not ours.code and not peer.code else f'; exit codes {ours.code}, {peer.code}'}",
         flush=True,
     )
@@ -126,7 +135,7 @@ def measured(command: Sequence[str], *, environment: dict[str, str] | None = Non
     process = psutil.Popen(
         command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
-    most, spent = 0, dict[int, float]()
+    most, spent, loads = 0, dict[int, float](), list[float]()
     while process.poll() is None:
         held = 0
         for one in (process, *_below(process)):
@@ -135,8 +144,10 @@ def measured(command: Sequence[str], *, environment: dict[str, str] | None = Non
                 spent[one.pid] = times.user + times.system
                 held += one.memory_info().rss
         most = max(most, held)
+        loads.append(os.getloadavg()[0])
         time.sleep(0.2)
-    return Cost(time.perf_counter() - began, sum(spent.values()), most, process.returncode)
+    wall, load = time.perf_counter() - began, sum(loads) / max(len(loads), 1)
+    return Cost(wall, sum(spent.values()), most, load, process.returncode)
 
 
 def _below(process: psutil.Popen) -> list[psutil.Process]:

@@ -9,24 +9,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import InputError
+from odscen.lanegraph.searches.blocks import Blocks
+from odscen.lanegraph.searches.connected_parts import ConnectedParts
 from odscen.lanegraph.searches.corridor_paths import CorridorPaths
 from odscen.lanegraph.searches.edge_matrix import shortest_edges
+from odscen.lanegraph.searches.farthest_nodes import FarthestNodes
 from odscen.lanegraph.searches.graph_searches import csgraph
 from odscen.lanegraph.searches.kept_trees import KEPT_TREES, ROUTERS, Tree
 from odscen.lanegraph.searches.paths_to_goal import NO_PREDECESSOR, PathsTo
+from odscen.lanegraph.searches.ring_goals import RingGoals
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
+    from numpy.typing import NDArray
     from scipy import sparse
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.lanegraph.searches.corridor_paths import Way
+    from odscen.lanegraph.searches.ring_goals import GoalsOfStart
 
 _FEW = 64
 """Pairs up to which it is quicker to look from each source by itself: those of a short scenario."""
 _MANY = 1 << 20
-"""Nodes, times sources, from which chains are worth their making."""
+"""Nodes, times sources, from which blocks are worth their making."""
 _LARGE = 1 << 15
 """Nodes from which a path is found sooner in its corridor than in the tree of its source."""
 _TREES = 8
@@ -121,9 +127,13 @@ class PathFinder:
 
     @cached_property
     def _corridors(self) -> CorridorPaths | None:
-        """Corridors of the graph; ``None`` if it has none that are of use."""
-        found = CorridorPaths(self._both_ways, self._cuts(self._both_ways.tocoo()))
-        return found if found.is_of_use else None
+        return None if self._blocks is None else CorridorPaths(self._blocks)
+
+    @cached_property
+    def _blocks(self) -> Blocks | None:
+        """The graph in blocks; ``None`` if they are of no use."""
+        found = Blocks(self._both_ways, self._cuts(self._both_ways.tocoo()))
+        return found if found.are_of_use else None
 
     @cached_property
     def _both_ways(self) -> sparse.csr_matrix[np.float64]:
@@ -160,12 +170,7 @@ class PathFinder:
         """
         if self._directed and len(sources) <= _FEW:
             return self._lead_few(sources, targets)
-        starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
-        if not self._directed:
-            return np.asarray(starts == ends, dtype=np.bool_)
-        reached, columns = self._reached(ends)
-        pairs = zip(starts.tolist(), ends.tolist(), strict=True)
-        return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
+        return self._parts.lead(self._local[sources], self._local[targets])
 
     def _lead_few(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
         """The same, each source by itself."""
@@ -189,31 +194,7 @@ class PathFinder:
         For each source, shape ``(S,)``, a row of the table, shape ``(R, T)``: sources from which
         the same can be reached share one. A node counts as reached from itself.
         """
-        starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
-        parts, rows = np.unique(starts, return_inverse=True)
-        row = rows.astype(np.int32)
-        if not self._directed:
-            return row, np.equal.outer(parts, ends)
-        reached, columns = self._reached(ends)
-        table = np.zeros((len(parts), len(columns)), dtype=np.bool_)
-        for index, part in enumerate(parts.tolist()):
-            bits = reached[part]
-            while bits:
-                low = bits & -bits
-                table[index, low.bit_length() - 1] = True
-                bits ^= low
-        return row, table[:, [columns[part] for part in ends.tolist()]]
-
-    def _reached(self, parts: Int32Array) -> tuple[dict[int, int], dict[int, int]]:
-        """For each part a bit for each of ``parts`` that it leads to; and which bit is whose."""
-        columns = {part: k for k, part in enumerate(np.unique(parts).tolist())}
-        reached: dict[int, int] = {}
-        for part in self._part_order:
-            bits = 1 << columns[part] if part in columns else 0
-            for after in self._part_successors[part]:
-                bits |= reached[after]
-            reached[part] = bits
-        return reached, columns
+        return self._parts.reach(self._local[sources], self._local[targets])
 
     def has_goals(self, spawn: int) -> bool:
         """Whether there is any goal candidate: whether anything can be reached."""
@@ -239,52 +220,70 @@ class PathFinder:
         ends[self._local[spawn]] = False
         return self.nodes[ends].astype(np.int32)
 
-    def each_candidates(self, spawns: Sequence[int]) -> list[Int32Array]:
-        """Goal candidates of many spawns, each in its place; the same, sooner on a large map."""
-        found: dict[int, Int32Array] = {}
-        if len(spawns) * len(self.nodes) >= _MANY:
-            inside = [one for one in dict.fromkeys(spawns) if self._holds(one)]
-            found |= self._ends_from([one for one in inside if self._reaches_end(one)])
-            found |= dict(self._farthest_from([one for one in inside if self._is_closed(one)]))
-        return [found[one] if one in found else self.goal_candidates(one) for one in spawns]
+    def each_candidates(
+        self, spawns: Sequence[int], among: Callable[[int], BoolArray] | None = None
+    ) -> Iterator[GoalsOfStart]:
+        """Yield the goal candidates of many spawns; the same, sooner on a large map.
+
+        Parameters
+        ----------
+        among
+            Nodes of the map, shape ``(N,)``, that goals of a spawn may be on; all if not given.
+        """
+        is_much = len(spawns) * len(self.nodes) >= _MANY
+        ends = self._ends_from(spawns) if is_much else {}
+        for spawn in spawns:
+            goals = ends.get(spawn)
+            allowed = among(spawn) if among is not None and self._holds(spawn) else None
+            if goals is None and is_much and self._rings is not None and self._is_closed(spawn):
+                yield self._rings.of(int(self._local[spawn]), allowed)
+                continue
+            goals = self.goal_candidates(spawn) if goals is None else goals[goals != spawn]
+            yield goals if allowed is None else goals[allowed[goals]]
 
     def are_candidates(self, spawns: Sequence[int], goals: Sequence[int]) -> list[bool]:
         """Say of many spawns at once whether the goal in its place :meth:`is_candidate`."""
-        pairs = list(zip(spawns, goals, strict=True))
-        found: dict[tuple[int, int], bool] = {}
-        if len(spawns) * len(self.nodes) >= _MANY:
-            asked = dict.fromkeys(pairs)
-            found |= self._are_farthest([pair for pair in asked if self._is_asked_of_lane(*pair)])
-        return [found[one] if one in found else self.is_candidate(*one) for one in pairs]
+        is_much = len(spawns) * len(self.nodes) >= _MANY
+        found = [False] * len(spawns)
+        # In the order of the map, as starts of one block are searched from together.
+        for place in sorted(range(len(spawns)), key=spawns.__getitem__):
+            spawn, goal = spawns[place], goals[place]
+            known: bool | None = None
+            if is_much and self._rings is not None and self._is_closed(spawn) and self._holds(goal):
+                known = self._rings.is_goal(*self._local[[spawn, goal]].tolist())
+            found[place] = self.is_candidate(spawn, goal) if known is None else known
+        return found
 
     def _ends_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
-        """Candidates of each spawn that reaches an end."""
+        """Ends that each spawn reaches, itself among them if it is one; if it reaches others."""
+        starts = [one for one in dict.fromkeys(spawns) if self._holds(one)]
+        starts = [one for one in starts if self._reaches_end(one)]
         ends = self.nodes[self._is_end].astype(np.int32)
-        row, table = self.reach(np.array(spawns, dtype=np.int32), ends)
+        row, table = self.reach(np.array(starts, dtype=np.int32), ends)
         reached = [ends[ahead] for ahead in table]
-        return {
-            spawn: reached[number][reached[number] != spawn]
-            for spawn, number in zip(spawns, row.tolist(), strict=True)
-        }
+        return {spawn: reached[number] for spawn, number in zip(starts, row.tolist(), strict=True)}
 
-    def _farthest_from(self, spawns: Sequence[int]) -> Iterator[tuple[int, Int32Array]]:  # noqa: ARG002
-        """Yield spawns that reach no end with their candidates, where that goes sooner."""
-        yield from ()
+    @cached_property
+    def _rings(self) -> RingGoals | None:
+        """Goals of spawns that reach no end; ``None`` where they are found by a search of all."""
+        if self._blocks is None:
+            return None
+        return RingGoals(
+            self._both_ways,
+            self._parts.of,
+            FarthestNodes(self._blocks, self._lane_starts),
+            nodes=self.nodes,
+            is_road=self._are_roads(self.nodes[self._lane_starts]),
+            searched=self.goal_candidates,
+        )
 
-    def _are_farthest(
-        self,
-        pairs: Sequence[tuple[int, int]],  # noqa: ARG002
-    ) -> dict[tuple[int, int], bool]:
-        """Whether goals are the farthest nodes of their lanes, as far as that goes sooner."""
-        return {}
-
-    def _is_asked_of_lane(self, spawn: int, goal: int) -> bool:
-        """Whether a goal of the region can only be the farthest node of its lane."""
-        return self._holds(spawn) and self._holds(goal) and self._is_closed(spawn)
+    def _are_roads(self, nodes: NDArray[np.integer]) -> BoolArray:
+        """Whether goals in a ring may be on the lanes of some nodes while others are left."""
+        return np.ones(len(nodes), dtype=np.bool_)
 
     def _is_closed(self, spawn: int) -> bool:
-        """Whether no end can be reached from a node of the region, but other nodes."""
-        return self.has_goals(spawn) and not self._reaches_end(spawn)
+        """Whether a node lies in the region, and no end can be reached from it, but other nodes."""
+        return self._holds(spawn) and self.has_goals(spawn) and not self._reaches_end(spawn)
 
     def is_candidate(self, spawn: int, goal: int) -> bool:
         """Whether ``goal``, which can be reached, is among the candidates of ``spawn``."""
@@ -297,45 +296,17 @@ class PathFinder:
         return np.asarray(self.out_degree <= self.end_degree, dtype=np.bool_)
 
     @cached_property
-    def _parts(self) -> Int32Array:
-        """Number of the strongly connected part that each node of the region is in."""
-        labels: Int32Array = csgraph.connected_components(
-            self._matrix, directed=self._directed, connection="strong"
-        )[1]
-        return labels
-
-    @cached_property
-    def _part_successors(self) -> dict[int, set[int]]:
-        after: dict[int, set[int]] = {part: set() for part in np.unique(self._parts).tolist()}
-        edges = self._matrix.tocoo()
-        parts = np.stack([self._parts[edges.row], self._parts[edges.col]], axis=1)
-        for one, other in np.unique(parts[parts[:, 0] != parts[:, 1]], axis=0).tolist():
-            after[one].add(other)
-        return after
-
-    @cached_property
-    def _part_order(self) -> tuple[int, ...]:
-        """Parts, each behind those that it leads to."""
-        after = self._part_successors
-        order: list[int] = []
-        done: set[int] = set()
-        todo = list(after)
-        while todo:  # parts make no circles
-            ahead = [one for one in after[todo[-1]] if one not in done]
-            if ahead:
-                todo += ahead
-            elif (part := todo.pop()) not in done:
-                done.add(part)
-                order.append(part)
-        return tuple(order)
+    def _parts(self) -> ConnectedParts:
+        return ConnectedParts(self._matrix, directed=self._directed)
 
     @cached_property
     def _ends_ahead(self) -> Int32Array:
         """At least how many ends, itself included, can be reached from each node of the region."""
         ends = np.flatnonzero(self._is_end)
         if not self._directed:
-            per_part = np.bincount(self._parts[ends], minlength=len(self.nodes))
-            return per_part[self._parts].astype(np.int32)
+            part = self._parts.of
+            per_part = np.bincount(part[ends], minlength=len(self.nodes))
+            return per_part[part].astype(np.int32)
         if not len(ends):
             return np.zeros(len(self.nodes), dtype=np.int32)
         back = csgraph.dijkstra(self._matrix.T.tocsr(), indices=ends, min_only=True)
@@ -368,13 +339,13 @@ class PathFinder:
     def _name(self, node: int) -> str:
         return f"node {node}"
 
-    def _farthest(self, spawn: int, distances: FloatArray, *, within: float = 0.0) -> Int32Array:
-        """Rows of the farthest reachable node of each lane, and of those at most that much less."""
+    def _farthest(self, spawn: int, distances: FloatArray) -> Int32Array:
+        """Rows of the farthest reachable nodes of each lane, where several are equally far all."""
         away = np.where(np.isfinite(distances), distances, -1.0)
         away[self._local[spawn]] = -1.0
         farthest = np.maximum.reduceat(away, self._lane_starts)
-        least = np.repeat(farthest, self._lane_sizes) - within
-        return np.flatnonzero((away >= least) & (away >= 0)).astype(np.int32)
+        sizes = np.diff(self._lane_starts, append=len(self._lane))
+        return np.flatnonzero((away >= np.repeat(farthest, sizes)) & (away >= 0)).astype(np.int32)
 
     def _one_per_lane(self, rows: Int32Array) -> Int32Array:
         """Return the first node of each lane among these, ascending."""
@@ -387,7 +358,3 @@ class PathFinder:
         """Where the nodes of each lane begin."""
         starts: Int32Array = np.flatnonzero(np.diff(self._lane, prepend=-1)).astype(np.int32)
         return starts
-
-    @cached_property
-    def _lane_sizes(self) -> Int32Array:
-        return np.diff(self._lane_starts, append=len(self._lane)).astype(np.int32)

@@ -11,11 +11,9 @@ import numpy as np
 
 from odscen.lanegraph.path_finder import PathFinder
 from odscen.lanegraph.query import node_id, walk_node_id
-from odscen.lanegraph.searches.chained_distances import ChainedDistances
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
+    from numpy.typing import NDArray
     from scipy import sparse
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
@@ -56,42 +54,13 @@ class Router(PathFinder):
         """Router of the same region by another cost of each edge, shape ``(E,)``."""
         return Router(self._graph, self.mask, costs=costs)
 
-    def _farthest_from(self, spawns: Sequence[int]) -> Iterator[tuple[int, Int32Array]]:
-        if not spawns:
-            return
-        chained = ChainedDistances(self._matrix, self._graph.lanes.segment[self.nodes])
-        for place, distances in chained.each(self._local[list(spawns)].tolist()):
-            spawn = spawns[place]
-            rounding = chained.rounding * float(distances[np.isfinite(distances)].max())
-            rows = self._farthest(spawn, distances, within=rounding)
-            if (np.diff(self._lane[rows]) > 0).all():  # else it is rounding that decides
-                yield spawn, self._on_roads(self.nodes[rows].astype(np.int32))
-
-    def _are_farthest(self, pairs: Sequence[tuple[int, int]]) -> dict[tuple[int, int], bool]:
-        on_roads = [pair for pair in pairs if not self._in_junction[pair[1]]]
-        if not on_roads:
-            return {}
-        spawns, goals = self._local[np.array(on_roads)].T.tolist()
-        lanes = np.searchsorted(self._lane_starts, goals, side="right") - 1
-        starts, sizes = self._lane_starts[lanes], self._lane_sizes[lanes]
-        spans = list(zip(starts.tolist(), (starts + sizes).tolist(), strict=True))
-        chained = ChainedDistances(self._matrix, self._graph.lanes.segment[self.nodes])
-        found: dict[tuple[int, int], bool] = {}
-        for place, distances in chained.each_at(spawns, spans):
-            first, end = spans[place]
-            away = np.where(np.isfinite(distances), distances, -1.0)
-            if first <= spawns[place] < end:
-                away[spawns[place] - first] = -1.0
-            most = float(away.max())
-            farthest = np.flatnonzero((away >= most - chained.rounding * most) & (away >= 0.0))
-            if len(farthest) == 1:  # else it is rounding that decides
-                found[on_roads[place]] = first + int(farthest[0]) == goals[place]
-        return found
-
     def _cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
         """Blocks end where a junction is left."""
         inside = self._in_junction[self.nodes]
         return np.asarray(inside[edges.row] & ~inside[edges.col], dtype=np.bool_)
+
+    def _are_roads(self, nodes: NDArray[np.integer]) -> BoolArray:
+        return np.asarray(~self._in_junction[nodes], dtype=np.bool_)
 
     def is_terminal(self, node: int) -> bool:
         """Whether no edge leaves ``node`` inside the region."""

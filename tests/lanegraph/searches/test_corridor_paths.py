@@ -7,19 +7,11 @@ from hypothesis import strategies as st
 from scipy.sparse import csgraph, csr_matrix
 
 from odscen.lanegraph import path_finder
-from odscen.lanegraph.build_graphs import build_map_graph
-from odscen.lanegraph.graphs import MapGraph
+from odscen.lanegraph.searches.blocks import Blocks
 from odscen.lanegraph.searches.corridor_paths import CorridorPaths
 from odscen.lanegraph.searches.edge_matrix import shortest_edges
 from odscen.lanegraph.shortest_paths import Router, WalkRouter
-from odscen.opendrive.parse import parse
-from odscen.workspace.shipped import shipped_maps
-
-
-def shipped(name: str) -> MapGraph:
-    (path,) = (one for one in shipped_maps() if one.stem == name)
-    odr = parse(path.read_bytes(), file=path.name)
-    return build_map_graph(odr, name=name, sha256="0" * 64)
+from tests.lanegraph.shipped_graphs import shipped
 
 
 def searched(matrix: csr_matrix, source: int, target: int) -> tuple[float, list[int]]:
@@ -52,8 +44,9 @@ def between_lines(matrix: csr_matrix, length: int) -> np.ndarray:
 def test_a_path_is_the_one_that_a_search_of_all_nodes_finds(seed: int, metres: bool) -> None:
     rng = np.random.default_rng(seed)
     matrix = in_lines(20, 7, rng, metres=metres)
-    corridors = CorridorPaths(matrix, between_lines(matrix, 7))
-    assert corridors.is_of_use
+    blocks = Blocks(matrix, between_lines(matrix, 7))
+    assert blocks.are_of_use
+    corridors = CorridorPaths(blocks)
     undecided = 0
     for source, target in rng.integers(0, matrix.shape[0], (40, 2)).tolist():
         found = corridors.find(source, target)
@@ -69,25 +62,25 @@ def test_two_paths_that_are_equally_long_to_the_last_digit_are_not_decided_here(
     # 0 -> 1 -> 3 and 0 -> 2 -> 3; what follows is one path.
     rows, columns = np.array([0, 0, 1, 2, *range(3, 19)]), np.array([1, 2, 3, 3, *range(4, 20)])
     matrix = shortest_edges(20, rows, columns, np.full(len(rows), 2.0))
-    corridors = CorridorPaths(matrix, np.ones(matrix.nnz, dtype=np.bool_))
+    corridors = CorridorPaths(Blocks(matrix, np.ones(matrix.nnz, dtype=np.bool_)))
     assert corridors.find(0, 19) is None
     assert corridors.find(3, 19).nodes.tolist() == [*range(3, 20)]
     longer = matrix.copy()
     longer.data[0] += 1e-9  # as little as that decides
-    nodes = CorridorPaths(longer, np.ones(matrix.nnz, dtype=np.bool_)).find(0, 19).nodes
+    nodes = CorridorPaths(Blocks(longer, np.ones(matrix.nnz, dtype=np.bool_))).find(0, 19).nodes
     assert nodes.tolist() == [0, 2, *range(3, 20)]
 
 
 def test_where_no_path_leads_the_length_is_infinite() -> None:
     matrix = shortest_edges(20, np.arange(19), np.arange(1, 20), np.ones(19))
-    way = CorridorPaths(matrix, np.ones(19, dtype=np.bool_)).find(5, 3)
+    way = CorridorPaths(Blocks(matrix, np.ones(19, dtype=np.bool_))).find(5, 3)
     assert np.isinf(way.metres)
     assert len(way.nodes) == 0
 
 
 def test_a_graph_that_is_not_cut_has_no_corridors() -> None:
     matrix = shortest_edges(20, np.arange(19), np.arange(1, 20), np.ones(19))
-    assert not CorridorPaths(matrix, np.zeros(19, dtype=np.bool_)).is_of_use
+    assert not Blocks(matrix, np.zeros(19, dtype=np.bool_)).are_of_use
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ from odscen.scenario.sampling.sampled_behaviour import draw_behaviour
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from odscen.base.arrays import Int32Array
+    from odscen.base.arrays import BoolArray
     from odscen.base.ids import SegmentId
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.sampling_config import (
@@ -323,18 +323,15 @@ def _drafts(
     """Give each spot a goal and a behaviour; a spot without a goal that can be used is dropped."""
     walk = bool(spots) and spots[0].category is Category.PEDESTRIAN
     rng = stream(seed, "walkers" if walk else "vehicles")
-    reach = None
-    if usable.drivable is not None and not walk:
-        reach = Reach(region.graph.lanes, region.lanes & usable.drivable)
+    among: Callable[[int], BoolArray] | None = None
+    if walk:
+        among = None if (walkable := usable.walkable) is None else lambda _: walkable
+    elif usable.drivable is not None:
+        among = Reach(region.graph.lanes, region.lanes & usable.drivable).of
     drafts = []
     router = region.walk_router if walk else region.router
-    candidates = router.each_candidates([spot.node for spot in spots])
-    for spot, found in zip(spots, candidates, strict=True):
-        goals: Int32Array = found
-        if reach is not None:
-            goals = goals[reach.of(spot.node)[goals]]
-        elif walk and usable.walkable is not None:
-            goals = goals[usable.walkable[goals]]
+    candidates = router.each_candidates([spot.node for spot in spots], among)
+    for spot, goals in zip(spots, candidates, strict=True):
         if len(goals):
             goal = int(goals[int(rng.integers(len(goals)))])
             body = supply.bodies[spot.category]
