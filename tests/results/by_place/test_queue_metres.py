@@ -7,7 +7,7 @@ import polars as pl
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.results.by_place.queue_metres import GAP, _joined, _Rows
+from odscen.results.by_place.queue_metres import GAP, _joined, _SlowRows
 
 PERIOD = 0.5
 PASSES = 3
@@ -61,7 +61,7 @@ def test_who_is_reached_by_a_queue_is_in_it_until_it_drives_on(rows: list[dict])
         k == 0 or placed[k][:2] != placed[k - 1][:2] or one[2] - placed[k - 1][2] > 1.5 * PERIOD
         for k, one in enumerate(placed)
     ]
-    table = _Rows(
+    table = _SlowRows(
         names=pl.Series(["left", "through"]),
         moments=np.arange(9) * PERIOD,
         group=np.array([group == "through" for _, group, _ in placed], dtype=np.int64),

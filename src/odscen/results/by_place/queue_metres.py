@@ -139,7 +139,7 @@ def _slow(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class _Rows:
+class _SlowRows:
     """Slow vehicles by vehicle and time, ``(N,)`` each, with numbers in place of names.
 
     Attributes
@@ -173,7 +173,7 @@ def _placed(
     facts: NetFacts,
     *,
     period: float,
-) -> _Rows:
+) -> _SlowRows:
     """Where slow vehicles are before the lines that they come to."""
     import polars as pl
 
@@ -201,7 +201,7 @@ def _placed(
     group = of_stretch[stretch]
     front = stretches["line"].to_numpy()[stretch] - pos
     moments = np.unique(time)
-    return _Rows(
+    return _SlowRows(
         names=pl.Series(names),
         moments=moments,
         group=group,
@@ -240,7 +240,7 @@ def _grouped(slow: pl.DataFrame, entered: pl.DataFrame, groups: LaneGroups) -> p
     )
 
 
-def _joined(rows: _Rows) -> IntArray:
+def _joined(rows: _SlowRows) -> IntArray:
     """Those that are in the queue, by lane group and moment, and from the line backwards."""
     # In which order they are who are beside each other does not matter.
     order = np.lexsort((rows.front, rows.moment, rows.group))
