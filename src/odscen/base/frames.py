@@ -14,12 +14,12 @@ as well as numbers (field by field), so that a whole trajectory converts in one 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    from odscen.base.arrays import FloatArray
 
-Real = float | NDArray[np.float64]
+    Real = float | FloatArray
 
 
 class XodrPose(NamedTuple):
@@ -54,11 +54,15 @@ class CarlaPose(NamedTuple):
 
 def angle_deg_from_hdg(hdg: Real) -> Real:
     """SUMO angle in [0, 360) degrees of an OpenDRIVE heading in radians."""
+    import numpy as np
+
     return np.mod(90.0 - np.degrees(hdg), 360.0)
 
 
 def hdg_from_angle_deg(angle_deg: Real) -> Real:
     """OpenDRIVE heading in [-pi, pi) radians of a SUMO angle in degrees."""
+    import numpy as np
+
     return np.mod(np.radians(90.0 - np.asarray(angle_deg)) + np.pi, 2.0 * np.pi) - np.pi
 
 
@@ -66,6 +70,8 @@ def xodr_to_sumo(
     pose: XodrPose, *, length: Real, net_offset: tuple[float, float] = (0.0, 0.0)
 ) -> SumoPose:
     """Body centre in OpenDRIVE to front bumper in SUMO; ``length`` of the body in metres."""
+    import numpy as np
+
     half = np.asarray(length) / 2.0
     level = half * np.cos(pose.pitch)
     return SumoPose(
@@ -81,6 +87,8 @@ def sumo_to_xodr(
     pose: SumoPose, *, length: Real, net_offset: tuple[float, float] = (0.0, 0.0)
 ) -> XodrPose:
     """Front bumper in SUMO to body centre in OpenDRIVE; inverse of :func:`xodr_to_sumo`."""
+    import numpy as np
+
     hdg = hdg_from_angle_deg(pose.angle_deg)
     half = np.asarray(length) / 2.0
     level = half * np.cos(pose.pitch)
@@ -111,6 +119,8 @@ def body_centre(
 
 def xodr_to_carla(pose: XodrPose) -> CarlaPose:
     """OpenDRIVE to CARLA: y and the sense of rotation change sign."""
+    import numpy as np
+
     return CarlaPose(
         x=pose.x,
         y=np.negative(pose.y),
@@ -122,6 +132,8 @@ def xodr_to_carla(pose: XodrPose) -> CarlaPose:
 
 def carla_to_xodr(pose: CarlaPose) -> XodrPose:
     """CARLA to OpenDRIVE; inverse of :func:`xodr_to_carla`."""
+    import numpy as np
+
     return XodrPose(
         x=pose.x,
         y=np.negative(pose.y),

@@ -19,6 +19,7 @@ from odscen.results.by_place.lane_groups import lane_groups
 from odscen.results.by_place.lane_places import LanePlaces
 from odscen.results.by_place.queue_metres import queue_backs, queue_sums
 from odscen.results.records.light_programs import LightProgram, ShownGroup
+from odscen.results.records.numbered_rows import with_numbered_names
 
 LEFT, THROUGH = "r1>j1>r3", "r1>j1>r2"
 # The road (100 m) widens into a bay for the left turn (l, 40 m) beside the lane through (t, 40 m).
@@ -93,6 +94,19 @@ def test_a_queue_is_measured_from_the_stop_line_to_its_last_rear_over_all_lanes(
     assert backs is not None
     # v5, on the road, turns left: its front is at 44 m; v6 is too far behind to be in the queue.
     assert backs.rows() == [(LEFT, 0.0, 49.0)]
+
+
+def test_a_queue_is_the_same_with_numbered_names_and_in_any_order_of_rows() -> None:
+    seen = [(t, f"v{k}", "l", 39.0 - 7.5 * k, 0.0) for t in (0.0, 1.0, 2.0) for k in range(5)]
+    later = [(9.0, f"v{k}", ":l", 5.0, 5.0) for k in range(5)]
+    table = rows(*seen, *later).collect()
+    backs = queue_backs(table.lazy(), GROUPS, FACTS)
+    assert backs is not None
+    assert backs.rows() == [(LEFT, t, 36.0) for t in (0.0, 1.0, 2.0)]
+    for other in (with_numbered_names(table), table.reverse()):
+        again = queue_backs(other.lazy(), GROUPS, FACTS)
+        assert again is not None
+        assert again.equals(backs)
 
 
 def test_who_is_slow_by_itself_before_the_line_is_no_queue() -> None:

@@ -7,7 +7,7 @@ import polars as pl
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.results.by_place.queue_metres import GAP, _joined
+from odscen.results.by_place.queue_metres import GAP, _joined, _SlowRows
 
 PERIOD = 0.5
 PASSES = 3
@@ -50,13 +50,25 @@ def slow_vehicles(draw: st.DrawFn) -> list[dict]:
             front = draw(st.floats(0.0, 60.0))
             group = draw(st.sampled_from(["left", "left", "left", "through"]))
             rows.append({"id": name, "time": step * PERIOD, "lane_group": group, "front": front})
-            rows[-1]["rear"] = front + 5.0
+            rows[-1]["rear"] = front + draw(st.sampled_from([2.0, 5.0, 18.0]))
     return rows
 
 
 @given(slow_vehicles())
 def test_who_is_reached_by_a_queue_is_in_it_until_it_drives_on(rows: list[dict]) -> None:
-    types = {"id": pl.String, "time": pl.Float64, "lane_group": pl.String}
-    table = pl.DataFrame(rows, schema={**types, "front": pl.Float64, "rear": pl.Float64})
-    found = _joined(table, period=PERIOD)
-    assert set(found.select("id", "time").rows()) == in_queue(rows)
+    placed = [(row["id"], row["lane_group"], row["time"]) for row in rows]
+    spells = [
+        k == 0 or placed[k][:2] != placed[k - 1][:2] or one[2] - placed[k - 1][2] > 1.5 * PERIOD
+        for k, one in enumerate(placed)
+    ]
+    table = _SlowRows(
+        names=pl.Series(["left", "through"]),
+        moments=np.arange(9) * PERIOD,
+        group=np.array([group == "through" for _, group, _ in placed], dtype=np.int64),
+        moment=np.array([round(time / PERIOD) for *_, time in placed], dtype=np.int64),
+        spell=np.cumsum(spells),
+        front=np.array([row["front"] for row in rows]),
+        rear=np.array([row["rear"] for row in rows]),
+    )
+    found = _joined(table) if rows else []
+    assert {(rows[k]["id"], rows[k]["time"]) for k in found} == in_queue(rows)

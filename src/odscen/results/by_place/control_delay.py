@@ -22,11 +22,20 @@ queue of the junction ahead from its top on.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from odscen.results.records.numbered_rows import (
+    among,
+    by_vehicle_and_time,
+    changes,
+    numbers_among,
+)
 
 if TYPE_CHECKING:
     import polars as pl
 
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.results.by_place.facilities import NetFacts
     from odscen.results.by_place.lane_places import LanePlaces
 
@@ -123,20 +132,7 @@ def _lost_on(
     if not set(_NEEDED) <= set(trajectories.collect_schema()):
         return None
     known = drivers.select("id", "factor", "max_speed").with_row_index("vehicle")
-    # Numbers instead of names: there are very many rows.
-    rows = (
-        trajectories.select(
-            id=pl.col("vehicle_id").cast(str),
-            time=pl.col("timestep_time").cast(pl.Float64),
-            lane=pl.col("vehicle_lane").cast(str),
-            speed=pl.col("vehicle_speed").cast(pl.Float64),
-        )
-        .join(known.lazy(), on="id")
-        .join(lanes.lazy().select("lane", "place", "limit", "inner"), on="lane")
-        .select("vehicle", "time", "place", "inner", ratio=_share_of_desired())
-        .sort("vehicle", "time")
-    )
-    found = _stretch_sums(rows, period).collect()
+    found = _stretch_sums(_ratios(trajectories, known, lanes), period)
     return (
         found.join(known.select("vehicle", "id"), on="vehicle")
         .join(lanes.select("junction", "movement", first="place", via="lane"), on="first")
@@ -167,50 +163,97 @@ def _known_lanes(places: LanePlaces, limits: pl.DataFrame) -> pl.DataFrame:
     return rows.with_columns(inner=inner).with_row_index("place")
 
 
-def _share_of_desired() -> pl.Expr:
+@dataclass(frozen=True, slots=True)
+class _Ratios:
+    """Speed as a share of what is desired, by vehicle and time, ``(N,)`` each.
+
+    Attributes
+    ----------
+    vehicle, place, inner
+        Numbers of the vehicle, its lane, and the junction that it is in; 0 on roads.
+    time, ratio
+        Seconds; 0 to 1.
+    """
+
+    vehicle: IntArray
+    place: IntArray
+    inner: IntArray
+    time: FloatArray
+    ratio: FloatArray
+
+
+def _ratios(trajectories: pl.LazyFrame, known: pl.DataFrame, lanes: pl.DataFrame) -> _Ratios:
+    """Of known vehicles on known lanes, whose numbers are their rows."""
+    import numpy as np
     import polars as pl
 
-    desired = pl.min_horizontal(pl.col("limit") * pl.col("factor"), "max_speed")
-    return (pl.col("speed") / desired).clip(0.0, 1.0)
+    kinds = trajectories.collect_schema()
+    rows = (
+        trajectories.filter(
+            among("vehicle_id", known["id"], kinds["vehicle_id"])
+            & among("vehicle_lane", lanes["lane"], kinds["vehicle_lane"])
+        )
+        .select(
+            id="vehicle_id",
+            time=pl.col("timestep_time").cast(pl.Float64),
+            lane="vehicle_lane",
+            speed=pl.col("vehicle_speed").cast(pl.Float64),
+        )
+        .collect()
+    )
+    vehicle = numbers_among(rows["id"], known["id"])
+    order = by_vehicle_and_time(vehicle, rows["time"])
+    vehicle, place = vehicle[order], numbers_among(rows["lane"], lanes["lane"])[order]
+    factor, most = (known[name].to_numpy()[vehicle] for name in ("factor", "max_speed"))
+    desired = np.minimum(lanes["limit"].to_numpy()[place] * factor, most)
+    return _Ratios(
+        vehicle=vehicle,
+        place=place,
+        inner=lanes["inner"].to_numpy()[place],
+        time=rows["time"].to_numpy()[order],
+        ratio=np.clip(rows["speed"].to_numpy()[order] / desired, 0.0, 1.0),
+    )
 
 
-def _stretch_sums(rows: pl.LazyFrame, period: float) -> pl.LazyFrame:
-    """What is lost on each stretch; rows are sorted by vehicle and time."""
+def _stretch_sums(rows: _Ratios, period: float) -> pl.DataFrame:
+    """What is lost on each stretch."""
+    import numpy as np
     import polars as pl
 
-    col = pl.col
-    other = col("vehicle") != col("vehicle").shift(1)
-    road, top = col("inner") == 0, col("top")
-    reached, slowed = col("reached"), col("slowed")
-    return (
-        rows.with_columns(
-            number=(other | (col("inner") != col("inner").shift(1)))
-            .fill_null(value=True)
-            .cum_sum(),
-            # The first record is the insertion, before the first step is driven.
-            lost=pl.when(other.fill_null(value=True))
-            .then(0.0)
-            .otherwise((1.0 - col("ratio")) * period),
-        )
-        .with_columns(top=col("ratio").max().over("number"))
-        .with_columns(reached=(col("ratio") >= REACHED * top).cum_max().over("number"))
-        .with_columns(
-            slowed=(reached & ((col("ratio") < SLOWED * top) | (top < FREE)))
-            .cum_max()
-            .over("number")
-        )
-        .group_by("number")
-        .agg(
-            col("vehicle").first(),
-            first=col("place").first(),
-            final=col("place").last(),
-            begin=col("time").first(),
-            last=col("time").last(),
-            behind=col("lost").filter(road & ~reached).sum(),
-            on_the_way=col("lost").filter(road & reached & ~slowed).sum(),
-            before=col("lost").filter(road & slowed).sum(),
-            inside=col("lost").filter(~road).sum(),
-        )
+    other = changes(rows.vehicle)
+    first = np.flatnonzero(other | changes(rows.inner))
+    last = np.append(first[1:], len(other))[: len(first)] - 1
+    # The first record is the insertion, before the first step is driven.
+    lost = np.where(other, 0.0, (1.0 - rows.ratio) * period)
+    length = last - first + 1
+    place = np.arange(len(other))
+
+    def since(begun: BoolArray) -> BoolArray:
+        """Whether it has begun, then or before on the same stretch."""
+        begin = np.minimum.reduceat(np.where(begun, place, len(place)), first)
+        return place >= np.repeat(begin, length)
+
+    def summed(some: BoolArray) -> FloatArray:
+        return np.add.reduceat(np.where(some, lost, 0.0), first)
+
+    road = rows.inner == 0
+    top = np.repeat(np.maximum.reduceat(rows.ratio, first), length)
+    reached = since(rows.ratio >= REACHED * top)
+    slowed = since(reached & ((rows.ratio < SLOWED * top) | (top < FREE)))
+    return pl.DataFrame(
+        {
+            "number": np.arange(1, len(first) + 1),
+            "vehicle": rows.vehicle[first],
+            "first": rows.place[first],
+            "final": rows.place[last],
+            "begin": rows.time[first],
+            "last": rows.time[last],
+            "behind": summed(road & ~reached),
+            "on_the_way": summed(road & reached & ~slowed),
+            "before": summed(road & slowed),
+            "inside": summed(~road),
+        },
+        schema_overrides=dict.fromkeys(("vehicle", "first", "final"), pl.UInt32),
     )
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import InputError
+from odscen.base.nearest_points import nearest
 from odscen.base.shown import some_of
 from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.query import segment_rows
@@ -234,8 +235,6 @@ def _shortest(graph: MapGraph, first: str, last: str, mask: BoolArray | None) ->
 
 
 def _measured(graph: MapGraph, names: Sequence[str], path: Int32Array) -> Corridor:
-    from odscen.base.near_points import cKDTree
-
     lanes = graph.lanes
     line = np.column_stack([lanes.x[path], lanes.y[path]])
     metres = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
@@ -245,7 +244,7 @@ def _measured(graph: MapGraph, names: Sequence[str], path: Int32Array) -> Corrid
     for begin, end in zip(first.tolist(), [*first[1:].tolist(), len(path)], strict=True):
         here = np.flatnonzero(lanes.segment == rows[begin])
         xy = np.column_stack([lanes.x[here], lanes.y[here]])
-        away, near = cKDTree(line[begin:end]).query(xy)
+        away, near = nearest(xy, line[begin:end])
         near += begin
         heading = lanes.hdg[path[near]]
         offset = xy - line[near]

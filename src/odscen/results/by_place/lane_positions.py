@@ -50,7 +50,7 @@ def _along(shape: FloatArray, points: FloatArray) -> FloatArray:
     for start, step, square, length, before in zip(
         starts, steps, squares, metres, ends[:-1], strict=True
     ):
-        share = np.clip((points - start) @ step / square, 0.0, 1.0)
+        share = np.clip(((points - start) * step).sum(axis=1) / square, 0.0, 1.0)
         distance = np.hypot(*(points - start - share[:, None] * step).T)
         closer = distance < best
         best = np.where(closer, distance, best)

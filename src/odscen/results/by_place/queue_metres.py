@@ -13,11 +13,13 @@ the one that their lane leads to.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.results.by_place.lane_positions import NEEDED, positions
+from odscen.results.records.numbered_rows import among, by_vehicle_and_time, changes, numbers
 
 if TYPE_CHECKING:
     import polars as pl
@@ -61,40 +63,27 @@ def queue_backs(
     ``lane_group``, ``time`` (s), ``metres``; without moments without a queue. ``None`` if lane,
     place or speed were not recorded.
     """
-    import polars as pl
-
     if not set(NEEDED) <= set(trajectories.collect_schema()):
         return None
-    known = groups.reach.select("lane").unique()
-    slow = (
-        trajectories.filter(pl.col("vehicle_speed") < QUEUED)
-        .select(
-            id=pl.col("vehicle_id").cast(str),
-            time=pl.col("timestep_time").cast(pl.Float64),
-            lane=pl.col("vehicle_lane").cast(str),
-            x=pl.col("vehicle_x").cast(pl.Float64),
-            y=pl.col("vehicle_y").cast(pl.Float64),
-        )
-        .join(known.lazy(), on="lane", how="semi")
-        .sort("id", "time")
-        .collect(engine="streaming")
-    )
-    entered = _entries(trajectories, groups)
-    lengths = facts.limits.select("lane", metres="length")
-    front = pl.col("ahead") + pl.col("metres") - pl.col("pos")
-    rows = (
-        _grouped(slow.with_columns(positions(slow, facts)), entered, groups)
-        .join(facts.drivers.select("id", body="length"), on="id", how="left")
-        .join(lengths, on="lane", how="left", maintain_order="left")
-        .with_columns(front=front, rear=front + pl.col("body").fill_null(5.0))
-    )
     step = record_step(trajectories) if period is None else period
-    queued = _joined(rows, period=step)
-    return (
-        queued.group_by("lane_group", "time")
-        .agg(metres=pl.col("rear").max())
-        .sort("lane_group", "time")
-    )
+    slow = _slow(trajectories, groups)
+    if slow.is_empty():
+        return _backs([], [], [])
+    rows = _placed(slow, _entries(trajectories, groups), groups, facts, period=step)
+    joined = _joined(rows)
+    if not len(joined):
+        return _backs([], [], [])
+    at, rear = rows.at[joined], rows.rear[joined]
+    first = np.flatnonzero(changes(at))
+    group, moment = np.divmod(at[first], len(rows.moments))
+    return _backs(rows.names[group], rows.moments[moment], np.maximum.reduceat(rear, first))
+
+
+def _backs(groups: Any, times: Any, metres: Any) -> pl.DataFrame:
+    import polars as pl
+
+    schema = {"lane_group": pl.String, "time": pl.Float64, "metres": pl.Float64}
+    return pl.DataFrame({"lane_group": groups, "time": times, "metres": metres}, schema=schema)
 
 
 def record_step(trajectories: pl.LazyFrame) -> float:
@@ -110,11 +99,13 @@ def _entries(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
     """Who entered which junction when, by which lane group; sorted by time."""
     import polars as pl
 
+    kind = trajectories.collect_schema()["vehicle_lane"]
     return (
-        trajectories.select(
-            id=pl.col("vehicle_id").cast(str),
+        trajectories.filter(among("vehicle_lane", groups.ways["via"], kind))
+        .select(
+            id=pl.col("vehicle_id").cast(pl.String),
             then=pl.col("timestep_time").cast(pl.Float64),
-            via=pl.col("vehicle_lane").cast(str),
+            via=pl.col("vehicle_lane").cast(pl.String),
         )
         .join(groups.ways.lazy().select("via", "junction", "lane_group"), on="via")
         .group_by("id", "junction", "lane_group")
@@ -124,12 +115,110 @@ def _entries(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
     )
 
 
+def _slow(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
+    """Records of those who can be queued, by vehicle and time; ``number`` is the vehicle's."""
+    import polars as pl
+
+    col = pl.col
+    kind = trajectories.collect_schema()["vehicle_lane"]
+    slow = (
+        trajectories.filter(
+            (col("vehicle_speed") < QUEUED) & among("vehicle_lane", groups.first["lane"], kind)
+        )
+        .select(
+            id="vehicle_id",
+            time=col("timestep_time").cast(pl.Float64),
+            lane="vehicle_lane",
+            x=col("vehicle_x").cast(pl.Float64),
+            y=col("vehicle_y").cast(pl.Float64),
+        )
+        .collect(engine="streaming")
+    )
+    number, _ = numbers(slow["id"])
+    return slow.with_columns(number=pl.Series(number))[by_vehicle_and_time(number, slow["time"])]
+
+
+@dataclass(frozen=True, slots=True)
+class _SlowRows:
+    """Slow vehicles by vehicle and time, ``(N,)`` each, with numbers in place of names.
+
+    Attributes
+    ----------
+    names, moments
+        Lane groups and times (s) that have the numbers ``group`` and ``moment``.
+    spell
+        Number of the stretch of time in which it is slow before one stop line.
+    front, rear
+        Metres from the stop line.
+    """
+
+    names: pl.Series
+    moments: FloatArray
+    group: IntArray
+    moment: IntArray
+    spell: IntArray
+    front: FloatArray
+    rear: FloatArray
+
+    @property
+    def at(self) -> IntArray:
+        """Number of lane group and moment together."""
+        return self.group * np.int64(len(self.moments)) + self.moment
+
+
+def _placed(
+    slow: pl.DataFrame,
+    entered: pl.DataFrame,
+    groups: LaneGroups,
+    facts: NetFacts,
+    *,
+    period: float,
+) -> _SlowRows:
+    """Where slow vehicles are before the lines that they come to."""
+    import polars as pl
+
+    lane, _ = numbers(slow["lane"])
+    time, x, y = (slow[name].to_numpy() for name in ("time", "x", "y"))
+    another = changes(slow["number"].to_numpy()) | (np.diff(time, prepend=np.inf) > 1.5 * period)
+    # Within a stretch nobody enters a junction, and most do not move.
+    starts = another | changes(lane)
+    moved = starts | changes(x) | changes(y)
+    pos = positions(slow.filter(moved), facts).to_numpy()[np.cumsum(moved) - 1]
+    stretches = (
+        _grouped(slow.filter(starts).with_row_index("stretch"), entered, groups)
+        .join(facts.drivers.select("id", body="length"), on="id", how="left")
+        .join(facts.limits.select("lane", metres="length"), on="lane", how="left")
+        .select(
+            "stretch",
+            "lane_group",
+            pl.col("body").fill_null(5.0),
+            line=pl.col("ahead") + pl.col("metres"),
+        )
+        .sort("stretch")
+    )
+    of_stretch, names = numbers(stretches["lane_group"])
+    stretch = np.cumsum(starts) - 1
+    group = of_stretch[stretch]
+    front = stretches["line"].to_numpy()[stretch] - pos
+    moments = np.unique(time)
+    return _SlowRows(
+        names=pl.Series(names),
+        moments=moments,
+        group=group,
+        moment=np.searchsorted(moments, time).astype(np.min_scalar_type(len(moments))),
+        spell=np.cumsum(another | changes(group)),
+        front=front,
+        rear=front + stretches["body"].to_numpy()[stretch],
+    )
+
+
 def _grouped(slow: pl.DataFrame, entered: pl.DataFrame, groups: LaneGroups) -> pl.DataFrame:
     """The lane group of each slow vehicle, and ``ahead``: metres from its lane to the line."""
     import polars as pl
 
     found = (
-        slow.join(groups.first, on="lane", how="left")
+        slow.with_columns(pl.col("id", "lane").cast(pl.String))
+        .join(groups.first, on="lane", how="left")
         .sort("time")
         .join_asof(
             entered.rename({"lane_group": "by"}),
@@ -143,69 +232,63 @@ def _grouped(slow: pl.DataFrame, entered: pl.DataFrame, groups: LaneGroups) -> p
     reach = groups.reach.select("lane", "lane_group", "ahead")
     leads = pl.col("ahead").is_not_null()
     # On a lane that does not lead there, one has yet to change, and stands in the other's way.
-    return (
-        found.join(reach, left_on=("lane", "by"), right_on=("lane", "lane_group"), how="left")
-        .with_columns(
-            lane_group=pl.when(leads).then("by").otherwise("other"),
-            ahead=pl.coalesce("ahead", "ahead_of_other"),
-        )
-        .sort("id", "time")
+    return found.join(
+        reach, left_on=("lane", "by"), right_on=("lane", "lane_group"), how="left"
+    ).with_columns(
+        lane_group=pl.when(leads).then("by").otherwise("other"),
+        ahead=pl.coalesce("ahead", "ahead_of_other"),
     )
 
 
-def _joined(rows: pl.DataFrame, *, period: float) -> pl.DataFrame:
-    """Rows of those that are in the queue; ``period`` seconds lie between two records."""
-    import polars as pl
-
-    col = pl.col
-    spell = (
-        (col("id") != col("id").shift(1)).fill_null(value=True)
-        | (
-            (col("time").diff() > 1.5 * period)
-            | (col("lane_group") != col("lane_group").shift(1))
-        ).fill_null(value=True)
-    ).cum_sum()  # fmt: skip
-    at = ("lane_group", "time")
-    # Ordered from the line backwards, one that is more than the gap behind begins another cluster.
-    behind = col("front") - col("rear").cum_max().shift(1).over(*at)
-    other = col("lane_group").ne_missing(col("lane_group").shift(1))
-    cluster = (
-        other | col("time").ne_missing(col("time").shift(1)) | (behind > GAP).fill_null(value=False)
-    ).cum_sum()
-    ordered = (
-        rows.sort("id", "time")
-        .with_columns(spell=spell)
-        .with_row_index("row")
-        .sort("lane_group", "time", "front", "id")
-        .with_columns(cluster=cluster)
-    )
-    if not ordered.height:
-        return ordered
-    return ordered.filter(_queued(*(ordered[name].to_numpy() for name in _SORTED)))
+def _joined(rows: _SlowRows) -> IntArray:
+    """Those that are in the queue, by lane group and moment, and from the line backwards."""
+    # In which order they are who are beside each other does not matter.
+    order = np.lexsort((rows.front, rows.moment, rows.group))
+    front = rows.front[order]
+    cluster: IntArray = np.cumsum(_clusters(rows.at[order], front, rows.rear[order]))
+    return order[_queued(order, rows.spell, cluster, front)]
 
 
-_SORTED = ("row", "spell", "cluster", "front")
+def _clusters(at: IntArray, front: FloatArray, rear: FloatArray) -> BoolArray:
+    """Who begins another cluster: who is more than the gap behind all that are before it.
+
+    Parameters
+    ----------
+    at
+        Number of lane group and moment, ascending.
+    front, rear
+        Metres from the stop line, from there backwards.
+    """
+    first = changes(at)
+    most = int(np.diff(np.flatnonzero(first), append=len(at)).max())
+    furthest, reach = rear.copy(), 1
+    while reach < most:  # over twice as many each time
+        both = np.maximum(furthest[reach:], furthest[:-reach])
+        furthest[reach:] = np.where(at[reach:] == at[:-reach], both, furthest[reach:])
+        reach *= 2
+    behind = front[1:] - furthest[:-1] > GAP
+    return first | np.concatenate(([False], behind))
 
 
-def _queued(row: IntArray, spell: IntArray, cluster: IntArray, front: FloatArray) -> BoolArray:
+def _queued(order: IntArray, spell: IntArray, cluster: IntArray, front: FloatArray) -> BoolArray:
     """Who is in a queue; the vehicles of a moment are reached by it again and again.
 
     Parameters
     ----------
-    row
+    order
         Place of each in the order of vehicles and times.
-    spell, cluster
-        Numbers of the stretch of time in which it is slow, and of the cluster that it is in, which
-        are in the order of what is given.
+    spell
+        In the order of vehicles and times: number of the stretch of time in which it is slow.
+    cluster
+        Number of the cluster that it is in, ascending.
     front
         Metres from the stop line.
     """
-    first = np.flatnonzero(np.diff(cluster, prepend=cluster[0] - 1))
-    queued = np.repeat(np.fmin.reduceat(front, first) <= GAP, np.diff(first, append=len(front)))
-    by_time = np.argsort(row)
-    place = np.arange(len(row))
-    spells = spell[by_time]
-    begin = np.maximum.accumulate(np.where(np.diff(spells, prepend=-1), place, 0))
+    first = np.flatnonzero(changes(cluster))
+    queued = np.repeat(np.minimum.reduceat(front, first) <= GAP, np.diff(first, append=len(front)))
+    by_time = np.empty_like(order)
+    place = by_time[order] = np.arange(len(order))
+    begin = np.maximum.accumulate(np.where(changes(spell), place, 0))
     for _ in range(_PASSES):
         # Whoever has joined stays: the last that was queued lies in the same spell.
         last = np.maximum.accumulate(np.where(queued[by_time], place, -1))

@@ -50,14 +50,19 @@ def queue_lengths(
         .drop_nulls("begin")
     )
     in_interval = moments.group_by("begin").agg(pl.len().alias("moments"))
+    kind = trajectories.collect_schema()["vehicle_lane"]
+    # Names of junctions come last: there are very many rows.
+    names = places.ways["junction"].unique().sort().to_frame().with_row_index("place")
+    leads = places.ways.join(names, on="junction").select(
+        "place", lane=pl.col("lane").cast(kind, strict=False)
+    )
     standing = (
         trajectories.filter(pl.col("vehicle_speed") < STOPPED)
-        .select(
-            time=pl.col("timestep_time").cast(pl.Float64), lane=pl.col("vehicle_lane").cast(str)
-        )
-        .join(places.ways.lazy().select("lane", "junction"), on="lane")
-        .group_by("junction", "time")
+        .select(time=pl.col("timestep_time").cast(pl.Float64), lane="vehicle_lane")
+        .join(leads.lazy(), on="lane")
+        .group_by("place", "time")
         .agg(pl.len().alias("queue"))
+        .join(names.lazy(), on="place")
         .join(moments, on="time")
     )
     # Moments without a queue have no row: the rank is counted from the longest.

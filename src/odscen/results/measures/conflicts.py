@@ -8,9 +8,8 @@ Simulation Models", FHWA-RD-03-050, 2003, whose limits are the ones here.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -80,7 +79,7 @@ def _joined(tables: Sequence[pl.DataFrame]) -> pl.DataFrame:
     new = pl.col("begin") > until + pl.when(same_slice).then(0.0).otherwise(WATCHED_ON)
     number = new.fill_null(value=True).cum_sum().over(pair).alias("number")
     worst = ("ttc", "pet", "drac")
-    place = pl.col("ttc").fill_null(np.inf).arg_min()
+    place = pl.col("ttc").fill_null(math.inf).arg_min()
     return (
         ordered.with_columns(number)
         .group_by(*pair, "number", maintain_order=True)
@@ -121,6 +120,7 @@ def walking_conflicts(
         Columns ``time, id, x, y, angle`` (front centre; degrees clockwise from north), of every
         step, in one frame.
     """
+    import numpy as np
     import polars as pl
 
     from odscen.base.near_points import cKDTree

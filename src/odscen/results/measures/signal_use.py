@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.stored_files import tables
 from odscen.results.measures.figure import Basis, Better, Display, ReportSection, RunFigure
+from odscen.results.records.numbered_rows import among
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -141,8 +142,8 @@ def _passages(
     """Vehicles and the times at which they passed a light, and stopped before it if they did."""
     import polars as pl
 
-    names = rows.collect_schema().names()
-    if not {"vehicle_lane", "vehicle_speed"} <= set(names):
+    kinds = rows.collect_schema()
+    if not {"vehicle_lane", "vehicle_speed"} <= set(kinds):
         return None
     inside = pl.DataFrame(
         [
@@ -154,14 +155,20 @@ def _passages(
         schema=dict.fromkeys(("lane", "light", "group"), pl.String),
         orient="row",
     ).unique("lane", maintain_order=True)
-    seen = rows.select(
-        pl.col("timestep_time").cast(pl.Float64).alias("time"),
-        pl.col("vehicle_id").alias("id"),
-        pl.col("vehicle_lane").alias("lane"),
-        pl.col("vehicle_speed").alias("speed"),
-    )
+
+    def seen(some: pl.LazyFrame, on: pl.DataFrame) -> pl.LazyFrame:
+        return (
+            some.filter(among("vehicle_lane", on["lane"], kinds["vehicle_lane"]))
+            .select(
+                time=pl.col("timestep_time").cast(pl.Float64),
+                id=pl.col("vehicle_id").cast(pl.String),
+                lane=pl.col("vehicle_lane").cast(pl.String),
+            )
+            .join(on.lazy(), on="lane")
+        )
+
     passed = (
-        seen.join(inside.lazy(), on="lane")
+        seen(rows, inside)
         .group_by("id", "light", "group")
         .agg(passed=pl.col("time").min())
         .collect()
@@ -170,8 +177,7 @@ def _passages(
         return passed.with_columns(stopped=pl.lit(None, dtype=pl.Float64))
     edges = _approaches(programs, ways)
     stopped = (
-        seen.filter(pl.col("speed") < STOPPED)
-        .join(edges.lazy(), on="lane")
+        seen(rows.filter(pl.col("vehicle_speed") < STOPPED), edges)
         .group_by("id", "light")
         .agg(stopped=pl.col("time").min())
         .collect()

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.results.records.numbered_rows import by_vehicle_and_time, numbers
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import polars as pl
 
-    from odscen.base.arrays import FloatArray, IntArray
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
 
 
 OTHER = "other"
@@ -56,28 +58,32 @@ def tidy(
     schema |= {"speed": pl.Float64, "category": pl.String, "piece": pl.UInt32}
     if columns is None:
         return pl.DataFrame(schema=schema)
-    lookup = pl.DataFrame(
-        {"id": list(categories), "category": list(categories.values())},
-        schema={"id": pl.String, "category": pl.String},
-    )
     rows = (
         trajectories.select(pl.col(old).alias(new) for new, old in columns.items())
         .with_columns(pl.col("time", "x", "y", "speed").cast(pl.Float64))
         .filter(pl.col("id").is_not_null() & pl.all_horizontal(pl.col("x", "y").is_finite()))
         .with_columns(pl.col("x") - net_offset[0], pl.col("y") - net_offset[1])
-        .join(lookup, on="id", how="left", maintain_order="left")
-        .with_columns(pl.col("category").fill_null(OTHER))
-        .sort("id", "time", maintain_order=True)
     )
-    another = (pl.col("id") != pl.col("id").shift()).fill_null(value=False)
-    pause = pl.col("time").diff()
-    step = rows.select(pause.filter(pause > 0).min()).item() or 1.0
-    away = pause > 1.5 * step
+    number, names = numbers(rows["id"])
+    order = by_vehicle_and_time(number, rows["time"])
+    rows, number = rows[order], number[order]
+    kinds = pl.Series([categories.get(name, OTHER) for name in names], dtype=pl.String)
+    piece = np.cumsum(_begins_a_piece(rows, number), dtype=np.uint32)
+    return rows.with_columns(category=kinds[number], piece=pl.Series(piece)).select(*schema)
+
+
+def _begins_a_piece(rows: pl.DataFrame, number: IntArray) -> BoolArray:
+    """Whether a record is the first of another road user, or after an interruption; not row 0."""
+    time, x, y, speed = (rows[name].to_numpy() for name in ("time", "x", "y", "speed"))
+    pause = np.diff(time)
+    step = float(pause[pause > 0].min(initial=np.inf))
+    away = pause > 1.5 * (step if np.isfinite(step) else 1.0)
     # Some teleports end in the step they begin: none covers ten metres more than driving takes.
-    moved = (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()
-    away |= moved > 2.0 * pause * pl.max_horizontal("speed", pl.col("speed").shift()) + 10.0
-    away = away.fill_null(value=False)
-    return rows.with_columns((another | away).cum_sum().cast(pl.UInt32).alias("piece"))
+    moved = np.sqrt(np.diff(x) ** 2 + np.diff(y) ** 2)
+    away |= moved > 2.0 * pause * np.fmax(speed[1:], speed[:-1]) + 10.0
+    found = np.zeros(len(time), dtype=np.bool_)
+    found[1:] = away | (number[1:] != number[:-1])
+    return found
 
 
 def _column_names(columns: list[str]) -> dict[str, str] | None:
@@ -113,7 +119,7 @@ def speed_over_time(traces: pl.DataFrame, *, end: float, width: float) -> SpeedC
     n = max(1, int(np.ceil(end / width)))
     time = (np.arange(n, dtype=np.float64) + 0.5) * width
     rows = (
-        traces.with_columns((pl.col("time") / width).floor().cast(pl.Int64).alias("bin"))
+        traces.select("speed", bin=(pl.col("time") / width).floor().cast(pl.Int64))
         .filter(pl.col("bin").is_between(0, n - 1))
         .group_by("bin")
         .agg(
@@ -221,8 +227,10 @@ def speed_by_place(traces: pl.DataFrame, *, size: float = 3.0) -> SpeedCells:
     import polars as pl
 
     cells = (
-        traces.with_columns(
-            (pl.col("x") / size).floor().alias("i"), (pl.col("y") / size).floor().alias("j")
+        traces.select(
+            "speed",
+            (pl.col("x") / size).floor().alias("i"),
+            (pl.col("y") / size).floor().alias("j"),
         )
         .group_by("i", "j")
         .agg(pl.col("speed").mean())

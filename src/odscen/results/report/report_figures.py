@@ -113,6 +113,6 @@ def _card(figure: RunFigure, value: float, values: Mapping[str, Any]) -> Card:
 
 def _speed_on_the_road(traces: pl.DataFrame) -> list[Card]:
     """Mean of all vehicles at all times, those included that have not arrived."""
-    speed = traces.filter(traces["category"] != "pedestrian")["speed"].mean()
+    speed = traces["speed"].filter(traces["category"] != "pedestrian").mean()
     text = f"{number(speed * 3.6, 1)} km/h" if isinstance(speed, int | float) else "-"
     return [Card("mean speed on the road", text, "of all vehicles, stops included")]

@@ -91,7 +91,7 @@ def run_map(
         beside = 0.35 * (bounds[2] - bounds[0])
         wider = (bounds[0] - beside, bounds[1], bounds[2] + beside, bounds[3])
         layers.append(element("g", map_layers(drawing.clipped(wider), options), class_="map"))
-    vehicles = traces.filter(traces["category"] != "pedestrian")
+    vehicles = traces.select("x", "y", "speed").filter(traces["category"] != "pedestrian")
     layers.append(_speed_layer(speed_by_place(vehicles)))
     layers.append(_path_layer(paths, actors, dot))
     layers.append(_mark_layer(paths, spawns, events, dot))

@@ -294,6 +294,7 @@ def _speed_section(traces: pl.DataFrame, end: float) -> Markup | None:
     if traces.is_empty():
         return None
     width = bin_width(end)
+    traces = traces.select("time", "speed", "category")
     vehicles = traces.filter(traces["category"] != "pedestrian")
     parts: list[Markup | None] = []
     if not vehicles.is_empty():

@@ -11,7 +11,7 @@ import numpy as np
 
 from odscen.base.errors import InputError
 from odscen.base.xml_reading import read_xml
-from odscen.convert.verify.net_reader import read_net
+from odscen.convert.verify.net_reader import read_connections
 from odscen.results.by_place.facilities import NetFacts, no_links
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.xml_rows import elements
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.base.arrays import FloatArray
-    from odscen.convert.verify.net_reader import NetFile
+    from odscen.convert.verify.net_reader import NetConnections
 
 HEAVY = ("truck", "trailer", "bus", "coach", "fire", "tram")
 """SUMO's vehicle classes that count as heavy vehicles."""
@@ -73,8 +73,7 @@ def _net_facts(net: _NetFile) -> NetFacts:
     """Facts of a network, without drivers."""
     import polars as pl
 
-    content = net.path.read_bytes()
-    root = read_xml(content, huge=True)
+    root = read_xml(net.path.read_bytes(), huge=True)
     lanes = [(edge, lane) for edge in root.iterfind("edge") for lane in edge.iterfind("lane")]
     limits = [
         (
@@ -86,7 +85,7 @@ def _net_facts(net: _NetFile) -> NetFacts:
         for edge, lane in lanes
     ]
     ring = {name for one in root.iterfind("roundabout") for name in one.get("edges", "").split()}
-    known = read_net(content)
+    known = read_connections(root)
     yields = _giving_way(known)
     mirrored = str.maketrans("lLrR", "rRlL") if root.get("lefthand") == "true" else {}
     links = {
@@ -131,7 +130,7 @@ def _net_facts(net: _NetFile) -> NetFacts:
     )
 
 
-def _follows(net: NetFile) -> pl.DataFrame:
+def _follows(net: NetConnections) -> pl.DataFrame:
     """Lane and lane behind it, over the lanes inside junctions."""
     import polars as pl
 
@@ -144,7 +143,7 @@ def _points(shape: str) -> FloatArray:
     return np.array(points, dtype=np.float64).reshape(-1, 2)
 
 
-def _giving_way(net: NetFile) -> dict[str, list[str]]:
+def _giving_way(net: NetConnections) -> dict[str, list[str]]:
     """First lanes inside of connections that give way to other vehicles, and theirs.
 
     Giving way to people does not count.
@@ -153,7 +152,7 @@ def _giving_way(net: NetFile) -> dict[str, list[str]]:
     rows = net.request_rows()
     for junction in net.junctions:
         links = rows[junction.id]
-        driven = {k for k, link in enumerate(links) if net.lanes[link.target].function == "normal"}
+        driven = {k for k, link in enumerate(links) if net.functions[link.target] == "normal"}
         for index in sorted(driven):
             before = junction.yields.get(index, frozenset()) & driven
             if before:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.results.measures.conflicts import conflicts_of_slices
+from odscen.results.records.numbered_rows import with_numbered_names
 from odscen.sumo.folder.layout import (
     CALLS_FILE,
     CONFLICTS_FILE,
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 _TIME = "timestep_time"
+_UNUSED = ("vehicle_z", "vehicle_angle")
+"""Columns that no figure is made of."""
 
 
 class Recorded(NamedTuple):
@@ -52,20 +55,28 @@ def trajectory_files(run: Path) -> list[Path]:
     return recorded_files(run, TRAJECTORIES_FILE)
 
 
-IN_MEMORY = 8 << 20
-"""Bytes of trajectories that are read once and kept, instead of each time that they are used."""
+IN_MEMORY = 32 << 20
+"""Bytes of trajectories that are read once and kept, instead of each time that they are used.
+
+Some two million rows, of 44 bytes each.
+"""
 
 
 def scan_trajectories(run: Path) -> pl.LazyFrame | None:
-    """Trajectories to compute with; ``None`` if none were recorded, or no road user was there."""
+    """Trajectories to compute with; ``None`` if none were recorded, or no road user was there.
+
+    Names of those that are kept are numbered, see
+    :mod:`odscen.results.records.numbered_rows`, and without what figures are not made of.
+    """
     import polars as pl
 
     files = trajectory_files(run)
     if not files:
         return None
+    table = pl.scan_parquet(files).drop(_UNUSED, strict=False)
     if sum(file.stat().st_size for file in files) > IN_MEMORY:
-        return pl.scan_parquet(files)
-    return pl.read_parquet(files).lazy()
+        return table
+    return with_numbered_names(table.collect()).lazy()
 
 
 def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:

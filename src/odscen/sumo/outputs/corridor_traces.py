@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from odscen.base.nearest_points import nearest
 from odscen.results.by_place.corridors import junctions_of
 from odscen.results.report.report_corridor import NONE_RECORDED, CorridorTraces
 from odscen.sumo.folder.recorded import trajectory_files
@@ -30,9 +31,6 @@ _GRAIN = 300.0
 
 _NEAR = 5.0
 """Metres from the nearest node beyond which a record on the same lane is not on the corridor."""
-
-_LANES_APART = 1e6
-"""Metres put between lanes in the search, so that a node of another lane is never nearest."""
 
 _AWAY = 10.0
 """Seconds; a vehicle that is away for longer, or comes back further behind, passes anew."""
@@ -129,14 +127,15 @@ def _placed(
     """Add ``along``; records on the same lanes beside the corridor are left out."""
     import polars as pl
 
-    from odscen.base.near_points import cKDTree
-
     lanes, places = sumo_map.graph.lanes, sumo_map.lane_places
     xy = np.column_stack([lanes.x, lanes.y])[nodes] + np.array(sumo_map.net_offset)
-    tree = cKDTree(np.column_stack([xy, places.lane[nodes] * _LANES_APART]))
-    at = rows.select("vehicle_x", "vehicle_y").to_numpy()
-    away, near = tree.query(np.column_stack([at, rows["lane"].to_numpy() * _LANES_APART]))
+    at, lane = rows.select("vehicle_x", "vehicle_y").to_numpy(), rows["lane"].to_numpy()
+    away, near = np.empty(len(at)), np.empty(len(at), dtype=np.int64)
+    for one in np.unique(lane).tolist():
+        here, own = np.flatnonzero(lane == one), np.flatnonzero(places.lane[nodes] == one)
+        away[here], found = nearest(at[here], xy[own])
+        near[here] = own[found]
     ahead = at - xy[near]
     hdg = lanes.hdg[nodes][near]
     metres = along[near] + ahead[:, 0] * np.cos(hdg) + ahead[:, 1] * np.sin(hdg)
-    return rows.with_columns(pl.Series("along", metres)).filter(pl.Series(np.asarray(away) < _NEAR))
+    return rows.with_columns(pl.Series("along", metres)).filter(pl.Series(away < _NEAR))

@@ -27,10 +27,10 @@ from pathlib import Path
 from typing import Any, NoReturn, Self
 
 from odscen.sumo.worker import simulate
-from odscen.sumo.worker.warm_imports import import_all
+from odscen.sumo.worker.warm_imports import import_all, import_for
 
 IDLE = 60.0
-"""Wall seconds without a run after which the process ends, for it holds 110 MB."""
+"""Wall seconds without a run after which the process ends, for it holds 100 MB."""
 MOST_DESCRIPTORS = 8
 _MOST_BYTES = 1 << 16
 
@@ -99,6 +99,7 @@ class _Children:
     ) -> None:
         """Fork a process that runs a plan."""
         said_to, stdout, stderr, *kept = descriptors
+        import_for(Path(request["cwd"] or "", request["plan"]).parent)  # once for all that follow
         pid = os.fork()
         if not pid:
             for other in (*self._said_to.values(), self._ended, self._wake):

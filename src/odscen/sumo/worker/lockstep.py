@@ -17,13 +17,13 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from odscen.results.records.run_events import EventKind, event_row
 from odscen.sumo.worker.protocol import Command, EgoPose, MoreRules, Outside, State, decode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    import numpy as np
 
     from odscen.results.records.run_plan import Plan
     from odscen.sumo.worker.protocol import Lockstep, Message
@@ -110,6 +110,8 @@ class LockstepWatch:
 
     def show(self, session: Session, recorder: Recorder) -> None:
         """Report the step just made; there is nothing to report before the first."""
+        import numpy as np
+
         if not self._steps:
             return
         known = len(self._lane) - 1
@@ -138,6 +140,8 @@ class LockstepWatch:
         self._send(state, rows)
 
     def _rows(self, poses: Poses, places: list[tuple[str, float]]) -> np.ndarray:
+        import numpy as np
+
         rows = np.empty((len(poses.ids), COLUMNS), dtype="<f8")
         rows[:, 0] = [self._row.get(name, -1) for name in poses.ids]
         rows[:, 1] = poses.x

@@ -63,7 +63,7 @@ from odscen.sumo.worker.slice_processes import End
 from odscen.sumo.worker.slices import run_slice
 from odscen.sumo.worker.steering import Steering
 from odscen.sumo.worker.stepping import Stepper
-from odscen.sumo.worker.warm_imports import import_all
+from odscen.sumo.worker.warm_imports import import_all, import_for
 from odscen.sumo.worker.watch import Watch
 
 if TYPE_CHECKING:
@@ -134,6 +134,7 @@ def _run_slices(plan: Plan, folder: Path, send: Send, how: Sequence[str]) -> End
 
         if slice_processes.POSSIBLE:
             import_all()
+            import_for(folder, watched=bool(how))
             end = slice_processes.in_processes(how, run)
         else:
             end = run(how)

@@ -6,6 +6,8 @@ import ctypes
 from contextlib import suppress
 from pathlib import Path
 
+from odscen.sumo.folder.layout import BEHAVIOUR_FILE, STORY_FILE, SUMO_FOLDER
+
 _XERCES = "libxerces-c-3"
 _INITIALIZE = (
     "_ZN11xercesc_3_216XMLPlatformUtils10InitializeEPKcS2_PNS_12PanicHandlerEPNS_13MemoryManagerE"
@@ -15,15 +17,25 @@ _INITIALIZE = (
 
 def import_all() -> None:
     """Import all that a simulation needs, without anything of SUMO having run."""
-    # Not polars: what is here each fork has to be given, and tables are made elsewhere.
+    # Not polars, nor numpy: what is here each fork has to be given, and tables are made elsewhere.
     import lxml.etree
 
     from odscen.sumo.outputs import output_tables
-    from odscen.sumo.worker.simulation import session
+    from odscen.sumo.worker.simulation import libsumo_import
 
     del lxml, output_tables
-    session.import_libsumo()
+    libsumo_import.import_libsumo()
     _ready_xerces()
+
+
+def import_for(folder: Path, *, watched: bool = False) -> None:
+    """Import what the run in ``folder`` needs and others do not, if there is anything."""
+    if watched:
+        import odscen.sumo.worker.snapshots
+    if (folder / SUMO_FOLDER / STORY_FILE).is_file():
+        import odscen.sumo.worker.story.story_run
+    if (folder / SUMO_FOLDER / BEHAVIOUR_FILE).is_file():
+        import odscen.sumo.worker.behaviour.behaviour_run  # noqa: F401
 
 
 def _ready_xerces() -> bool:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from odscen.results.records.run_events import EventKind, event_row
 from odscen.sumo.worker.protocol import Detectors, FrameMessage, Incidents, Lights
-from odscen.sumo.worker.snapshots import Snapshots
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -50,6 +49,8 @@ class Watch:
         *,
         detectors: Sequence[str] = (),
     ) -> None:
+        from odscen.sumo.worker.snapshots import Snapshots  # arrays, which few runs need
+
         self.steering = steering
         self._snapshots = Snapshots(plan)
         self._send = send

@@ -15,7 +15,8 @@ CROSSING = Path(__file__).parents[4] / "maps" / "signal_crossing.xodr"
 SCRIPT = """
 import json, math, sys
 from odscen.sumo.worker.protocol import ForeignUser
-from odscen.sumo.worker.simulation.session import open_session, import_libsumo
+from odscen.sumo.worker.simulation.libsumo_import import import_libsumo
+from odscen.sumo.worker.simulation.session import open_session
 with open_session(["-n", sys.argv[1], "--step-length", "0.1", "--no-step-log"]) as session:
     sumo = import_libsumo()
     sumo.route.add("r", [sys.argv[2]])

@@ -116,7 +116,7 @@ def test_importing_libsumo_prints_nothing_to_stdout_even_where_it_would(tmp_path
     result = run_script(
         """
 sys.path.insert(0, sys.argv[1])
-from odscen.sumo.worker.simulation.session import import_libsumo
+from odscen.sumo.worker.simulation.libsumo_import import import_libsumo
 import_libsumo()
 print("clean")
 """,

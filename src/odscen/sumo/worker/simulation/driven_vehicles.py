@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
@@ -79,10 +77,14 @@ class DrivenVehicles:
 
     def numbers(self, what: str, names: Sequence[str]) -> FloatArray:
         """One of :data:`NUMBERS` of each vehicle; m, m/s, m/s^2, degrees from north clockwise."""
+        import numpy as np
+
         return np.fromiter(map(self._numbers[what], names), np.float64, len(names))
 
     def fronts(self, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
         """Middle of each one's front, SUMO's frame, metres."""
+        import numpy as np
+
         places = np.array([*map(self._place, names)], dtype=np.float64).reshape(-1, 2)
         return places[:, 0], places[:, 1]
 

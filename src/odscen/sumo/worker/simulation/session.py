@@ -8,18 +8,15 @@ process's file descriptors 1 and 2, see :mod:`odscen.sumo.worker.output_capture`
 
 from __future__ import annotations
 
-import os
-import sys
 from collections import Counter
 from contextlib import contextmanager, suppress
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, cast
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import SimulationError
 from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
 from odscen.sumo.worker.simulation.foreign_traffic import ForeignLights, ForeignTraffic, is_foreign
+from odscen.sumo.worker.simulation.libsumo_import import import_libsumo
 from odscen.sumo.worker.simulation.moved_actors import MovedActors
 from odscen.sumo.worker.simulation.observed import (
     Collision,
@@ -36,7 +33,6 @@ from odscen.sumo.worker.simulation.stopped_vehicles import StoppedVehicles
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
-    from types import ModuleType
 
 
 _HAPPENINGS = (
@@ -302,6 +298,8 @@ class Session:
             raise SimulationError(msg) from error
 
     def _poses(self, domain: Any, signals: Callable[[str], int] | None) -> Poses:
+        import numpy as np
+
         ids = domain.getIDList()
         position, angle, speed = domain.getPosition, domain.getAngle, domain.getSpeed
         places = np.array([position(name) for name in ids], dtype=np.float64).reshape(-1, 2)
@@ -380,28 +378,3 @@ def _native(sumo: Any, domain: str, name: str) -> Any:
 def _of_the_run(happened: Sequence[Any]) -> list[Any]:
     """Leave out what happened to road users that other programs drive, but collisions."""
     return [one for one in happened if not (isinstance(one, str) and is_foreign(one))]
-
-
-def import_libsumo() -> Any:
-    """Import libsumo with stdout kept clean.
-
-    With pyarrow importable libsumo prints a warning about Arrow to stdout when imported, which
-    would break output that a program reads; it goes to stderr instead.
-    """
-    sys.stdout.flush()
-    kept = os.dup(1)
-    # It imports sumolib, for a few names, and that pyproj, which takes longer than a short run.
-    unused = "pyproj" not in sys.modules and "sumolib" not in sys.modules
-    if unused:
-        sys.modules["pyproj"] = cast("ModuleType", None)  # how Python itself says: not there
-    try:
-        os.dup2(2, 1)
-        import libsumo
-
-        sys.stdout.flush()
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        if unused:
-            del sys.modules["pyproj"]
-    return libsumo

@@ -7,18 +7,17 @@ for SUMO does not say beforehand when it leaves. All other stops leave doors shu
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from odscen.sumo.worker.simulation.observed import VehicleSignal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from odscen.base.arrays import IntArray
 
 GETTING_OUT = 4.0
 """Seconds for which the driver's door is open."""
@@ -43,7 +42,7 @@ class StopDoors:
         self._simulation, self._vehicle = sumo.simulation, sumo.vehicle
         self._open: dict[str, tuple[int, float]] = {}
 
-    def signals(self, ids: Sequence[str], time: float) -> NDArray[np.int64]:
+    def signals(self, ids: Sequence[str], time: float) -> IntArray:
         """Bits of :class:`VehicleSignal` for each vehicle; to be called after each step.
 
         Parameters
@@ -51,6 +50,8 @@ class StopDoors:
         time
             Simulated seconds.
         """
+        import numpy as np
+
         simulation = self._simulation
         if simulation.getStopStartingVehiclesNumber():
             for name in simulation.getStopStartingVehiclesIDList():
@@ -70,7 +71,7 @@ class StopDoors:
         if self._lefthand:
             kerb, road = road, kerb
         if state & _AT_BUS_STOP:
-            self._open[name] = int(kerb), np.inf
+            self._open[name] = int(kerb), math.inf
         elif state & _AT_PARKING_AREA and self._vehicle.getDistance(name) > _DRIVEN:
             self._open[name] = int(road), time + GETTING_OUT
 
