@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Self
 
 from odscen.base.errors import ResourceError
 from odscen.sumo.runner.allocator import fast_allocator
+from odscen.sumo.worker.slice_processes import POSSIBLE
 
 if TYPE_CHECKING:
     from typing import BinaryIO
 
 SERVER = "odscen.sumo.worker.fork_server"
-POSSIBLE = sys.platform.startswith("linux")
-"""Elsewhere a process that has loaded much cannot be relied on when it is forked."""
 SET_BY_POLARS = "_RJEM_MALLOC_CONF"
 """Set when polars is imported, here and there; a server may have been started before."""
 _TRIES = 2

@@ -132,9 +132,8 @@ def webster(name: str, wish: WebsterWish, shared: Shared) -> TimedSignalsState:
         scenario, arrows = with_turn_arrows(shared.workspace, scenario, junctions=wish.junctions)
         notes = arrow_words(arrows)
     timed = time_signals(shared.workspace, scenario, junctions=wish.junctions)
-    draft = shared.drafts.change(
-        name, wish.version, "Time lights after the demand", lambda _: timed.scenario
-    )
+    label = "Time lights after the demand"
+    draft = shared.drafts.change(name, wish.version, label, lambda _: timed.scenario)
     state = state_of(shared, draft)
     return TimedSignalsState(state=state, notes=[*notes, *timed.to_words()], picture="")
 
