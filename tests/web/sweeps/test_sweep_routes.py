@@ -245,8 +245,13 @@ def test_a_sweep_of_a_server_that_has_ended_is_stopped_and_can_be_deleted(
 
 def test_a_case_that_takes_too_long_is_given_up_by_the_estimate() -> None:
     plan = SweepPlan((axis_from_text("gap=10,20"),))
-    found = estimate(workspace(), loads(cut_in()), plan, settings=SweepSettings(), patience=0.05)
+    data = json.loads(cut_in())
+    data["simulation"]["duration"] = 500_000.0
+    data["actors"][0] |= {"speed": 0.15, "initial_speed": 0.15}
+    crawling = loads(json.dumps(data))  # 4,000 s to the goal: a second of computing
+    found = estimate(workspace(), crawling, plan, settings=SweepSettings(), patience=0.05)
     assert not found.whole
+    assert found.seconds >= 0.05
 
 
 @pytest.mark.parametrize(
