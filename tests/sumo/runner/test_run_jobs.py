@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import _thread
 import json
 import subprocess
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -218,6 +220,26 @@ def test_a_run_that_cannot_be_prepared_is_left_out_where_somebody_is_told(
     results = run_many(jobs, refused=lambda job, error: told.update({job.name: str(error)}))
     assert told == {"broken": "no such place"}
     assert [result.folder.name for result in results] == ["good"]
+
+
+def test_ctrl_c_ends_the_preparation_of_a_run(prepare: Prepare, tmp_path: Path) -> None:
+    seen: list[str] = []
+
+    def endless() -> PreparedRun:
+        try:
+            for step in range(6000):
+                time.sleep(0.01)
+                if step == 50:  # when the main thread waits for this one
+                    _thread.interrupt_main()
+            seen.append("prepared")
+        finally:
+            seen.append("ended")
+        return prepare()
+
+    with pytest.raises(KeyboardInterrupt):
+        run_many([RunJob("large", endless, tmp_path / "runs" / "large")])
+    assert seen == ["ended"]
+    assert not (tmp_path / "runs").exists()
 
 
 def test_finish_adds_files_before_the_folder_appears(prepare: Prepare, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.errors import InputError
+from odscen.base.interruptible import Interruptible
 from odscen.base.system_errors import disk_errors
 from odscen.results.measures.summary import summary_to_json
 from odscen.sumo.folder import layout
@@ -159,7 +160,7 @@ def run_many(
     scenarios are checked before they are run; with ``refused`` that is told it, the others go on
     and the result leaves it out.
     """
-    stopping = threading.Event()
+    stopping, preparing = threading.Event(), Interruptible()
     expect_runs(len(jobs))
 
     def one(job: RunJob) -> Run | None:
@@ -178,7 +179,8 @@ def run_many(
             if progress is not None:
                 progress(job, message)
 
-        prepared = job.prepare()
+        with preparing.computing():
+            prepared = job.prepare()
         result = run_prepared(
             prepared,
             job.out,
@@ -192,13 +194,14 @@ def run_many(
         return result
 
     with ThreadPoolExecutor(max_workers=max(1, processes)) as pool:
-        futures = [pool.submit(one, job) for job in jobs]
         try:
+            futures = [pool.submit(one, job) for job in jobs]
             _wait(futures)
             ended = (future.result() for future in futures)
             return tuple(run for run in ended if run is not None)
         except BaseException:
             stopping.set()
+            preparing.break_off()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
