@@ -6,10 +6,16 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from odscen.app.demand.demands import add_background
+from odscen.app.maps import load_map
+from odscen.app.signals.program_editing import take_over_program
 from odscen.app.signals.signal_optimisation import time_signals
 from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError, NotFoundError
+from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import MapReference
+from odscen.scenario.edits.edited_parts import changed_part
+from odscen.sumo.calibrate.light_timing import with_timings
 from odscen.sumo.realize.realization import realize
 from odscen.workspace.store import Workspace
 from tests.signal_case import MAP, ROOT, crossing, one_plan, program, scenario
@@ -138,3 +144,24 @@ def test_settings_that_cannot_be_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         time_signals(workspace, placed(workspace, scenario(None)), **settings)  # type: ignore[arg-type]
+
+
+def test_lights_of_a_coordination_whose_cycles_differ_get_one(workspace: Workspace) -> None:
+    """As when one of them has got an arrow, and with it a longer cycle."""
+    workspace.add_map(ROOT / "maps" / "town_5x5.xodr")
+    loaded = load_map(workspace.map("town_5x5"))
+    town = edits.new_scenario(loaded.sumo.graph, name="town", roi=loaded.sumo.graph.segments.ids)
+    town = add_background(workspace, town, name="all", per_km=30.0)
+    junctions = [light.names[0] for light in loaded.lights[:2]]
+    for name in junctions:
+        town = take_over_program(workspace, town, name)
+    cycles = [plan.cycle for light in lights_of(workspace, town)[:2] for plan in light.plans]
+    assert cycles == [40.0, 46.0]
+    town = with_timings(town, [
+        changed_part(one, {"coordination": "Avenue", "cycle": cycle})
+        for one, cycle in zip(town.signals.junctions, cycles, strict=True)
+    ])  # fmt: skip
+    timed = time_signals(workspace, town, junctions=junctions[:1]).scenario
+    assert len({timing.cycle for timing in timed.signals.junctions}) == 1
+    shown = {light.plans[0].cycle for light in lights_of(workspace, timed)[:2]}
+    assert shown == {timed.signals.junctions[0].cycle}
