@@ -165,6 +165,7 @@ export const mapInfo = (name: string, junctions: number): MapInfo => ({
   report_counts: {},
   network: { converter: "odscen", source: null },
   preview: "",
+  outdated: false,
   graph: {
     spacing: 2,
     nodes: 1,

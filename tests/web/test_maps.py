@@ -265,6 +265,7 @@ def test_maps_of_an_older_odscen_are_listed_and_previewed_as_they_are_and_built_
     with TestClient(create_app(store), base_url="http://localhost") as client:
         (row,) = client.get("/api/maps").json()
         assert row["name"] == "t_junction_signs"
+        assert row["outdated"] is True
         assert client.get("/api/broken-maps").json() == []
         assert client.get(row["preview"]).status_code == 200
         assert json.loads(about.read_text())["builder"] == "1"
@@ -273,5 +274,5 @@ def test_maps_of_an_older_odscen_are_listed_and_previewed_as_they_are_and_built_
         del older["network"]  # as very old ones are
         (about.parent / "SHA256SUMS").unlink()
         about.write_text(json.dumps(older))
-        assert client.get("/api/maps").json() == [row]
+        assert client.get("/api/maps").json() == [row | {"outdated": False}]
         assert json.loads(about.read_text())["builder"] != "1"

@@ -4497,6 +4497,8 @@ export interface components {
             };
             /** Preview */
             preview: string;
+            /** Outdated */
+            outdated: boolean;
             semantics: components["schemas"]["SemanticsInfo"];
             /** Lights */
             lights: components["schemas"]["LightInfo"][];
@@ -4514,6 +4516,8 @@ export interface components {
         /**
          * MapInfo
          * @description A map of the catalogue; ``report_counts`` says how many elements had which outcome.
+         *
+         *     An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
          */
         MapInfo: {
             /** Name */
@@ -4535,6 +4539,8 @@ export interface components {
             };
             /** Preview */
             preview: string;
+            /** Outdated */
+            outdated: boolean;
         };
         /**
          * MapReference

@@ -1,4 +1,4 @@
-import { ActionIcon, Button, Card, Group, Title, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, Card, Group, Text, Title, Tooltip } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
@@ -41,6 +41,11 @@ export function MapCard({
             <li key={fact}>{fact}</li>
           ))}
         </ul>
+        {map.outdated && (
+          <Text size="sm" c="dimmed" mb={8}>
+            <Trans>Built by an earlier odscen: it is rebuilt when it is first opened.</Trans>
+          </Text>
+        )}
         <Button fullWidth onClick={onStart} loading={starting} aria-label={t`New scenario on ${map.name}`}>
           <Trans>New scenario</Trans>
         </Button>

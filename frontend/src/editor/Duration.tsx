@@ -46,7 +46,7 @@ export function Duration({
         }}
       />
       <Select
-        w={112}
+        w={126}
         aria-label={t`${label}: unit`}
         data={UNITS()}
         value={String(unit)}

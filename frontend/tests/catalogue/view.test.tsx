@@ -27,6 +27,12 @@ test("maps are searched, sorted and filtered; what matches none can be taken bac
   expect(names()).toHaveLength(2);
 });
 
+test("a map that an earlier odscen has built says so", async () => {
+  server({ "/scenarios": [], "/maps": [mapInfo("Town", 9), { ...mapInfo("Village", 0), outdated: true }] });
+  show(<CatalogueView />);
+  expect(await screen.findAllByText(/^Built by an earlier odscen/)).toHaveLength(1);
+});
+
 test("without maps the example maps are offered", async () => {
   server({ "/scenarios": [], "/maps": [] });
   show(<CatalogueView />);

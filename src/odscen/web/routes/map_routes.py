@@ -265,4 +265,5 @@ def _map_info(entry: MapEntry) -> MapInfo:
         network=NetworkOrigin(converter=entry.converter, source=info["network"]["source"]),
         report_counts=info["report"]["counts"],
         preview=f"/api/maps/{entry.name}/preview.svg",
+        outdated=is_outdated(entry),
     )

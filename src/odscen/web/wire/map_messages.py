@@ -60,7 +60,10 @@ class NetworkOrigin(Answer):
 
 
 class MapInfo(Answer):
-    """A map of the catalogue; ``report_counts`` says how many elements had which outcome."""
+    """A map of the catalogue; ``report_counts`` says how many elements had which outcome.
+
+    An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
+    """
 
     name: str
     sha256: str
@@ -72,6 +75,7 @@ class MapInfo(Answer):
     network: NetworkOrigin
     report_counts: dict[ElementOutcome, int]
     preview: str
+    outdated: bool
 
 
 class BrokenMapInfo(Answer):
