@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.errors import InputError
-from odscen.base.interruptible import Interruptible
 from odscen.base.system_errors import disk_errors
 from odscen.results.measures.summary import summary_to_json
 from odscen.sumo.folder import layout
@@ -24,6 +23,7 @@ from odscen.sumo.folder.found_files import found_files
 from odscen.sumo.folder.run_sums import seal_run
 from odscen.sumo.runner.forecast import refuse_without_room
 from odscen.sumo.runner.forked_worker import expect_runs, is_one_of_many, is_ready
+from odscen.sumo.runner.interruptible import Interruptible
 from odscen.sumo.runner.left_results import left_results
 from odscen.sumo.runner.long_runs import refuse_interrupted, run_lock, run_long
 from odscen.sumo.runner.run_folder import (
@@ -126,6 +126,10 @@ _LISTEN = 0.2
 """Wall seconds after which a wait looks for Ctrl-C."""
 
 
+_GRACE = 2.0
+"""Wall seconds in which a run that is prepared may come to where it is stopped in good order."""
+
+
 class _StoppedError(Exception):
     """Another run of the same call has failed to start, or the user has interrupted."""
 
@@ -194,16 +198,25 @@ def run_many(
         return result
 
     with ThreadPoolExecutor(max_workers=max(1, processes)) as pool:
+        futures: list[Future[Run | None]] = []
         try:
-            futures = [pool.submit(one, job) for job in jobs]
+            futures.extend(pool.submit(one, job) for job in jobs)
             _wait(futures)
             ended = (future.result() for future in futures)
             return tuple(run for run in ended if run is not None)
         except BaseException:
             stopping.set()
-            preparing.break_off()
             pool.shutdown(wait=False, cancel_futures=True)
+            _leave(futures, preparing)
             raise
+
+
+def _leave(futures: Sequence[Future[Run | None]], preparing: Interruptible) -> None:
+    """Let runs that have to stop come to where they do; break off preparing what is large."""
+    try:
+        wait(futures, timeout=_GRACE)
+    finally:
+        preparing.break_off()
 
 
 def _wait(futures: Sequence[Future[Run | None]]) -> None:
