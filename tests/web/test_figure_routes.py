@@ -1,8 +1,16 @@
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from starlette.testclient import TestClient
 
 from odscen.results.measures.registry import names_of
+from tests.own_figure import install
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pytest
 
 
 def test_the_page_is_told_what_figures_are(client: TestClient) -> None:
@@ -13,3 +21,13 @@ def test_the_page_is_told_what_figures_are(client: TestClient) -> None:
     assert speed["display"] == {"unit": "km/h", "factor": 3.6, "digits": 1, "clock": False}
     assert (figures["arrived"]["part"], figures["sim_seconds"]["part"]) == ("actors", "")
     assert figures["teleported"]["on_page"]
+
+
+def test_figures_of_installed_packages_are_offered_to_the_page(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert client.get("/api/figures/installed").json() == []
+    install(tmp_path, monkeypatch)
+    rows = {row["name"]: row for row in client.get("/api/figures/installed").json()}
+    assert rows["top_speed"]["definition"] == "Highest speed that anybody had, m/s."
+    assert rows["gone"]["error"]

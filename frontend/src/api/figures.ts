@@ -10,6 +10,12 @@ export type ActorMeasureInfo = components["schemas"]["ActorMeasureInfo"];
 /** All measures of single road users. */
 export const actorMeasures = (): Promise<ActorMeasureInfo[]> => call("get", "/api/figures/actors");
 
+/** A figure that an installed package offers. */
+export type InstalledFigureInfo = components["schemas"]["InstalledFigureInfo"];
+
+/** Figures of installed packages. */
+export const installedFigures = (): Promise<InstalledFigureInfo[]> => call("get", "/api/figures/installed");
+
 let asked: Promise<FigureInfo[]> | null = null;
 
 /** All figures of a run; asked for once, and again after a failure. */

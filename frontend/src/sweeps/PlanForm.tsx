@@ -4,7 +4,7 @@ import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useMemo, useRef, useState } from "react";
 
 import { fixed } from "../language/numbers";
-import { allFigures } from "../api/figures";
+import { allFigures, installedFigures } from "../api/figures";
 import { type PlannedSweep, sweeps } from "../api/sweeps";
 import type { ScenarioDocument } from "../api/types";
 import { shortNumber } from "../editor/parameters";
@@ -22,6 +22,7 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
   const [failure, setFailure] = useState<string | null>(null);
   const [busy, setBusy] = useState<"plan" | "start" | null>(null);
   const figures = useLoaded(allFigures).value;
+  const installed = useLoaded(installedFigures).value;
   const set = (fields: Partial<SweepForm>): void => {
     setForm({ ...form, ...fields });
     setPlanned(null); // which is of another sweep now
@@ -156,7 +157,10 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           className="plan-wide"
           label={t`Figures of runs as more columns`}
           placeholder={t`for example mean_speed`}
-          data={(figures ?? []).map(({ name }) => name)}
+          data={[
+            { group: t`Figures of runs`, items: names(figures) },
+            { group: t`Of installed packages`, items: names(installed?.filter(({ error }) => !error)) },
+          ]}
           value={[...form.figures]}
           onChange={(names) => set({ figures: names })}
         />
@@ -219,6 +223,9 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
 type Named = [string, ScenarioDocument["parameters"][string]];
 
 /** The units in which a table has its values. */
+const names = (figures: readonly { name: string }[] | null | undefined): string[] =>
+  (figures ?? []).map(({ name }) => name);
+
 const unitsOf = (parameters: Named[]): string =>
   parameters.map(([name, { unit }]) => (unit ? `${name} (${unit})` : name)).join(", ");
 

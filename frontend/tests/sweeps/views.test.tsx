@@ -60,6 +60,10 @@ const planned = {
   processes: 2,
   patience: 60,
 };
+const INSTALLED = [
+  { name: "top_speed", definition: "Highest speed.", error: "" },
+  { name: "gone", definition: "", error: "it cannot be imported" },
+];
 const info: SweepInfo = {
   sweep: "s-1",
   scenario: "s",
@@ -159,6 +163,25 @@ test("a sweep tells what it takes before it starts, and a change of the form ask
     path: "/api/sweeps",
     body: { scenario: "s", vary: [{ parameter: "gap", low: 5, high: 50, steps: 7 }] },
   });
+});
+
+test("figures of installed packages are offered as columns, but for those that cannot be used", async () => {
+  const swept: ScenarioDocument = {
+    ...scenario([actor("a")]),
+    parameters: { gap: { value: 20, unit: "m", min: 5, max: 50, description: "" } },
+  };
+  const asked = server({
+    "/api/figures/installed": INSTALLED,
+    "/api/figures": [],
+    "/api/sweeps/plan": planned,
+  });
+  const { user } = show(<PlanForm scenario="s" document={swept} />);
+  await user.click(screen.getByRole("textbox", { name: "Figures of runs as more columns" }));
+  await user.click(await screen.findByRole("option", { name: "top_speed" }));
+  expect(screen.queryByRole("option", { name: "gone" })).toBeNull();
+  await user.click(screen.getByRole("button", { name: "Plan the sweep" }));
+  expect(await screen.findByText(costOf(planned))).toBeDefined();
+  expect(asked.at(-1)).toMatchObject({ body: { figures: ["top_speed"] } });
 });
 
 test("what a sweep takes is not said of a form that has changed while it was found out", async () => {

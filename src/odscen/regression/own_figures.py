@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, Field
 
+from odscen.app.figure_functions import value_of
 from odscen.base.errors import InputError
 from odscen.regression.tolerance import parse_tolerance
 from odscen.results.measures.figure import Better, Figure
@@ -85,16 +86,11 @@ def own_values(figures: Mapping[str, Figure], run: Run, *, beside: Path) -> dict
     found: dict[str, float | None] = {}
     for name, figure in figures.items():
         file, _, function = figure.source.rpartition(":")
-        element = f"figures.{name}"
-        try:
-            value = _function(beside / file, function)(run)
-        except Exception as error:  # whatever the user's own code raises
-            msg = f"{figure.source}: {type(error).__name__}: {error}"
-            raise InputError(msg, element=element) from error
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
-            msg = f"{figure.source} returned {value!r}, not a number or None"
-            raise InputError(msg, element=element)
-        found[name] = None if value is None else float(value)
+
+        def call(run: Run, file: Path = beside / file, function: str = function) -> object:
+            return _function(file, function)(run)
+
+        found[name] = value_of(call, run, source=figure.source, element=f"figures.{name}")
     return found
 
 

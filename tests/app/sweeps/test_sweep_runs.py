@@ -20,6 +20,7 @@ from odscen.scenario.sweeps.sweep_plan import SweepPlan, axis_from_text
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings
+from tests.own_figure import install
 from tests.sumo.story_case import MIDDLE, RIGHT, document, node_at, workspace
 
 if TYPE_CHECKING:
@@ -217,3 +218,35 @@ def test_a_sweep_that_cannot_be_is_refused(
     plan = SweepPlan((axis_from_text(axis),))
     with pytest.raises(InputError, match=words):
         sweep(workspace(), cut_in, plan, tmp_path / "out", settings=SweepSettings(safe=safe))
+
+
+def test_a_figure_of_an_installed_package_is_a_column_and_can_be_limited(
+    cut_in: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, monkeypatch)
+    plan = SweepPlan((axis_from_text("van=12,26"),))
+    settings = SweepSettings(safe=("top_speed <= 29",), figures=("top_speed", "mean_speed"))
+    found = sweep(workspace(), cut_in, plan, tmp_path / "sweep", settings=settings).table
+    speeds = [
+        Run.open(tmp_path / "sweep" / "runs" / case).trajectories()["speed"].max()
+        for case in found["case"]
+    ]
+    assert found["top_speed"].to_list() == speeds
+    assert found["safe"].to_list() == [False, False], "the ego begins at 30 m/s"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("words", "words returned 'many', not a number or None"),
+        ("fails", "fails: ZeroDivisionError: division by zero"),
+        ("beauty", "no figure of runs is called 'beauty', and no installed package offers one"),
+    ],
+)
+def test_a_figure_of_a_package_that_is_none_says_why(
+    cut_in: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str
+) -> None:
+    install(tmp_path, monkeypatch)
+    plan = SweepPlan((axis_from_text("van=12"),))
+    with pytest.raises(InputError, match=words):
+        sweep(workspace(), cut_in, plan, tmp_path / "sweep", settings=SweepSettings(figures=[name]))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from odscen.app.figure_functions import installed_value, is_installed
 from odscen.app.scenarios import SUFFIX, scenario_name
 from odscen.app.sweeps.sweep_folder import read_sweep, settings_from_dict
 from odscen.base.errors import InputError
@@ -69,8 +70,8 @@ def limits_of(settings: SweepSettings) -> tuple[Limit, ...]:
         If a figure or a column of a limit is unknown.
     """
     for name in settings.figures:
-        if run_figure(name) is None:
-            msg = f"no figure of runs is called {name!r}"
+        if run_figure(name) is None and not is_installed(name):
+            msg = f"no figure of runs is called {name!r}, and no installed package offers one"
             raise InputError(msg)
     columns = [*OUTCOME, *settings.figures, *settings.own]
     return tuple(limit_from_text(text, columns) for text in settings.safe)
@@ -125,7 +126,7 @@ def _measured(run: Run, settings: SweepSettings, watched: Collection[str] | None
     )
     for name in settings.figures:
         entry = run_figure(name)
-        found[name] = None if entry is None else run.value_of(entry)
+        found[name] = installed_value(name, run) if entry is None else run.value_of(entry)
     return found | {name: function(run) for name, function in settings.own.items()}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
+from odscen.app.figure_functions import installed_figures
 from odscen.results.judging.actor_measures import ACTOR_MEASURES
 from odscen.results.measures.figure import Better, SummaryPart
 from odscen.results.measures.registry import RUN_FIGURES
@@ -51,6 +52,20 @@ def actor_measures() -> list[ActorMeasureInfo]:
         ActorMeasureInfo(name=one.name, unit=one.unit, label=one.label, definition=one.definition)
         for one in ACTOR_MEASURES
     ]
+
+
+class InstalledFigureInfo(Answer):
+    """A figure of an installed package; ``error`` says why it cannot be used, or is empty."""
+
+    name: str
+    definition: str
+    error: str
+
+
+@router.get("/installed")
+def installed() -> list[InstalledFigureInfo]:
+    """Figures that installed packages offer, for columns of sweeps."""
+    return [InstalledFigureInfo(**one._asdict()) for one in installed_figures()]
 
 
 @router.get("")

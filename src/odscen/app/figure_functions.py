@@ -1,0 +1,97 @@
+"""Figures of a finished run that are functions from outside: named in a file, or installed.
+
+A package offers such figures by entry points::
+
+    [project.entry-points."odscen.figures"]
+    queue = "my_figures:queue"
+
+Their names are then used as those of odscen's own figures are: in columns of sweeps, on the command
+line and in the page.
+"""
+
+from __future__ import annotations
+
+import inspect
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, NamedTuple
+
+from odscen.base.errors import InputError
+from odscen.results.measures.registry import names_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from odscen.sumo.folder.finished_run import Run
+
+GROUP = "odscen.figures"
+
+
+class InstalledFigure(NamedTuple):
+    """A figure of an installed package; ``error`` says why it cannot be used, or is empty."""
+
+    name: str
+    definition: str
+    error: str = ""
+
+
+def installed_figures() -> tuple[InstalledFigure, ...]:
+    """Figures of installed packages by name, with the first line of what each says of itself."""
+    names = {one.name for one in entry_points(group=GROUP)} - {*names_of("run")}
+    found = []
+    for name in sorted(names):
+        try:
+            said = inspect.getdoc(_function(name)) or ""
+            found.append(InstalledFigure(name, said.partition("\n")[0]))
+        except InputError as error:
+            found.append(InstalledFigure(name, "", error.problem))
+    return tuple(found)
+
+
+def is_installed(name: str) -> bool:
+    """Whether a package offers a figure of this name."""
+    return bool(entry_points(group=GROUP, name=name))
+
+
+def installed_value(name: str, run: Run) -> float | None:
+    """Compute an installed figure of a run.
+
+    Raises
+    ------
+    InputError
+        If it cannot be imported, raises, or returns anything but a number or ``None``.
+    """
+    return value_of(_function(name), run, source=name, element="figures")
+
+
+def value_of(
+    function: Callable[[Run], object], run: Run, *, source: str, element: str
+) -> float | None:
+    """Call a function from outside with a finished run.
+
+    Raises
+    ------
+    InputError
+        If it raises, or returns anything but a number or ``None``; names ``source``.
+    """
+    try:
+        value = function(run)
+    except Exception as error:  # whatever the user's own code raises
+        msg = f"{source}: {type(error).__name__}: {error}"
+        raise InputError(msg, element=element) from error
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+        msg = f"{source} returned {value!r}, not a number or None"
+        raise InputError(msg, element=element)
+    return None if value is None else float(value)
+
+
+def _function(name: str) -> Callable[[Run], object]:
+    (point, *_) = entry_points(group=GROUP, name=name)
+    try:
+        found = point.load()
+    except Exception as error:  # whatever an import may raise
+        msg = f"it cannot be imported from {point.value}: {error!r}"
+        raise InputError(msg, element=name) from error
+    if not callable(found):
+        msg = f"{point.value} is no function of a finished run"
+        raise InputError(msg, element=name)
+    return found  # type: ignore[no-any-return]
