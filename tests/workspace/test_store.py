@@ -12,7 +12,7 @@ from odscen.base.errors import (
     OpenDriveError,
     WorkspaceError,
 )
-from odscen.workspace import guarded_build, map_build
+from odscen.workspace import guarded_build
 from odscen.workspace.folder_names import check_name, name_from_file
 from odscen.workspace.store import Workspace, is_outdated
 
@@ -27,13 +27,18 @@ def workspace(tmp_path_factory):
     return store
 
 
-def test_a_map_is_built_once(workspace, monkeypatch):
-    def never(*_arguments, **_options):
-        pytest.fail("the map was built again")
-
-    monkeypatch.setattr(map_build, "build_map", never)
-    again = workspace.add_map(SMALL)
-    assert again.info == workspace.map("t_junction_signs").info
+def test_a_map_is_built_once(tmp_path):
+    store = Workspace.open(tmp_path)
+    written = (store.add_map(SMALL).folder / "map.json").stat()
+    again = store.add_map(SMALL)
+    assert again.info == store.map("t_junction_signs").info
+    kept = (again.folder / "map.json").stat()
+    assert (kept.st_ino, kept.st_mtime_ns) == (written.st_ino, written.st_mtime_ns)
+    about = again.folder / "map.json"
+    about.write_text(about.read_text().replace('"builder": ', '"builder": "1", "_": '))
+    (again.folder / "SHA256SUMS").unlink()
+    store.add_map(SMALL)
+    assert about.stat().st_ino != written.st_ino, "an outdated one is built anew"
 
 
 def test_what_is_loaded_is_what_was_built(workspace):
