@@ -27,7 +27,9 @@ _INTERRUPTED = 130
 def _interrupt_again(what: sys.UnraisableHookArgs) -> None:
     """Interrupt again what was interrupted where Python only shows exceptions and goes on."""
     if what.exc_type is KeyboardInterrupt:
-        again = threading.Timer(_AGAIN, interrupt_main)  # not here: it would be shown again
+        # Not here: it would be shown again. SIGTERM, as SIGINT may be ignored, as by who is started
+        # in the background of a script.
+        again = threading.Timer(_AGAIN, interrupt_main, (signal.SIGTERM,))
         again.daemon = True
         again.start()
     else:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import _thread
 import json
+import signal
 import subprocess
 import time
 from dataclasses import replace
@@ -222,7 +223,9 @@ def test_a_run_that_cannot_be_prepared_is_left_out_where_somebody_is_told(
     assert [result.folder.name for result in results] == ["good"]
 
 
-def test_ctrl_c_ends_the_preparation_of_a_run(prepare: Prepare, tmp_path: Path) -> None:
+def test_ctrl_c_ends_the_preparation_of_a_run(
+    prepare: Prepare, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     seen: list[str] = []
 
     def endless() -> PreparedRun:
@@ -236,6 +239,9 @@ def test_ctrl_c_ends_the_preparation_of_a_run(prepare: Prepare, tmp_path: Path) 
             seen.append("ended")
         return prepare()
 
+    # In the background of a script it would be ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     with pytest.raises(KeyboardInterrupt):
         run_many([RunJob("large", endless, tmp_path / "runs" / "large")])
     assert seen == ["ended"]
