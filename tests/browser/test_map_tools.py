@@ -136,7 +136,7 @@ def test_escape_closes_a_list_before_it_ends_the_measuring(user: OdscenPage, sam
     layers = user.page.get_by_role("button", name="Layers of the map")
     press(user, layers)
     grid = user.page.get_by_role("checkbox", name="Grid with coordinates")
-    expect(grid).to_be_visible()
+    expect(grid).to_be_focused()  # a moment after it is seen; before, keys are those of the map
     user.page.keyboard.press("Escape")
     expect(grid).to_have_count(0)
     assert metres(measured(user).inner_text()) == pytest.approx(10.0, abs=0.2)
