@@ -25,22 +25,22 @@ from odscen.app.demand.demand_correction import correct_matrix
 from odscen.app.maps import LoadedMap, load_map
 from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.base.categories import Category
-from odscen.results.records.assignment_steps import Assignment, AssignmentStep
-from odscen.results.report.report_demand import ShownCount, convergence_chart, scatter_chart
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
+from odscen.records.assignment_steps import Assignment, AssignmentStep
+from odscen.reports.report_demand import ShownCount, convergence_chart, scatter_chart
+from odscen.runs.finished_run import Run
+from odscen.runs.layout import ASSIGNMENT_FILE
+from odscen.runs.recorded import trajectory_files
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds
 from odscen.scenario.document.scenario_document import Counts, Demand, Matrix, Scenario, Zone
 from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import CountFits, run_fit
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.layout import ASSIGNMENT_FILE
-from odscen.sumo.folder.recorded import trajectory_files
 from odscen.sumo.realize.passages import seen_passages
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 
 HOUR = 3600.0
 SLICE = 900.0

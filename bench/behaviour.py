@@ -19,9 +19,9 @@ from bench.in_turns import seconds_of
 from bench.rules import MAP, traffic
 from odscen.app.maps import load_map
 from odscen.app.running.runs import check_run, prepare_run
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.store import Workspace
 
 PIPED = (
     "from odscen.learning.behaviour.behaviour_messages import serve; "

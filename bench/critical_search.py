@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.app.sweeps.critical_search import SearchSettings, search
-from odscen.app.sweeps.sweep_folder import SweepSettings
 from odscen.app.template_scenarios import template_scenario
-from odscen.learning.search.proposals import SEARCH_METHODS
+from odscen.experiments.search.proposals import SEARCH_METHODS
+from odscen.experiments.sweeps.critical_search import SearchSettings, search
+from odscen.experiments.sweeps.sweep_folder import SweepSettings
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.sweeps.sweep_plan import Range
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario

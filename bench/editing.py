@@ -21,10 +21,10 @@ from playwright.sync_api import expect
 from bench.canvas import TOWN
 from bench.common import shared_maps
 from odscen.app.scenarios import SUFFIX, generate
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage
 from tools import page as tool
 

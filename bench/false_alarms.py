@@ -31,11 +31,11 @@ import numpy as np
 import numpy.typing as npt
 
 from odscen.app.scenarios import read_scenario, write_scenario
-from odscen.regression.baseline import baseline_of
-from odscen.regression.detection import DetectEntry, Pairs, detection_of, size_of
-from odscen.regression.gates import run_suite
-from odscen.regression.measure import FigureKey, Measured
-from odscen.regression.scatter import (
+from odscen.experiments.regression.baseline import baseline_of
+from odscen.experiments.regression.detection import DetectEntry, Pairs, detection_of, size_of
+from odscen.experiments.regression.gates import run_suite
+from odscen.experiments.regression.measure import FigureKey, Measured
+from odscen.experiments.regression.scatter import (
     CAUGHT,
     CHANGE,
     FEWEST_SEEDS,
@@ -44,12 +44,12 @@ from odscen.regression.scatter import (
     allowed_by_chance,
     seeds_needed,
 )
-from odscen.regression.seed_sizing import PILOT, PROBE, with_longer_headway
-from odscen.regression.suites.suite import Case, Suite, read_suite
-from odscen.regression.tolerance import Tolerances, usual
-from odscen.regression.verdict import hold_against
+from odscen.experiments.regression.seed_sizing import PILOT, PROBE, with_longer_headway
+from odscen.experiments.regression.tolerance import Tolerances, usual
+from odscen.experiments.regression.verdict import hold_against
+from odscen.experiments.suites.suite import Case, Suite, read_suite
+from odscen.maps.store import Workspace
 from odscen.sumo.realize.driving import HEADWAY
-from odscen.workspace.store import Workspace
 
 SUITE = Path(__file__).parents[1] / "suites" / "shipped.toml"
 RERUNS = 50
@@ -213,8 +213,9 @@ def alarmed(pool: Pool, rows: IntArray, count: int, random: np.random.Generator)
     mine = [seeds[row] for row in rows[:count]]
     others = [seed for seed in pool.before if seed not in mine]
     if len(others) < FEWEST_SEEDS:
-        msg = f"{count} of {len(seeds)} seeds are chosen; run the bench with more --seeds"
-        raise SystemExit(msg)
+        raise SystemExit(
+            f"{count} of {len(seeds)} seeds are chosen; run the bench with more --seeds"
+        )
     rest = random.permutation(others)[:count]
     sides = [chosen_of(pool.before, part) for part in (mine, rest)]
     verdict = hold_against(baseline_of(sides[0], {}), sides[1], Tolerances({}), detect=DETECT)

@@ -22,9 +22,9 @@ from websockets.sync.client import connect
 from bench.canvas import TOWN
 from bench.common import shared_maps
 from odscen.app.scenarios import SUFFIX, generate
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage
 from tools import page as tool
 
@@ -207,7 +207,6 @@ def _duration(url: str, run: str) -> float:
             begun = time.monotonic()
         if state not in ("preparing", "running"):
             if begun is None:
-                msg = f"{run}: {state} before it ran"
-                raise RuntimeError(msg)
+                raise RuntimeError(f"{run}: {state} before it ran")
             return time.monotonic() - begun
         time.sleep(0.05)

@@ -21,8 +21,8 @@ from pathlib import Path
 from time import process_time as clock
 from typing import TYPE_CHECKING
 
-from odscen.results.records.run_plan import Plan
-from odscen.sumo.folder.layout import CONFIG_FILE
+from odscen.records.run_plan import Plan
+from odscen.runs.layout import CONFIG_FILE
 from odscen.sumo.outputs.output_tables import outputs_to
 from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
 from odscen.sumo.worker.simulation.session import open_session

@@ -27,15 +27,15 @@ from pathlib import Path
 from odscen.app.demand import demands
 from odscen.app.scenarios import SUFFIX, generate, read_scenario, write_scenario
 from odscen.base.atomic_folders import clear_leftovers
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
+from odscen.runs.layout import RECORDED
+from odscen.runs.recorded import recorded_files
 from odscen.scenario.demand.day_profiles import DAY, curve
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import Flow
 from odscen.scenario.edits.demand_edits import set_clock
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.sumo.folder.layout import RECORDED
-from odscen.sumo.folder.recorded import recorded_files
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 
 FLOWS = 40
 PER_HOUR = 900.0

@@ -35,8 +35,8 @@ from odscen.app.learned.model_files import train_on
 from odscen.app.learned.snapshot_data import DataSettings, make_shards, read_shards
 from odscen.cli.map_commands import names_for
 from odscen.learning.reference.model_training import TrainingSettings
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
 from tools.make_maps.__main__ import map_text
 from tools.make_maps.maps import ON_DEMAND
 

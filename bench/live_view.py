@@ -21,14 +21,14 @@ from websockets.sync.client import connect
 
 from bench import recording
 from odscen.app.scenarios import SUFFIX, generate
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
+from odscen.runs import layout
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.sumo.folder import layout
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.worker_process import run_worker
 from odscen.sumo.worker.protocol import Command, Pace
 from odscen.web.application import create_app
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 
 VEHICLES = 2200
 SECONDS = 120.0

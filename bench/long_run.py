@@ -31,16 +31,16 @@ from bench.common import compile_modules, shared_maps, without_output
 from odscen.app.demand import demands
 from odscen.app.maps import load_map
 from odscen.app.running.reports import write_report
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.checkpoint import last_number, read_checkpoint
-from odscen.sumo.folder.recorded import trajectory_files
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
+from odscen.runs import layout
+from odscen.runs.checkpoint import last_number, read_checkpoint
+from odscen.runs.recorded import trajectory_files
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.forked_worker import worker_environment
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_folder import make_summary, write_run_folder
 from odscen.sumo.runner.worker_process import run_worker
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 from tools.make_maps.__main__ import map_text
 
 HOUR = 3600.0

@@ -14,7 +14,10 @@ import polars as pl
 from odscen.app.maps import load_map
 from odscen.app.running.runs import check_file, prepare_run
 from odscen.base.categories import Category
-from odscen.results.measures.comparison import compare_figure
+from odscen.figures.measures.comparison import compare_figure
+from odscen.maps.store import Workspace
+from odscen.runs.recorded import read_trajectories
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.measures_document import (
     ChangedPermission,
@@ -30,11 +33,8 @@ from odscen.scenario.document.scenario_document import (
     Simulation,
 )
 from odscen.scenario.document.transit_document import Transit
-from odscen.sumo.folder.recorded import read_trajectories
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_lane_places import lane_segments
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap

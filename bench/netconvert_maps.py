@@ -23,12 +23,12 @@ from odscen.app.running import batches
 from odscen.app.scenarios import SUFFIX, generate
 from odscen.base.errors import OdscenError
 from odscen.cli.map_commands import names_for
-from odscen.results.measures.summary import actors_from_json
+from odscen.figures.measures.summary import actors_from_json
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.web.application import create_app
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -26,9 +26,9 @@ from typing import NamedTuple
 
 import psutil
 
-from odscen.sumo.folder import layout
+from odscen.maps.shipped import shipped_maps
+from odscen.runs import layout
 from odscen.sumo.runner.forked_worker import worker_environment
-from odscen.workspace.shipped import shipped_maps
 from tools.make_maps.__main__ import map_text
 
 COMMAND = (sys.executable, "-m", "odscen")

@@ -23,13 +23,13 @@ from odscen.app.export import export, export_run
 from odscen.app.running.runs import run
 from odscen.app.scenarios import generate
 from odscen.app.template_scenarios import write_template
-from odscen.interchange.openscenario.dialect import VERSIONS
+from odscen.formats.openscenario.dialect import VERSIONS
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.scenario.templates.no_place import NoPlaceError
 from odscen.scenario.templates.template_registry import TEMPLATES
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

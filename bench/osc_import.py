@@ -23,10 +23,10 @@ from odscen.app.running.runs import run
 from odscen.app.scenario_imports import import_scenario
 from odscen.base.errors import NoMapError, OdscenError
 from odscen.base.xml_reading import read_xml
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 
 if TYPE_CHECKING:
-    from odscen.interchange.openscenario_import.xosc_reader import EgoDriver
+    from odscen.formats.openscenario_import.xosc_reader import EgoDriver
 
 SHARED = Path(__file__).parents[2] / "shared"
 VERDICTS = ("taken", "approximated", "ignored", "refused")

@@ -19,7 +19,7 @@ from odscen.app.scenario_imports import import_scenario
 from odscen.base.errors import OdscenError
 from odscen.changes.acting_differences import acting_differences
 from odscen.lanegraph.query import is_walk_node_id, node_index
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.app.scenario_imports import ImportedScenario

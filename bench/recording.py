@@ -16,8 +16,8 @@ import tempfile
 from pathlib import Path
 
 from bench.common import without_output
-from odscen.results.records.run_plan import Plan, PlannedActor
-from odscen.sumo.folder import layout
+from odscen.records.run_plan import Plan, PlannedActor
+from odscen.runs import layout
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 

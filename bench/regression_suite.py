@@ -20,10 +20,10 @@ from pathlib import Path
 
 from bench.short_runs import JOBS, POOL, spent_by
 from odscen.app.scenarios import GenerationSettings, generate
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
+from odscen.runs import layout
 from odscen.scenario.document.sampling_config import SamplingConfig
-from odscen.sumo.folder import layout
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 
 SEEDS = (1, 2, 3)
 SECONDS = 60.0

@@ -22,6 +22,8 @@ from bench.in_turns import shares_of
 from odscen.app.maps import load_map
 from odscen.app.running.runs import check_run, prepare_run
 from odscen.lanegraph.query import node_id
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.scenario_document import (
     Actor,
@@ -31,13 +33,11 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Simulation,
 )
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
-    from odscen.sumo.folder.finished_run import Run
+    from odscen.runs.finished_run import Run
 
 MAP = Path(__file__).parents[1] / "maps" / "town_5x5.xodr"
 ACTORS, ROUNDS = 20, 5

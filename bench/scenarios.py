@@ -17,11 +17,11 @@ from bench.common import shared_maps
 from odscen.app.running import batches
 from odscen.app.scenarios import generate
 from odscen.cli.map_commands import names_for
-from odscen.results.measures.summary import ActorOutcome, actors_from_json
+from odscen.figures.measures.summary import ActorOutcome, actors_from_json
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 
 COUNT = int(os.environ.get("ODSCEN_BENCH_SCENARIOS", "200"))
 UNTIL = 3600.0

@@ -22,10 +22,10 @@ from typing import NamedTuple
 import numpy as np
 
 from odscen.app.scenarios import SUFFIX, generate, read_scenario
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 from tools import page as tool
 
 MAP = "signal_crossing"
@@ -229,8 +229,7 @@ def _steps(
         def work() -> None:
             found = _call(address, method, path, *content)  # type: ignore[arg-type]
             if found != status:
-                msg = f"{method} {path} was answered with {found}"
-                raise RuntimeError(msg)
+                raise RuntimeError(f"{method} {path} was answered with {found}")
 
         return work
 

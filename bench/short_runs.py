@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.app.scenarios import GenerationSettings, generate
+from odscen.maps.store import Workspace
+from odscen.runs import layout
 from odscen.scenario.document.sampling_config import SamplingConfig
-from odscen.sumo.folder import layout
 from odscen.sumo.runner.forked_worker import worker_environment
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

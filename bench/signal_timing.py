@@ -32,13 +32,13 @@ from odscen.app.signals.signal_optimisation import time_signals
 from odscen.app.signals.turn_arrows import with_turn_arrows
 from odscen.base.categories import Category
 from odscen.lanegraph.query import node_id
+from odscen.maps.store import Workspace
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.edits.edited_parts import changed_part, with_fields
 from odscen.scenario.signals.webster import LONGEST_CYCLE, whole_seconds
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -35,10 +35,10 @@ import psutil
 from distributed import LocalCluster, Status
 
 from bench.studies import QUIET
-from odscen.app.studies.map_packs import CACHE_VARIABLE
-from odscen.app.studies.study_folder import TABLE_FILE
-from odscen.app.studies.study_journal import JOURNAL_FILE, PARTS_FOLDER, read_rows
-from odscen.workspace.store import Workspace
+from odscen.experiments.studies.map_packs import CACHE_VARIABLE
+from odscen.experiments.studies.study_folder import TABLE_FILE
+from odscen.experiments.studies.study_journal import JOURNAL_FILE, PARTS_FOLDER, read_rows
+from odscen.maps.store import Workspace
 
 MAP = Path(__file__).parents[1] / "maps" / "t_junction_signs.xodr"
 JOBS = 2

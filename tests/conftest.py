@@ -36,8 +36,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Leave out the slow tests whose turn it is not; what is named runs whole."""
     asked = os.environ.get("ODSCEN_SLOW", "none")
     if asked not in {"none", "part", "all"}:
-        message = f"ODSCEN_SLOW is {asked!r}: none, part or all"
-        raise pytest.UsageError(message)
+        raise pytest.UsageError(f"ODSCEN_SLOW is {asked!r}: none, part or all")
     if asked == "all" or any(".py" in argument for argument in config.args):
         return
     commit = _commit(config.rootpath)

@@ -16,19 +16,19 @@ from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Demand
 from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from odscen.scenario.signals.light import Light
 from odscen.sumo.realize.lights.light_views import scenario_lights
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 
 if TYPE_CHECKING:
+    from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
 
 ROOT = Path(__file__).parents[1]
 MAP = ROOT / "maps" / "signal_crossing.xodr"

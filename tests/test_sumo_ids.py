@@ -15,7 +15,7 @@ OTHER_NAMES = {
     "name.split('_')": "names of figures",
 }
 """Expressions that join or split other names at an underscore."""
-STAGES = ("convert", "sumo", "results", "carla", "regression")
+STAGES = ("convert", "sumo", "runs", "records", "figures", "reports", "experiments", "carla")
 _PARSERS = {"split", "rsplit", "partition", "rpartition", "endswith", "removesuffix"}
 
 

@@ -17,12 +17,12 @@ from typer.main import get_command
 
 from odscen.app.running import batches
 from odscen.cli.commands import command_line
-from odscen.regression.compare import compare_runs, read_runs
-from odscen.regression.comparison_page import comparison_page
-from odscen.results.records.outcomes import StopReason
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.experiments.regression.compare import compare_runs, read_runs
+from odscen.experiments.regression.comparison_page import comparison_page
+from odscen.maps.store import Workspace
+from odscen.records.outcomes import StopReason
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

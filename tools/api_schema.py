@@ -17,8 +17,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from odscen.maps.store import Workspace
 from odscen.web.application import create_app
-from odscen.workspace.store import Workspace
 from tools import server_sentences, server_texts
 
 ROOT = Path(__file__).parents[1]

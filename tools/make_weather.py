@@ -1,4 +1,4 @@
-"""Write ``src/odscen/workspace/data/weather.json``: CARLA's presets and our own.
+"""Write ``src/odscen/maps/data/weather.json``: CARLA's presets and our own.
 
 CARLA's values are read from its Python package; ours complete the table of kinds and times of day.
 Run with ``python tools/make_weather.py`` where ``carla`` is installed.

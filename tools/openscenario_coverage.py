@@ -13,11 +13,11 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from odscen.interchange.openscenario_import.story.read_actions import IGNORED
+from odscen.formats.openscenario_import.story.read_actions import IGNORED
 
 ROOT: Final = Path(__file__).parents[1]
 LIST: Final = Path(__file__).with_name("openscenario_elements.txt")
-SOURCES: Final = ROOT / "src" / "odscen" / "interchange"
+SOURCES: Final = ROOT / "src" / "odscen" / "formats"
 ACTING: Final = frozenset({
     "PrivateAction", "LongitudinalAction", "LateralAction", "RoutingAction", "Position",
     "EntityCondition", "ByValueCondition", "Shape", "ScenarioObject",

@@ -15,12 +15,12 @@ from odscen.app.maps import LoadedMap, load_map
 from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.base.markup import element, path_data
 from odscen.drawing.svg_layers import LayerOptions, map_layers
-from odscen.results.report.report_map import fitted_view, scale_bar, view_box
-from odscen.results.report.report_parking import parking_layer
+from odscen.maps.store import Workspace
+from odscen.reports.report_map import fitted_view, scale_bar, view_box
+from odscen.reports.report_parking import parking_layer
+from odscen.runs.measured import read_parking
 from odscen.scenario.document.scenario_document import MapReference, Scenario
-from odscen.sumo.folder.measured import read_parking
 from odscen.sumo.realize.transit.parking_places import parking_positions, planned_parking
-from odscen.workspace.store import Workspace
 
 ROOT = Path(__file__).parents[1]
 TOWN = ROOT / "maps" / "town_5x5.xodr"

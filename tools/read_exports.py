@@ -22,12 +22,12 @@ from typing import Any
 from odscen.app.export import export, export_run
 from odscen.app.running.batches import run_many
 from odscen.app.scenarios import generate, read_scenario
+from odscen.maps.store import Workspace
+from odscen.runs.finished_run import Run
+from odscen.runs.layout import SCENARIO_FILE
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.layout import SCENARIO_FILE
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
 
 ROOT = Path(__file__).parents[1]
 BUILD = ROOT / "build" / "interchange"
@@ -138,8 +138,7 @@ def _told(name: str, file: Path, out: Path) -> dict[str, Any]:
         env={"PYTHONPATH": str(ROOT / "src"), "HOME": str(BUILD), "PATH": "/usr/bin:/bin"},
     )
     if done.returncode:
-        msg = f"{name} cannot read {file}"
-        raise SystemExit(msg)
+        raise SystemExit(f"{name} cannot read {file}")
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return found
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from odscen.app.generators import installed_generators
-from odscen.results.measures.usability import UsabilityLevel
+from odscen.figures.measures.usability import UsabilityLevel
 from odscen.scenario.templates.template_registry import TEMPLATES
 from odscen.sumo.worker.behaviour.behaviour_doors import installed_behaviours
 from odscen.web.routes.figure_routes import actor_measures, figures

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from odscen.app.sweeps.sweep_runs import sweep
+from odscen.experiments.sweeps.sweep_runs import sweep
+from odscen.maps.store import Workspace
 from odscen.scenario.sweeps.sweep_plan import SweepPlan, axis_from_text
-from odscen.workspace.store import Workspace
 from tools import page as tool
 from tools.screenshots.camera import in_few_colours
 from tools.screenshots.scenarios import WEAVE, cut_in

@@ -20,13 +20,13 @@ from odscen.app.maps import load_map
 from odscen.app.template_scenarios import template_scenario
 from odscen.base.markup import element
 from odscen.drawing.svg_layers import LayerOptions, map_layers
-from odscen.results.records.run_plan import Plan
-from odscen.results.report.report_map import scale_bar, view_box
-from odscen.sumo.folder.recorded import read_trajectories
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.maps.store import Workspace
+from odscen.records.run_plan import Plan
+from odscen.reports.report_map import scale_bar, view_box
+from odscen.runs.recorded import read_trajectories
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.store import Workspace
 from tools import map_style
 
 if TYPE_CHECKING:

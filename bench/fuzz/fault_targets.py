@@ -142,8 +142,7 @@ def _expected(trial: Trial) -> dict[str, bytes]:
             seconds=PATIENCE,
         )
         if ended.code:
-            msg = f"the run alone fails: {ended.err}"
-            raise RuntimeError(msg)
+            raise RuntimeError(f"the run alone fails: {ended.err}")
     return _results(kept / "sliced")
 
 

@@ -26,7 +26,7 @@ def suites(trial: Trial) -> str:
 def assets(trial: Trial) -> str:
     from importlib.resources import files
 
-    shipped = files("odscen.workspace") / "data" / "blueprints.json"
+    shipped = files("odscen.maps") / "data" / "blueprints.json"
     damage = damaged(shipped.read_bytes(), trial.rng, JSON)
     used = trial.used("maps")
     file = Path(used[1]) / "assets" / "blueprints.json"

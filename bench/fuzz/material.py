@@ -188,8 +188,9 @@ def _tables(root: Path) -> None:
 def _ok(limits: Limits, root: Path, *argv: str) -> Ended:
     ended = limits.run(argv, root)
     if ended.code:
-        msg = f"the material cannot be made: odscen {' '.join(argv)}: {ended.err}{ended.out}"
-        raise RuntimeError(msg)
+        raise RuntimeError(
+            f"the material cannot be made: odscen {' '.join(argv)}: {ended.err}{ended.out}"
+        )
     return ended
 
 

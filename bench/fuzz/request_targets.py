@@ -84,8 +84,8 @@ def _schema() -> Any:
 
 @cache
 def _document() -> dict[str, Any]:
+    from odscen.maps.store import Workspace
     from odscen.web.application import create_app
-    from odscen.workspace.store import Workspace
 
     document: dict[str, Any] = create_app(Workspace(Path("nowhere"))).openapi()
     return document

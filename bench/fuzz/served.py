@@ -74,8 +74,7 @@ class Served:
                 _answers(port, end)
                 return port
             time.sleep(0.05)
-        msg = f"odscen serve does not start: {self.said(whole=True)}"
-        raise RuntimeError(msg)
+        raise RuntimeError(f"odscen serve does not start: {self.said(whole=True)}")
 
     def said(self, *, whole: bool = False) -> str:
         """What the server has written since it was last asked."""

@@ -39,27 +39,27 @@ if TYPE_CHECKING:
         WorkspaceError,
     )
     from odscen.convert.model.conversion_settings import ConversionSettings
+    from odscen.experiments.regression.compare import RunComparison, compare
+    from odscen.figures.judging.expectations import parse_expectation
     from odscen.learning.hetero_data import read_arrays
-    from odscen.regression.compare import RunComparison, compare
-    from odscen.results.judging.expectations import parse_expectation
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.shipped import shipped_maps
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
+    from odscen.runs.recording import Recording
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sampling.generation_settings import GenerationSettings
     from odscen.scenario.story.action_kinds import ActionKind
     from odscen.scenario.story.condition_kinds import ConditionKind, Reading
     from odscen.scenario.story.speed_laws import SpeedLaw
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.recording import Recording
-    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.in_step import Step
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.shipped import shipped_maps
-    from odscen.workspace.store import Workspace
 
 _HOMES = {
-    "Workspace": "odscen.workspace.store",
-    "MapEntry": "odscen.workspace.map_entry",
-    "shipped_maps": "odscen.workspace.shipped",
+    "Workspace": "odscen.maps.store",
+    "MapEntry": "odscen.maps.map_entry",
+    "shipped_maps": "odscen.maps.shipped",
     "ConversionSettings": "odscen.convert.model.conversion_settings",
     "Scenario": "odscen.scenario.document.scenario_document",
     "GenerationSettings": "odscen.scenario.sampling.generation_settings",
@@ -76,19 +76,19 @@ _HOMES = {
     "Reading": "odscen.scenario.story.condition_kinds",
     "ActionKind": "odscen.scenario.story.action_kinds",
     "SpeedLaw": "odscen.scenario.story.speed_laws",
-    "RunSettings": "odscen.sumo.realize.run_settings",
-    "Recording": "odscen.sumo.realize.recording",
-    "parse_expectation": "odscen.results.judging.expectations",
+    "RunSettings": "odscen.runs.run_settings",
+    "Recording": "odscen.runs.recording",
+    "parse_expectation": "odscen.figures.judging.expectations",
     "run": "odscen.app.running.runs",
     "run_many": "odscen.app.running.batches",
     "resume": "odscen.app.running.resumed_runs",
     "watch": "odscen.app.running.watched_runs",
     "WatchedRun": "odscen.app.running.watched_runs",
     "Step": "odscen.sumo.runner.in_step",
-    "Run": "odscen.sumo.folder.finished_run",
+    "Run": "odscen.runs.finished_run",
     "renew_report": "odscen.app.running.reports",
-    "compare": "odscen.regression.compare",
-    "RunComparison": "odscen.regression.compare",
+    "compare": "odscen.experiments.regression.compare",
+    "RunComparison": "odscen.experiments.regression.compare",
     "OdscenError": "odscen.base.errors",
     "InputError": "odscen.base.errors",
     "ScenarioError": "odscen.base.errors",
@@ -150,8 +150,7 @@ if not TYPE_CHECKING:  # a type checker knows the names from the imports above, 
 
     def __getattr__(name: str) -> object:
         if name not in _HOMES:
-            msg = f"module {__name__!r} has no attribute {name!r}"
-            raise AttributeError(msg)
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         module, _, own = _HOMES[name].partition(":")
         value = getattr(import_module(module), own or name)
         globals()[name] = value

@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from odscen.app.scenarios import generate
+from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.store import Workspace
 
 MAPS = Path(__file__).parents[2] / "maps"
 CROSSING = "signal_crossing"

@@ -7,14 +7,14 @@ import pytest
 from odscen.app.running.runs import run
 from odscen.app.scenarios import check_scenario, read_scenario, write_scenario
 from odscen.base.errors import ScenarioError
-from odscen.results.judging.expectations import parse_expectation
+from odscen.figures.judging.expectations import parse_expectation
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps, loads
-from odscen.sumo.realize.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 
 def asking(sampled: Path, folder: Path, *criteria: str) -> Path:

@@ -13,12 +13,12 @@ from odscen.app.running.reports import renew_report
 from odscen.app.running.resumed_runs import resume
 from odscen.app.running.runs import carry_out, check_file, prepare_run
 from odscen.base.errors import DamagedError, InputError
-from odscen.regression.compare import compare
-from odscen.sumo.folder.run_sums import damaged_in
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.experiments.regression.compare import compare
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
+from odscen.runs.run_sums import damaged_in
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.worker.protocol import Progress
-from odscen.workspace.store import Workspace
 
 SLICE = 10.0
 

@@ -9,7 +9,7 @@ import pytest
 from odscen.app.export import EXPORTERS, export
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.base.errors import NotFoundError, ScenarioError, WorkspaceError
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 
 
 @pytest.mark.parametrize("to", [name for name, one in EXPORTERS.items() if one.files])

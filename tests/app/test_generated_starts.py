@@ -13,10 +13,10 @@ from odscen.app.generators import GeneratorDoor
 from odscen.app.running.batches import run_many
 from odscen.app.scenarios import generate, read_scenario
 from odscen.learning.fill_check import CheckedFill
+from odscen.maps.store import Workspace
+from odscen.runs.recorded import trajectory_files
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.sumo.folder.recorded import trajectory_files
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
 from tests.app.conftest import MAPS
 from tests.app.test_generators import PROGRAM
 

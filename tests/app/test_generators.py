@@ -19,12 +19,12 @@ from odscen.app.scenarios import generate, read_scenario
 from odscen.base.errors import InputError
 from odscen.learning.fill import Fill, FillRequest, fill_from_bytes
 from odscen.learning.fill_check import CheckedFill
+from odscen.maps.store import Workspace
+from odscen.runs.recorded import trajectory_files
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.scenario_document import Actor
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.scenario.sampling.sampler import sample_scenario
-from odscen.sumo.folder.recorded import trajectory_files
-from odscen.workspace.store import Workspace
 from tests import own_generator
 from tests.app.conftest import CROSSING
 

@@ -13,14 +13,14 @@ import pytest
 
 from odscen.app.scenario_imports import import_scenario
 from odscen.app.scenarios import read_scenario
-from odscen.app.sweeps.sweep_runs import sweep
 from odscen.base.errors import InputError
-from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
+from odscen.experiments.sweeps.sweep_runs import sweep
+from odscen.formats.openscenario_import.traced_numbers import TracedNumber
+from odscen.maps.store import Workspace
+from odscen.runs.finished_run import Run
 from odscen.scenario.document.expressions import evaluate
 from odscen.scenario.document.json_form import dumps, with_values
 from odscen.scenario.sweeps.sweep_plan import Range, Table, plan_from_data
-from odscen.sumo.folder.finished_run import Run
-from odscen.workspace.store import Workspace
 from tests.app.test_scenario_imports import FILE, SPEED, given
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from odscen.app.export import export
 from odscen.app.scenario_imports import import_scenario
 from odscen.app.template_scenarios import template_scenario
 from odscen.base.errors import InputError, NotFoundError
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.templates.template_registry import TEMPLATES
-from odscen.workspace.store import Workspace
 from tests.app.conftest import CROSSING
 
 

@@ -7,7 +7,7 @@ import pytest
 from odscen.app.map_comparison import ComparisonSettings, compare_converters
 from odscen.app.networks import bring_in
 from odscen.base.errors import InputError, NotFoundError
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 
 MAPS = Path(__file__).parents[2] / "maps"
 NO_RUNS = ComparisonSettings(levels=())

@@ -13,8 +13,8 @@ from odscen.app.running.runs import run
 from odscen.app.scenarios import check_scenario
 from odscen.base.errors import InputError
 from odscen.convert.imported.net_import import read_network
-from odscen.workspace.netconvert import NetconvertLimits, run_netconvert
-from odscen.workspace.store import Workspace
+from odscen.maps.netconvert import NetconvertLimits, run_netconvert
+from odscen.maps.store import Workspace
 
 ROOT = Path(__file__).parents[2]
 NAME = "signal_crossing"

@@ -16,7 +16,7 @@ from odscen.app.scenario_imports import import_scenario
 from odscen.app.scenarios import generate, read_scenario
 from odscen.app.template_scenarios import template_scenario
 from odscen.changes.acting_differences import acting_differences
-from odscen.interchange.openscenario.dialect import VERSIONS
+from odscen.formats.openscenario.dialect import VERSIONS
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.scenario_document import Environment
 from odscen.scenario.sampling.generation_settings import GenerationSettings

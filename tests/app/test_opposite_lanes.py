@@ -11,8 +11,8 @@ import pytest
 
 from odscen.app.running.runs import run
 from odscen.app.scenario_imports import import_scenario
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from odscen.app.export import export
 from odscen.app.running.runs import run
 from odscen.app.scenario_imports import import_scenario
 from odscen.changes.acting_differences import acting_differences
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from tests.app.test_openscenario_features import event, private, read, reasons, rule, scene
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from odscen.app.running.runs import carry_out, check_file, prepare_run, run
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import ConflictError, NotFoundError
 from odscen.base.folder_locks import locked
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
-from odscen.workspace.wastebasket import Wastebasket
+from odscen.maps.store import Workspace
+from odscen.maps.wastebasket import Wastebasket
+from odscen.runs.run_settings import RunSettings
 
 SHORT = RunSettings(until=5.0)
 STATUS = {"format": "odscen-status", "version": 1, "scenario": "s", "time": 0, "until": 9}

@@ -20,13 +20,13 @@ from lxml import etree
 from odscen.app.export import EXPORTERS, export, export_run, export_runs
 from odscen.app.running.batches import run_many
 from odscen.base.errors import InputError
-from odscen.interchange.exporter import WhatHappened
-from odscen.interchange.recordings.tfrecord import read_tfrecord
-from odscen.interchange.recordings.track_grid import ExportWindow, instants, tracks_of
+from odscen.formats.exporter import WhatHappened
+from odscen.formats.recordings.tfrecord import read_tfrecord
+from odscen.formats.recordings.track_grid import ExportWindow, instants, tracks_of
 from odscen.learning.hetero_data import read_arrays
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.finished_run import Run
+from odscen.runs.run_settings import RunSettings
 
 FORMATS = ("pyg", "scenarionet", "waymo", "commonroad")
 SECONDS = 9.6

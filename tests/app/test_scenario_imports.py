@@ -9,7 +9,7 @@ import pytest
 
 from odscen.app.scenario_imports import import_scenario
 from odscen.base.errors import InputError, NoMapError
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 
 if TYPE_CHECKING:
     from pathlib import Path

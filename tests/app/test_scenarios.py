@@ -8,9 +8,9 @@ import pytest
 
 from odscen.app.scenarios import generate, read_scenario, scenario_files
 from odscen.base.errors import InputError, NotFoundError
+from odscen.maps.store import BUILDER, Workspace, is_outdated
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.store import BUILDER, Workspace, is_outdated
 from tests.app.conftest import CROSSING, MAPS
 
 

@@ -10,7 +10,7 @@ import pytest
 from odscen.app.export import export
 from odscen.app.running.runs import run
 from odscen.app.scenario_imports import import_scenario
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tests.app.test_openscenario_features import entity_condition, read, rule, scene, when
 
 if TYPE_CHECKING:

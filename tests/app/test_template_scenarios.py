@@ -9,9 +9,9 @@ import pytest
 from odscen.app.scenarios import check_scenario, read_scenario
 from odscen.app.template_scenarios import template_scenario, write_template
 from odscen.base.errors import ConflictError, InputError, NotFoundError
+from odscen.maps.store import Workspace
 from odscen.scenario.templates.no_place import NoPlaceError
 from odscen.scenario.templates.template_registry import TEMPLATES
-from odscen.workspace.store import Workspace
 
 MAPS = Path(__file__).parents[2] / "maps"
 ROOM = {

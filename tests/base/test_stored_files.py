@@ -7,7 +7,7 @@ import pytest
 
 from odscen.base.errors import InputError
 from odscen.base.stored_files import documents, read_document, read_json, tables, typed_rows
-from odscen.results.records.run_events import Event, EventKind
+from odscen.records.run_events import Event, EventKind
 
 HEAD = '"format": "f", "version": 1'
 

@@ -16,8 +16,8 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect
 
 from odscen.app.scenarios import SUFFIX, generate
+from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage
 from tools import chromium
 from tools import page as tool

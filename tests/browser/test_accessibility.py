@@ -16,14 +16,14 @@ from playwright.sync_api import Page, expect
 
 from odscen.app.running import batches
 from odscen.app.scenarios import SUFFIX, generate
-from odscen.app.studies.executors import LocalExecutor
-from odscen.app.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
-from odscen.app.studies.study_runs import begin_study_of, carry_out_study
-from odscen.regression.compare import compare_runs, read_runs
-from odscen.regression.comparison_page import comparison_page
+from odscen.experiments.regression.compare import compare_runs, read_runs
+from odscen.experiments.regression.comparison_page import comparison_page
+from odscen.experiments.studies.executors import LocalExecutor
+from odscen.experiments.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
+from odscen.experiments.studies.study_runs import begin_study_of, carry_out_study
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
 from tests.browser.clipped_text import clipped_texts
 from tests.browser.conftest import ARTEFACTS, CROSSING
 from tests.browser.pages import FAILED, OdscenPage, settle

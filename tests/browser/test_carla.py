@@ -10,8 +10,8 @@ import pytest
 from playwright.sync_api import expect
 
 from odscen.app.scenarios import SUFFIX, generate
+from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING, SHIPPED
 from tests.browser.pages import OdscenPage
 from tests.browser.test_accessibility import Inspector

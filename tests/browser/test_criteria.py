@@ -8,10 +8,10 @@ import pytest
 from playwright.sync_api import expect
 
 from odscen.app.scenarios import SUFFIX
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage
 from tests.browser.test_keyboard import press
 from tests.browser.test_measures import card, crossing, opened

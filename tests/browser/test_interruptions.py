@@ -16,9 +16,9 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
 from odscen.base.categories import Category
 from odscen.lanegraph.query import node_id
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps
-from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.fault_line import FaultLine
 from tests.browser.pages import OdscenPage

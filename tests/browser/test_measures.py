@@ -9,9 +9,9 @@ from playwright.sync_api import Locator, expect
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps
-from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage
 from tests.browser.test_keyboard import press

@@ -8,10 +8,10 @@ from playwright.sync_api import expect
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
 from odscen.lanegraph.query import node_id
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.placing.region import Region, name_of, place_of
-from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage
 from tests.browser.test_keyboard import press

@@ -9,10 +9,10 @@ import pytest
 from playwright.sync_api import Locator, expect
 
 from odscen.app.scenarios import SUFFIX, read_scenario, write_scenario
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.scenario.document.signals_document import Signals
-from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage
 from tests.browser.test_signals import drag, open_program

@@ -8,8 +8,8 @@ import pytest
 from playwright.sync_api import Locator, expect
 
 from odscen.app.scenarios import SUFFIX, write_scenario
+from odscen.maps.store import Workspace
 from odscen.scenario.document.scenario_document import MapReference
-from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage
 from tests.signal_case import JUNCTION, program, scenario

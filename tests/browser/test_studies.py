@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 from playwright.sync_api import Locator, expect
 
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tests.browser.pages import OdscenPage
 from tools import page as tool
 

@@ -11,12 +11,12 @@ from playwright.sync_api import expect
 
 from odscen.app.running.runs import run
 from odscen.app.scenarios import SUFFIX, write_scenario
-from odscen.app.sweeps.sweep_runs import WATCHES_CLOSENESS
 from odscen.app.template_scenarios import template_scenario
-from odscen.results.measures.conflicts import SEEN_PET
+from odscen.experiments.sweeps.sweep_runs import WATCHES_CLOSENESS
+from odscen.figures.measures.conflicts import SEEN_PET
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
 from tests.browser.conftest import SHIPPED
 from tests.browser.pages import OdscenPage
 from tools import page as tool

@@ -14,10 +14,10 @@ import pytest
 
 from odscen.app.scenarios import generate
 from odscen.lanegraph.query import node_index
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.workspace.store import Workspace
 
 MAPS = Path(__file__).parents[2] / "maps"
 Sample = Callable[..., Path]

@@ -63,8 +63,7 @@ def mesh_file(
         If there are no triangles, or more vertices than a tile can number.
     """
     if not len(triangles) or len(vertices) > _MOST_VERTICES:
-        msg = f"{len(triangles)} triangles on {len(vertices)} vertices make no tile"
-        raise ValueError(msg)
+        raise ValueError(f"{len(triangles)} triangles on {len(vertices)} vertices make no tile")
     tile = _tile(vertices, triangles, areas)
     bits = max((len(triangles) - 1).bit_length(), 1)
     low = vertices.min(axis=0)

@@ -152,8 +152,7 @@ class StandIn:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
-            msg = f"the stand-in ended with {self._process.wait()}"
-            raise RuntimeError(msg)
+            raise RuntimeError(f"the stand-in ended with {self._process.wait()}")
         return dict(json.loads(line))
 
 

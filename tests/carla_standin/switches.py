@@ -106,8 +106,7 @@ class Switches:
         """Set some switches; a wrong name is a ``TypeError``."""
         known = {field.name for field in fields(self) if not field.name.startswith("_")}
         if unknown := set(values) - known:
-            msg = f"no such switch: {', '.join(sorted(unknown))}"
-            raise TypeError(msg)
+            raise TypeError(f"no such switch: {', '.join(sorted(unknown))}")
         for name, value in values.items():
             setattr(self, name, value)
         if any(name.endswith("_at_tick") for name in values):

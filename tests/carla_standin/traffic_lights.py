@@ -116,8 +116,7 @@ class TrafficLights:
     def __getitem__(self, actor: int) -> TrafficLight:
         """Light of an actor; refuses what is none."""
         if actor not in self._by_actor:
-            msg = f"Actor is not a traffic light. Actor Id: {actor}"
-            raise wire.RefusedError(msg)
+            raise wire.RefusedError(f"Actor is not a traffic light. Actor Id: {actor}")
         return self._by_actor[actor]
 
     def advance(self, dt: float) -> None:

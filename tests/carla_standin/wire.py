@@ -136,7 +136,6 @@ def image_message(
     """Picture of an RGB camera, ``width * height`` pixels of 4 bytes, rows from the top."""
     if len(bgra) != width * height * 4:
         # A wrong length aborts the client's whole process: never send one.
-        msg = f"{len(bgra)} bytes are no picture of {width} x {height} pixels"
-        raise ValueError(msg)
+        raise ValueError(f"{len(bgra)} bytes are no picture of {width} x {height} pixels")
     header = _HEADER.pack(_SENSOR_RGB_CAMERA, frame, elapsed, *at)
     return header + _IMAGE.pack(width, height, fov) + bgra

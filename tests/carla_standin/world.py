@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from odscen.maps.asset_catalogue import shipped_assets
 from odscen.scenario.placing.bodies import overlap
-from odscen.workspace.asset_catalogue import shipped_assets
 from tests.carla_standin import camera, scanners, wire
 from tests.carla_standin.actors import Actor, Kind
 from tests.carla_standin.blueprints import (
@@ -101,16 +101,14 @@ class World:
     def __getitem__(self, actor: int) -> Actor:
         """Actor by id; refuses an unknown one."""
         if actor not in self.actors:
-            message = f"Actor could not be found in the registry.  Actor Id: {actor}"
-            raise wire.RefusedError(message)
+            raise wire.RefusedError(f"Actor could not be found in the registry.  Actor Id: {actor}")
         return self.actors[actor]
 
     def of_kind(self, actor: int, kind: Kind) -> Actor:
         """Actor by id; refuses one of another kind."""
         found = self[actor]
         if found.kind is not kind:
-            msg = f"Actor is not a {kind.name.title()}. Actor Id: {actor}"
-            raise wire.RefusedError(msg)
+            raise wire.RefusedError(f"Actor is not a {kind.name.title()}. Actor Id: {actor}")
         return found
 
     def spawn(self, description: list[Any], at: Pose, parent: int | None = None) -> Actor:

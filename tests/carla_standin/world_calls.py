@@ -76,8 +76,7 @@ class WorldCalls:
         elif short in self._maps:
             road_map = RoadMap.read(self._maps[short], f"{_FOLDER}/{short}")
         else:
-            msg = f"Map '{name}' not found"
-            raise wire.RefusedError(msg)
+            raise wire.RefusedError(f"Map '{name}' not found")
         if reset_settings:
             world.reset_settings()
         world.open(road_map)

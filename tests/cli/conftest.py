@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 
 SHIPPED = Path(__file__).parents[2] / "maps"
 

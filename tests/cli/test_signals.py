@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import MapReference
-from odscen.workspace.store import Workspace
 from tests.cli.conftest import odscen
 from tests.signal_case import MAP, one_plan, scenario
 

@@ -7,11 +7,11 @@ import pytest
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario, write_scenario
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.json_form import content_sha256
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import to_graphml
-from odscen.workspace.store import Workspace
 from tests.cli.conftest import odscen
 
 SHUT = {"id": "shut", "kind": "closure", "begin": 10, "places": ["r2"]}

@@ -88,7 +88,14 @@ def test_the_regression_test_passes_and_fails_when_the_bound_is_tighter(tmp_path
     (tmp_path / "test_tighter.py").write_text(
         text.replace("mean_delay <= 60 s", "mean_delay <= 1 s")
     )
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "odscen.regression.pytest_plugin"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "odscen.experiments.regression.pytest_plugin",
+    ]
     done = subprocess.run(
         command, cwd=tmp_path, env=os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
         capture_output=True, text=True, check=False,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.graphs import MapGraph
+from odscen.maps.shipped import shipped_maps
 from odscen.opendrive.parse import parse
-from odscen.workspace.shipped import shipped_maps
 
 
 def shipped(name: str) -> MapGraph:

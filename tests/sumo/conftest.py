@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import sumo
 
-from odscen.results.records.run_plan import Plan, PlannedActor
+from odscen.records.run_plan import Plan, PlannedActor
 from odscen.sumo.realize.measure_files import measures_xml
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner import long_runs, worker_process

@@ -17,7 +17,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from odscen.sumo.folder.checkpoint import slice_folder
+from odscen.runs.checkpoint import slice_folder
 from odscen.sumo.worker import completion, slice_processes
 from odscen.sumo.worker.simulate import main
 

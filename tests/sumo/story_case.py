@@ -17,20 +17,20 @@ import polars as pl
 
 from odscen.app.maps import load_map
 from odscen.lanegraph.query import node_id, walk_node_id
-from odscen.results.records.run_events import events_from_json
-from odscen.results.records.run_plan import Plan
+from odscen.maps.store import Workspace
+from odscen.records.run_events import events_from_json
+from odscen.records.run_plan import Plan
+from odscen.runs.recorded import read_trajectories
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps, loads
-from odscen.sumo.folder.recorded import read_trajectories
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
-    from odscen.results.records.run_events import Event
+    from odscen.records.run_events import Event
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.runner.run_jobs import PreparedRun
 

@@ -14,10 +14,10 @@ import uvicorn
 from starlette.testclient import TestClient
 
 from odscen.app.scenarios import SUFFIX, generate
+from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
-from odscen.workspace.store import Workspace
 
 SHIPPED = Path(__file__).parents[2] / "maps"
 CROSSING = "signal_crossing"

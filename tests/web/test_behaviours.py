@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from odscen.sumo.folder.layout import BEHAVIOUR_FILE, SUMO_FOLDER
+from odscen.runs.layout import BEHAVIOUR_FILE, SUMO_FOLDER
 from tests.web.conftest import finished
 
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
 
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 
 def start(client: TestClient, scenario: str, name: str, **options: object) -> Any:

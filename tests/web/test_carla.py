@@ -9,9 +9,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from odscen.carla.server.client import Address
+from odscen.maps.store import Workspace
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
-from odscen.workspace.store import Workspace
 from tests.carla_standin.process import StandIn
 from tests.web.conftest import CROSSING, SHIPPED, finished, serving
 

@@ -10,9 +10,9 @@ from starlette.testclient import TestClient
 
 from odscen.app.demand import demands
 from odscen.app.maps import load_map
+from odscen.maps.store import Workspace
 from odscen.scenario.demand.count_stations import place_points
 from odscen.scenario.document.json_form import loads
-from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, finished, job, wait_for
 
 

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import loads
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.web.application import create_app
 from odscen.web.wire.document_changes import changes_between
-from odscen.workspace.store import Workspace
 from tests.web.json_patch import patched
 
 

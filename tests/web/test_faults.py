@@ -5,7 +5,7 @@ import os
 import pytest
 from starlette.testclient import TestClient
 
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tests.web.conftest import CROSSING
 
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from starlette.testclient import TestClient
 
-from odscen.results.measures.registry import names_of
+from odscen.figures.measures.registry import names_of
 from tests.own_figure import install
 
 if TYPE_CHECKING:

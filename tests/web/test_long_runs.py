@@ -9,9 +9,9 @@ import polars as pl
 import pytest
 from starlette.testclient import TestClient
 
+from odscen.maps.store import Workspace
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
-from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, finished, wait_for
 from tests.web.test_runs import control, start
 

@@ -12,8 +12,8 @@ from starlette.testclient import TestClient
 
 from odscen.app.removal import remove
 from odscen.lanegraph.query import node_ids
+from odscen.maps.store import Workspace
 from odscen.web.application import create_app
-from odscen.workspace.store import Workspace
 from tests.opendrive.snippets import document, lane, road, section
 from tests.web.conftest import CROSSING, SHIPPED, job, wait_for
 

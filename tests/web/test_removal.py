@@ -4,7 +4,7 @@ from pathlib import Path
 
 from starlette.testclient import TestClient
 
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tests.web.conftest import CROSSING, finished, wait_for
 
 

@@ -10,9 +10,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from odscen.app.maps import load_map
-from odscen.results.by_place.lane_places import LanePlaces
-from odscen.sumo.folder.run_sums import seal_again
-from odscen.workspace.store import Workspace
+from odscen.figures.by_place.lane_places import LanePlaces
+from odscen.maps.store import Workspace
+from odscen.runs.run_sums import seal_again
 from tests.web.conftest import CROSSING, finished
 from tests.web.test_runs import start
 

@@ -23,12 +23,12 @@ from odscen.app.scenarios import SUFFIX
 from odscen.base.errors import SimulationError
 from odscen.base.frames import SumoPose, sumo_to_xodr
 from odscen.carla.server.client import Address
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_plan import Plan
-from odscen.sumo.folder.run_sums import seal_again
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.figures.measures.summary import actors_from_json
+from odscen.maps.store import Workspace
+from odscen.records.run_plan import Plan
+from odscen.runs.run_settings import RunSettings
+from odscen.runs.run_sums import seal_again
 from odscen.web import active_runs
-from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, finished, wait_for
 
 
@@ -346,8 +346,7 @@ def test_a_run_whose_preparation_fails_can_be_removed(
     client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object, **__: object) -> None:
-        msg = "no way"
-        raise SimulationError(msg)
+        raise SimulationError("no way")
 
     monkeypatch.setattr(active_runs, "prepare_run", refuse)
     run = start(client, sampled)
@@ -487,7 +486,7 @@ def test_the_server_never_imports_libsumo(workspace: Workspace, sampled: str) ->
 import sys, time
 from pathlib import Path
 from starlette.testclient import TestClient
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from odscen.web.application import create_app
 with TestClient(create_app(Workspace.open(Path(sys.argv[1]))), base_url="http://localhost") as c:
     run = c.post("/api/runs", json={"scenario": sys.argv[2]}).json()["run"]
@@ -513,8 +512,8 @@ import os, sys, threading, time
 from pathlib import Path
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario
-from odscen.workspace.store import Workspace
-from odscen.sumo.folder.run_sums import seal_again
+from odscen.maps.store import Workspace
+from odscen.runs.run_sums import seal_again
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.worker.protocol import Pace

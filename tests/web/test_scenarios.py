@@ -15,6 +15,8 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, check_scenario
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.lanegraph.query import node_id, node_index
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.document_parts import Part
 from odscen.scenario.document.json_form import dumps, loads
@@ -28,8 +30,6 @@ from odscen.scenario.placing.region import Region, name_of, place_of
 from odscen.scenario.placing.spawn_room import late_for_changes
 from odscen.web.application import create_app
 from odscen.web.wire.document_changes import changes_between
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 from tests import own_generator
 from tests.web.conftest import CROSSING
 from tests.web.json_patch import patched

@@ -20,10 +20,10 @@ from schemathesis.specs.openapi.checks import (
 
 from odscen.app.scenarios import generate, read_scenario
 from odscen.app.signals.signal_plans import lights_of
+from odscen.maps.store import Workspace
+from odscen.maps.wastebasket import Wastebasket
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.web.application import create_app
-from odscen.workspace.store import Workspace
-from odscen.workspace.wastebasket import Wastebasket
 from tests.web.conftest import CROSSING
 
 CHECKS = [

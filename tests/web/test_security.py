@@ -7,8 +7,8 @@ import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
+from odscen.maps.store import Workspace
 from odscen.web.application import create_app
-from odscen.workspace.store import Workspace
 
 TRAVERSALS = (
     "..", "../x", "..%2fx", "%2e%2e%2fmaps", "..%5cx", "/etc/passwd", ".history", "a%00b", "a%0ab",

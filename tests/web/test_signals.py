@@ -11,9 +11,9 @@ from pydantic import TypeAdapter
 
 from odscen.app.scenarios import SUFFIX
 from odscen.base.categories import Category
+from odscen.runs.recorded import read_calls
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import MapReference
-from odscen.sumo.folder.recorded import read_calls
 from odscen.web.wire.map_messages import MapDetails
 from odscen.web.wire.signal_messages import LightProgramInfo, RunSignals
 from tests.signal_case import JUNCTION, program, scenario
@@ -22,8 +22,8 @@ from tests.web.conftest import CROSSING, finished
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
 
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 EVENING = 18.5 * 3600.0 - 60.0
 

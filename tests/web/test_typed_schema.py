@@ -15,10 +15,11 @@ from starlette.testclient import TestClient
 
 from odscen.app.scenarios import SUFFIX
 from odscen.base.checksums import SUMS_FILE
+from odscen.figures.measures.registry import COUNTS
 from odscen.lanegraph.map_statistics import MapStatistics
-from odscen.results.measures.registry import COUNTS
-from odscen.results.records.run_events import Event, EventKind, event_row
-from odscen.sumo.folder import layout
+from odscen.maps.store import Workspace
+from odscen.records.run_events import Event, EventKind, event_row
+from odscen.runs import layout
 from odscen.web.application import create_app
 from odscen.web.wire.live_messages import LiveMessage
 from odscen.web.wire.map_messages import (
@@ -30,7 +31,6 @@ from odscen.web.wire.map_messages import (
 )
 from odscen.web.wire.run_messages import IncidentInfo, ReplayColumns
 from odscen.web.wire.summary_messages import RunSummary, SummaryCounts
-from odscen.workspace.store import Workspace
 from tests.cli.conftest import odscen
 from tests.web.conftest import CROSSING, finished
 

@@ -97,8 +97,7 @@ def movements(start: End, exits: Sequence[End]) -> list[tuple[End, Pairs]]:
             found += [(end, [pair]) for pair in _bike_pairs(coming, going)]
     used = {i for _, pairs in found for i, _ in pairs}
     if missing := [lane for lane in lanes if lane not in used]:
-        msg = f"lanes {missing} of road {start.record.id} lead nowhere"
-        raise ValueError(msg)
+        raise ValueError(f"lanes {missing} of road {start.record.id} lead nowhere")
     return found
 
 

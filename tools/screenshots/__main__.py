@@ -13,7 +13,7 @@ from pathlib import Path
 
 from playwright.sync_api import expect
 
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tools import page as tool
 from tools.screenshots import editor_scenes, run_scenes, scenarios, task_scenes
 from tools.screenshots.camera import Scene, Studio

@@ -88,8 +88,7 @@ class Camera:
         few.save(path, optimize=True)
         size = path.stat().st_size
         if size > LARGEST:
-            msg = f"{path} has {size} bytes, more than {LARGEST}"
-            raise PictureTooLargeError(msg)
+            raise PictureTooLargeError(f"{path} has {size} bytes, more than {LARGEST}")
         print(f"{path.name}: {few.width} x {few.height}, {size // 1000} kB", flush=True)
 
     def look_at(self, place: tuple[float, float], *, closer: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from playwright.sync_api import expect
 
-from odscen.workspace.shipped import shipped_maps
+from odscen.maps.shipped import shipped_maps
 from tests.app.test_scenario_imports import ROAD
 from tests.browser.test_language import choose_preferences
 from tests.browser.test_openscenario import REFUSED, drop

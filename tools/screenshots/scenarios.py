@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, generate, write_scenario
-from odscen.app.studies.executors import LocalExecutor
-from odscen.app.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
-from odscen.app.studies.study_runs import begin_study_of, carry_out_study
 from odscen.app.template_scenarios import template_scenario
+from odscen.experiments.studies.executors import LocalExecutor
+from odscen.experiments.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
+from odscen.experiments.studies.study_runs import begin_study_of, carry_out_study
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import transitions
 from odscen.scenario.document.measures_document import SpeedLimit
@@ -16,8 +18,6 @@ from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.scenario.placing.region import Region
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.sumo.realize.road_users.planned_positions import planned_positions
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 from tests.signal_case import program
 from tests.signal_case import scenario as lit_scenario
 

@@ -4105,7 +4105,7 @@ export interface components {
         };
         /**
          * IncidentInfo
-         * @description Something that happened to ``actor``; see :class:`~odscen.results.records.run_events.Event`.
+         * @description Something that happened to ``actor``; see :class:`~odscen.records.run_events.Event`.
          *
          *     What there is nothing to say of is left out.
          */

@@ -1,7 +1,7 @@
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
-import "../../../src/odscen/results/report/assets/signals.css";
+import "../../../src/odscen/reports/assets/signals.css";
 import "./signals.css";
 
 import { Alert, CloseButton, Loader, Select, Switch, Text, VisuallyHidden } from "@mantine/core";

@@ -13,15 +13,15 @@ from odscen.changes.scenario_differences import scenario_differences
 from odscen.drawing.changed_places import changed_places
 from odscen.drawing.map_shapes import map_drawing
 from odscen.drawing.map_sheet import render_drawing
+from odscen.maps.map_files import read_map_file
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
-from odscen.workspace.map_files import read_map_file
 
 if TYPE_CHECKING:
     from odscen.changes.map_change import MapChange
     from odscen.changes.scenario_differences import ScenarioChange
+    from odscen.maps.store import Workspace
     from odscen.opendrive.road_model import OpenDrive
-    from odscen.workspace.store import Workspace
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.map_repairs import RepairStep
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 
 def examine(

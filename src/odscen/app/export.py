@@ -1,6 +1,6 @@
 """Scenarios in foreign formats.
 
-A new format is a module in ``odscen/interchange`` with an ``EXPORTER``, and its line in
+A new format is a module in ``odscen/formats`` with an ``EXPORTER``, and its line in
 :data:`EXPORTERS`; the command line and its help read that. Nothing heavy is imported to read it.
 """
 
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
-from odscen.interchange import (
+from odscen.formats import (
     arrays_export,
     commonroad_export,
     graphml_export,
@@ -28,10 +28,10 @@ from odscen.interchange import (
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.interchange.exporter import Exporter, ExportFiles, ExportSource, WhatHappened
+    from odscen.formats.exporter import Exporter, ExportFiles, ExportSource, WhatHappened
+    from odscen.maps.store import Workspace
     from odscen.opendrive.road_model import OpenDrive
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 EXPORTERS = {
     one.name: one
@@ -97,8 +97,10 @@ def export(
 
     exporter = _exporter(to, options)
     if exporter.files is None:
-        msg = f"the format {to} says what happened in a run: name the folder of one"
-        raise InputError(msg, file=str(scenario) if isinstance(scenario, Path) else None)
+        raise InputError(
+            f"the format {to} says what happened in a run: name the folder of one",
+            file=str(scenario) if isinstance(scenario, Path) else None,
+        )
     document = given_scenario(scenario)
     if exporter.checked:
         with in_file(str(scenario)) if isinstance(scenario, Path) else nullcontext():
@@ -147,14 +149,13 @@ def export_run(
         If the folder cannot be written.
     """
     from odscen.app.scenarios import read_scenario
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.folder.layout import SCENARIO_FILE
+    from odscen.runs.finished_run import Run
+    from odscen.runs.layout import SCENARIO_FILE
 
     exporter = _exporter(to, options)
     if exporter.runs is None:
         able = ", ".join(name for name, one in EXPORTERS.items() if one.runs is not None)
-        msg = f"the format {to} cannot say what happened in a run; {able} can"
-        raise InputError(msg)
+        raise InputError(f"the format {to} cannot say what happened in a run; {able} can")
     happened = _happened(run)
     seed = Run.open(run).summary["seed"]  # perhaps another one than the scenario's own
     document = read_scenario(run / SCENARIO_FILE).model_copy(update={"seed": seed})
@@ -177,7 +178,7 @@ def export_runs(
     Parameters and errors are those of :func:`export_run`; ``folder`` may be one of runs, such as
     ``runs`` of a workspace, with other things among them.
     """
-    from odscen.sumo.folder.layout import SUMMARY_FILE
+    from odscen.runs.layout import SUMMARY_FILE
 
     inside = sorted(one.parent for one in folder.glob(f"*/{SUMMARY_FILE}"))
     if (folder / SUMMARY_FILE).is_file() or not inside:
@@ -194,21 +195,19 @@ def _roads(map_file: Path) -> OpenDrive:
 
 def _exporter(to: str, options: Mapping[str, str] | None) -> Exporter:
     if to not in EXPORTERS:
-        what = "format"
-        raise NotFoundError(what, to, list(EXPORTERS))
+        raise NotFoundError("format", to, list(EXPORTERS))
     for option in options or {}:
         if option not in EXPORTERS[to].options:
-            msg = f"the format {to} has no {option}"
-            raise InputError(msg)
+            raise InputError(f"the format {to} has no {option}")
     return EXPORTERS[to]
 
 
 def _happened(folder: Path) -> WhatHappened:
-    from odscen.interchange.exporter import WhatHappened
-    from odscen.results.records.run_plan import Plan
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.folder.layout import PLAN_FILE
-    from odscen.sumo.folder.recorded import read_light_states
+    from odscen.formats.exporter import WhatHappened
+    from odscen.records.run_plan import Plan
+    from odscen.runs.finished_run import Run
+    from odscen.runs.layout import PLAN_FILE
+    from odscen.runs.recorded import read_light_states
 
     run = Run.open(folder)
     rows = run.trajectories()
@@ -232,7 +231,7 @@ def _source(
     happened: WhatHappened | None = None,
 ) -> ExportSource:
     from odscen.app.maps import map_of
-    from odscen.interchange.exporter import ExportSource
+    from odscen.formats.exporter import ExportSource
 
     loaded = map_of(workspace, document)
     return ExportSource(
@@ -261,6 +260,5 @@ def _write(files: ExportFiles, out: Path) -> list[Path]:
                 shutil.copyfile(content, path)
             written.append(path)
     except OSError as error:
-        msg = f"{out}: {error.strerror or error}"
-        raise WorkspaceError(msg) from error
+        raise WorkspaceError(f"{out}: {error.strerror or error}") from error
     return written

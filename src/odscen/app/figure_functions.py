@@ -16,12 +16,12 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import InputError
-from odscen.results.measures.registry import names_of
+from odscen.figures.measures.registry import names_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.sumo.folder.finished_run import Run
+    from odscen.runs.finished_run import Run
 
 GROUP = "odscen.figures"
 
@@ -76,11 +76,9 @@ def value_of(
     try:
         value = function(run)
     except Exception as error:  # whatever the user's own code raises
-        msg = f"{source}: {type(error).__name__}: {error}"
-        raise InputError(msg, element=element) from error
+        raise InputError(f"{source}: {type(error).__name__}: {error}", element=element) from error
     if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
-        msg = f"{source} returned {value!r}, not a number or None"
-        raise InputError(msg, element=element)
+        raise InputError(f"{source} returned {value!r}, not a number or None", element=element)
     return None if value is None else float(value)
 
 
@@ -89,9 +87,9 @@ def _function(name: str) -> Callable[[Run], object]:
     try:
         found = point.load()
     except Exception as error:  # whatever an import may raise
-        msg = f"it cannot be imported from {point.value}: {error!r}"
-        raise InputError(msg, element=name) from error
+        raise InputError(
+            f"it cannot be imported from {point.value}: {error!r}", element=name
+        ) from error
     if not callable(found):
-        msg = f"{point.value} is no function of a finished run"
-        raise InputError(msg, element=name)
+        raise InputError(f"{point.value} is no function of a finished run", element=name)
     return found  # type: ignore[no-any-return]

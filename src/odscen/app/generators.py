@@ -74,12 +74,13 @@ def open_generator(door: GeneratorDoor) -> Generator:
         If there is none, it cannot be imported or made, or an option is not possible.
     """
     if door.command is not None and door.name is not None:
-        msg = "a generator is given by its name or as a command, not both"
-        raise InputError(msg)
+        raise InputError("a generator is given by its name or as a command, not both")
     if door.command is not None:
         if door.options:
-            msg = "options are for classes; those of another program go into its command"
-            raise InputError(msg, element="generator")
+            raise InputError(
+                "options are for classes; those of another program go into its command",
+                element="generator",
+            )
         return _Command(_words(door.command), door.time_limit)
     name = door.name or ""
     found = _found(name)
@@ -87,11 +88,9 @@ def open_generator(door: GeneratorDoor) -> Generator:
     try:
         made = found(**values) if isinstance(found, type) else found
     except Exception as error:  # whatever code from outside may raise
-        msg = f"it cannot be made: {error!r}"
-        raise InputError(msg, element=name) from error
+        raise InputError(f"it cannot be made: {error!r}", element=name) from error
     if not callable(getattr(made, "fill", None)):
-        msg = "it has no method `fill(graph, request, rng)`"
-        raise InputError(msg, element=name)
+        raise InputError("it has no method `fill(graph, request, rng)`", element=name)
     return _Guarded(made, name)
 
 
@@ -113,8 +112,7 @@ def placer_of(loaded: LoadedMap) -> NamedPlacer:
 
         known = _installed()
         if name not in known:
-            what = "generator"
-            raise NotFoundError(what, name, known)
+            raise NotFoundError("generator", name, known)
         placer = Placer(open_generator(GeneratorDoor(name, options=options)))
         lights = lights_at_start(loaded.sumo)
         return placer.for_scenario(loaded.usable.bodies, seed, lights=lights)
@@ -169,8 +167,10 @@ class Placer:
             self.checked = checked_fill(fill, request, region)
             if self.checked.given and not self.checked.actors:
                 why = self.checked.remarks[0].why
-                msg = f"none of its {self.checked.given} road users can be placed; the first: {why}"
-                raise InputError(msg, element="generator")
+                raise InputError(
+                    f"none of its {self.checked.given} road users can be placed; the first: {why}",
+                    element="generator",
+                )
             return self.checked.actors
 
         return place
@@ -194,8 +194,7 @@ class _Guarded:
         except OdscenError:
             raise
         except Exception as error:
-            msg = f"it failed: {error!r}"
-            raise InputError(msg, element=self.name) from error
+            raise InputError(f"it failed: {error!r}", element=self.name) from error
         try:
             return fill_from_arrays(arrays)
         except InputError as error:
@@ -218,11 +217,14 @@ class _Command:
             self._run([word.format_map(_names(given, made)) for word in self.words])
             out = made.with_suffix(".npz")
             if not out.is_file():
-                msg = "it has ended, but written no file where {out}.npz says"
-                raise InputError(msg, element=self.words[0])
+                raise InputError(
+                    "it has ended, but written no file where {out}.npz says", element=self.words[0]
+                )
             if out.stat().st_size > MOST_BYTES:
-                msg = f"its file has {out.stat().st_size:,} bytes; {MOST_BYTES:,} are the most"
-                raise InputError(msg, element=self.words[0])
+                raise InputError(
+                    f"its file has {out.stat().st_size:,} bytes; {MOST_BYTES:,} are the most",
+                    element=self.words[0],
+                )
             return fill_from_bytes(out.read_bytes(), file=f"fill of {self.words[0]}")
 
     def _run(self, words: list[str]) -> None:
@@ -235,19 +237,17 @@ class _Command:
                 check=False,
             )
         except FileNotFoundError as error:
-            msg = "there is no such program"
-            raise InputError(msg, element=words[0]) from error
+            raise InputError("there is no such program", element=words[0]) from error
         except OSError as error:
-            msg = f"it cannot be started: {error.strerror}"
-            raise InputError(msg, element=words[0]) from error
+            raise InputError(f"it cannot be started: {error.strerror}", element=words[0]) from error
         except subprocess.TimeoutExpired as error:
-            msg = f"it took more than {self.time_limit:g} s"
-            raise InputError(msg, element=words[0]) from error
+            raise InputError(
+                f"it took more than {self.time_limit:g} s", element=words[0]
+            ) from error
         if done.returncode:
             lines = done.stderr.decode("utf-8", "replace").strip().splitlines()[-_LAST_LINES:]
             said = f": {' / '.join(lines)}" if lines else ""
-            msg = f"it ended with exit code {done.returncode}{said}"
-            raise InputError(msg, element=words[0])
+            raise InputError(f"it ended with exit code {done.returncode}{said}", element=words[0])
 
 
 def _names(given: Path, made: Path) -> dict[str, str]:
@@ -259,12 +259,12 @@ def _words(command: str) -> tuple[str, ...]:
         words = tuple(shlex.split(command))
         filled = "".join(words).format_map({"in": "\0", "out": "\1"})
     except (ValueError, KeyError, IndexError, AttributeError) as error:
-        msg = f"{command!r} is no command with {{in}} and {{out}}: {error}"
-        raise InputError(msg, element="generator") from error
+        raise InputError(
+            f"{command!r} is no command with {{in}} and {{out}}: {error}", element="generator"
+        ) from error
     for name, mark in (("{in}", "\0"), ("{out}", "\1")):
         if mark not in filled:
-            msg = f"{command!r} does not say where {name} goes"
-            raise InputError(msg, element="generator")
+            raise InputError(f"{command!r} does not say where {name} goes", element="generator")
     return words
 
 

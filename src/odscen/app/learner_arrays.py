@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.given_arrays import Array
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 
 def scenario_arrays(workspace: Workspace, scenario: Scenario | Path) -> dict[str, Array]:

@@ -15,13 +15,13 @@ from odscen.app.running.runs import check_run
 from odscen.base.errors import InputError, ToolError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.lanegraph.query import largest_part, node_id
+from odscen.maps.store import Workspace
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.scenario_document import Flow, MapReference, Scenario, Simulation
 from odscen.scenario.placing.region import Region
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.network_fit import route_fit
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from odscen.base.arrays import IntArray
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.convert.verify.fidelity_result import Fidelity
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.workspace.map_entry import MapEntry
+    from odscen.maps.map_entry import MapEntry
+    from odscen.runs.finished_run import Run
 
 PER_FLOW = 60.0
 """Vehicles per hour from one place: far below what a lane takes in from standstill."""
@@ -72,11 +72,11 @@ class ComparisonSettings:
     def __post_init__(self) -> None:
         for level in self.levels:
             if not 0.0 < level <= 10_000.0:
-                msg = f"a level must be above 0 and at most 10,000 per hour and km, not {level:g}"
-                raise InputError(msg)
+                raise InputError(
+                    f"a level must be above 0 and at most 10,000 per hour and km, not {level:g}"
+                )
         if not 60.0 <= self.duration <= 86_400.0:
-            msg = f"the duration must be 60 to 86,400 s, not {self.duration:g}"
-            raise InputError(msg)
+            raise InputError(f"the duration must be 60 to 86,400 s, not {self.duration:g}")
         if self.levels and not self.seeds:
             raise InputError("the comparison needs a seed")
 
@@ -261,8 +261,9 @@ def _trips(
         kept |= dict(list(routed.items())[: count - len(kept)])
         if len(kept) == count:
             return scenario.model_copy(update={"flows": tuple(kept.values())})
-    msg = f"only {len(kept)} of {count} pairs of places have a route on all networks of the map"
-    raise InputError(msg)
+    raise InputError(
+        f"only {len(kept)} of {count} pairs of places have a route on all networks of the map"
+    )
 
 
 def _pairs(
@@ -335,8 +336,7 @@ def _carried(
 
 def _of_run(run: Run) -> CarriedTraffic:
     if run.known["error"]:
-        msg = f"a run of the comparison failed: {run.known['error']}"
-        raise ToolError(msg)
+        raise ToolError(f"a run of the comparison failed: {run.known['error']}")
     end, counts = float(run.known["sim_seconds"]), run.counts
     delays = [
         max(end - row["depart"], 0.0)

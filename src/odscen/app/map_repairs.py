@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from odscen.base.checksums import SUMS_FILE, file_digest, sums_of, write_sums
 from odscen.base.errors import DamagedError, InputError, OdscenError
-from odscen.workspace.asset_catalogue import BLUEPRINTS_FILE
-from odscen.workspace.map_entry import INFO_FILE, XODR_FILE, read_entry
+from odscen.maps.asset_catalogue import BLUEPRINTS_FILE
+from odscen.maps.map_entry import INFO_FILE, XODR_FILE, read_entry
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from odscen.base.errors import DamagedFile
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.store import Workspace
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import Workspace
 
 SET_ASIDE = "damaged"
 """Folder of a workspace, or beside a run, with what could not be rebuilt."""
@@ -121,15 +121,13 @@ def _built_anew(workspace: Workspace, folder: Path) -> tuple[MapEntry, bool]:
     """Build a map anew; also whether with the usual settings, for want of its own."""
     xodr = folder / XODR_FILE
     if not xodr.is_file() or file_digest(xodr) not in _said_of_xodr(folder):
-        msg = f"its {XODR_FILE} is not as it was written, either"
-        raise InputError(msg)
+        raise InputError(f"its {XODR_FILE} is not as it was written, either")
     try:
         settings = read_entry(folder).conversion
     except DamagedError:
         return workspace.add_map(xodr, name=folder.name), True
     if settings.converter == "file":
-        msg = "its network was brought in: add the map, then the network again"
-        raise InputError(msg)
+        raise InputError("its network was brought in: add the map, then the network again")
     return workspace.add_map(xodr, name=folder.name, settings=settings), False
 
 

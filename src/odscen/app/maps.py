@@ -13,11 +13,11 @@ from odscen.sumo.realize.usable import usable_places
 
 if TYPE_CHECKING:
     from odscen.drawing.map_drawing import MapDrawing
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.placing.usable_nodes import Usable
     from odscen.scenario.signals.light import Light
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.store import Workspace
 
 
 @dataclass(frozen=True, slots=True, eq=False)

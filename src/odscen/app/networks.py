@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.convert.imported.network_changes import NetworkState, network_changes
-from odscen.workspace.allowances import BY_SIZE
+from odscen.maps.allowances import BY_SIZE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from odscen.convert.imported.network_changes import NetworkChange
-    from odscen.workspace.allowances import BuildLimits
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.store import Workspace
+    from odscen.maps.allowances import BuildLimits
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import Workspace
 
 
 class BroughtIn(NamedTuple):

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.errors import ConflictError, NotFoundError
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.run_status import going
+from odscen.maps.folder_names import check_name
+from odscen.maps.map_entry import MapEntry
+from odscen.maps.wastebasket import SCENARIO_SUFFIX, Wastebasket
+from odscen.runs import layout
+from odscen.runs.run_status import going
 from odscen.sumo.runner.long_runs import about
-from odscen.workspace.folder_names import check_name
-from odscen.workspace.map_entry import MapEntry
-from odscen.workspace.wastebasket import SCENARIO_SUFFIX, Wastebasket
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from odscen.workspace.store import Workspace
-    from odscen.workspace.wastebasket import RemovedItem, RemovedKind
+    from odscen.maps.store import Workspace
+    from odscen.maps.wastebasket import RemovedItem, RemovedKind
 
 
 _EARLY = 1 << 16
@@ -121,8 +121,7 @@ def remove(workspace: Workspace, kind: RemovedKind, name: str) -> RemovedItem:
         If it cannot be moved.
     """
     if kind == "run" and going(workspace.runs / check_name(name, what=kind)) == "running":
-        msg = f"run {name!r} is running in another process"
-        raise ConflictError(msg)
+        raise ConflictError(f"run {name!r} is running in another process")
     return Wastebasket(workspace).put(kind, name)
 
 

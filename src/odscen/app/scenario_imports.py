@@ -12,17 +12,17 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import check_scenario, write_scenario
 from odscen.base.errors import InputError, NoMapError, NotFoundError
 from odscen.base.text_files import write_text
-from odscen.interchange.openscenario.xosc_signals import movement_of
-from odscen.interchange.openscenario_import.import_report import ImportReport
-from odscen.interchange.openscenario_import.source.read_distributions import read_distribution
-from odscen.interchange.openscenario_import.source.resolved_tree import TreeResolver
-from odscen.interchange.openscenario_import.xosc_reader import (
+from odscen.formats.openscenario.xosc_signals import movement_of
+from odscen.formats.openscenario_import.import_report import ImportReport
+from odscen.formats.openscenario_import.source.read_distributions import read_distribution
+from odscen.formats.openscenario_import.source.resolved_tree import TreeResolver
+from odscen.formats.openscenario_import.xosc_reader import (
     MaplessSource,
     XoscSource,
     read_openscenario,
     report_without_map,
 )
-from odscen.workspace.folder_names import name_from_file
+from odscen.maps.folder_names import name_from_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.app.exchange.xosc_files import XoscFiles
-    from odscen.interchange.openscenario_import.import_report import ReportRow
-    from odscen.interchange.openscenario_import.xosc_reader import EgoDriver
+    from odscen.formats.openscenario_import.import_report import ReportRow
+    from odscen.formats.openscenario_import.xosc_reader import EgoDriver
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
-    from odscen.workspace.store import Workspace
 
 
 _NO_MAP: Final = "its map is missing: no place can be found"
@@ -139,8 +139,11 @@ def read_files(
         )
         report_without_map(bare, _NO_MAP, ego=ego)
         what = f"its map {error.name!r} is not found" if error.name else _NAMES_NONE
-        msg = f"{what}; give one with --map, a file (.xodr) or the name of a map"
-        raise NoMapError(msg, file=files.where, lists=told.report.lists()) from error
+        raise NoMapError(
+            f"{what}; give one with --map, a file (.xodr) or the name of a map",
+            file=files.where,
+            lists=told.report.lists(),
+        ) from error
     loaded = load_map(entry).sumo
     roads = RoadPoints(entry)
     source = XoscSource(
@@ -193,8 +196,10 @@ def _told(files: XoscFiles) -> _Told:
         root = files.tree()
         report.add(root, files.name)
     if root.find("Storyboard") is None and root.find("Entities") is None:
-        msg = "this file has no storyboard: distributions and catalogs are not scenarios"
-        raise InputError(msg, file=files.where)
+        raise InputError(
+            "this file has no storyboard: distributions and catalogs are not scenarios",
+            file=files.where,
+        )
     resolver = TreeResolver(report, _catalogs(files))
     values = resolver.resolve(root)
     return _Told(files, root, values, report, resolver.parameters, varied)

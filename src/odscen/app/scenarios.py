@@ -9,23 +9,23 @@ from odscen.app.maps import load_map, map_of
 from odscen.base.errors import InputError
 from odscen.base.given_files import read_given, read_given_text
 from odscen.base.text_files import write_text
-from odscen.results.judging.criteria import criteria_problems
+from odscen.figures.judging.criteria import criteria_problems
+from odscen.maps.folder_names import plain_name
+from odscen.maps.wastebasket import SCENARIO_SUFFIX
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.sampling_config import MapFilter, SamplingConfig, loads_config
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
-from odscen.workspace.folder_names import plain_name
-from odscen.workspace.wastebasket import SCENARIO_SUFFIX
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from odscen.app.generators import GeneratorDoor
     from odscen.learning.fill_check import CheckedFill
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 SUFFIX = SCENARIO_SUFFIX
 """Ending of scenario files."""
@@ -79,8 +79,9 @@ def write_scenario(scenario: Scenario, path: Path) -> Path:
     forms = {".graphml": ("the graph form is", "graphml"), ".npz": ("arrays are", "arrays")}
     if path.suffix in forms:
         what, to = forms[path.suffix]
-        msg = f"{what} written by: odscen export --to {to}; name a .json file"
-        raise InputError(msg, file=str(path))
+        raise InputError(
+            f"{what} written by: odscen export --to {to}; name a .json file", file=str(path)
+        )
     return write_text(path, dumps(scenario))
 
 
@@ -99,8 +100,7 @@ def scenario_files(paths: Iterable[Path]) -> list[Path]:
             continue
         inside = sorted(path.glob(f"*{SUFFIX}"))
         if not inside:
-            msg = f"no *{SUFFIX} in this folder"
-            raise InputError(msg, file=str(path))
+            raise InputError(f"no *{SUFFIX} in this folder", file=str(path))
         found += inside
     return found
 
@@ -231,8 +231,9 @@ def generate(
     else:
         statistics = _statistics(workspace, config.maps)
         if not statistics:
-            msg = f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
-            raise InputError(msg)
+            raise InputError(
+                f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
+            )
     paths = []
     for number in range(settings.count):
         seed = settings.seed + number

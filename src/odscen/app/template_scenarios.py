@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.base.errors import ConflictError
+from odscen.maps.folder_names import check_name
 from odscen.scenario.templates.template_registry import find_template, place_template
-from odscen.workspace.folder_names import check_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 
 def template_scenario(
@@ -82,6 +82,5 @@ def write_template(
     check_name(scenario.name, what="scenario")
     file = (out or workspace.scenarios) / f"{scenario.name}{SUFFIX}"
     if file.exists():
-        msg = f"{file} is there already; give the scenario another name"
-        raise ConflictError(msg)
+        raise ConflictError(f"{file} is there already; give the scenario another name")
     return write_scenario(scenario, file)

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.edits.edit_messages import EditBase
-    from odscen.workspace.store import Workspace
 
 
 def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenario:
@@ -60,8 +60,7 @@ def read_edits(path: Path) -> list[EditBase]:
     try:
         data = from_json(read_given_text(path))
     except ValueError as error:
-        msg = f"this is not JSON: {error}"
-        raise InputError(msg, file=str(path)) from error
+        raise InputError(f"this is not JSON: {error}", file=str(path)) from error
     with in_file(str(path)):
         ones = data if isinstance(data, list) else [data]
         return [_read(one, place=f"edits[{index}]") for index, one in enumerate(ones)]
@@ -84,8 +83,9 @@ def edits_of_settings(settings: Iterable[str]) -> list[EditBase]:
         name, equals, text = setting.partition("=")
         kind, dot, field = name.strip().partition(".")
         if not (equals and dot and kind and field):
-            msg = f"--set {setting!r}: write KIND.FIELD=VALUE, such as set_simulation.duration=900"
-            raise InputError(msg)
+            raise InputError(
+                f"--set {setting!r}: write KIND.FIELD=VALUE, such as set_simulation.duration=900"
+            )
         if not found or found[-1]["kind"] != kind or field in found[-1]:
             found.append({"kind": kind})
         found[-1][field] = _value(text)
@@ -119,8 +119,7 @@ def make_variant(
     old = read_scenario(parent)
     ones = list(edits)
     if not ones:
-        msg = "a variant differs from its parent; give a file of edits, or --set"
-        raise InputError(msg)
+        raise InputError("a variant differs from its parent; give a file of edits, or --set")
     new = edited(
         old.model_copy(update={"name": name, "variant": None}), ones, map_of(workspace, old)
     )
@@ -145,20 +144,19 @@ def edited(scenario: Scenario, edits: Iterable[EditBase], loaded: LoadedMap) -> 
         try:
             scenario = apply_edit(one, scenario, loaded)
         except ScenarioError as error:
-            msg = f"edit {index + 1}, {one.label!r}: {error}"
-            raise ScenarioError(msg) from error
+            raise ScenarioError(f"edit {index + 1}, {one.label!r}: {error}") from error
     return scenario
 
 
 def _read(data: Any, *, place: str) -> EditBase:
     if not isinstance(data, dict):
-        msg = f"{place}: an edit is an object with its kind, such as {json.dumps(_EXAMPLE)}"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"{place}: an edit is an object with its kind, such as {json.dumps(_EXAMPLE)}"
+        )
     try:
         return read_edit(data)
     except ScenarioError as error:
-        msg = f"{place}: {error}"
-        raise ScenarioError(msg, problems=error.problems) from error
+        raise ScenarioError(f"{place}: {error}", problems=error.problems) from error
 
 
 _EXAMPLE = {"kind": "set_seed", "seed": 3}

@@ -150,8 +150,7 @@ def _put(folder: Path, final: Path) -> None:
                     raise
             else:
                 return
-    msg = f"{final} is written by other processes all the time"
-    raise WorkspaceError(msg)
+    raise WorkspaceError(f"{final} is written by other processes all the time")
 
 
 def _clear(path: Path) -> bool:

@@ -24,8 +24,9 @@ def parse_duration(text: str) -> float:
     except ValueError:
         seconds = _sum_of_parts(text)
     if not (math.isfinite(seconds) and seconds > 0):
-        msg = f"{text!r} is no length of time; write for example 24h, 1h30m, 90min, 10s or 3600"
-        raise InputError(msg)
+        raise InputError(
+            f"{text!r} is no length of time; write for example 24h, 1h30m, 90min, 10s or 3600"
+        )
     return seconds
 
 

@@ -110,8 +110,7 @@ def _taken(folder: Path, what: str, patience: float) -> int:
             holder = _holder(descriptor)
             os.close(descriptor)
             if time.monotonic() - start >= (patience if _lives(holder) else GRACE):
-                msg = f"{what} is in the hands of {_words(holder)}"
-                raise ConflictError(msg) from None
+                raise ConflictError(f"{what} is in the hands of {_words(holder)}") from None
             time.sleep(_LISTEN)
         except BaseException:
             os.close(descriptor)

@@ -49,14 +49,12 @@ def arrays_from_npz(
         If it is no such file, or has too much; names the array and what is wrong with it.
     """
     if data.startswith(np.lib.format.MAGIC_PREFIX):
-        msg = "it is a single array, not an .npz file with named ones"
-        raise InputError(msg, file=file)
+        raise InputError("it is a single array, not an .npz file with named ones", file=file)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return _arrays(archive, file, only)
     except (zipfile.BadZipFile, EOFError, OSError, RuntimeError) as error:
-        msg = "it cannot be read as an .npz file"
-        raise InputError(msg, file=file) from error
+        raise InputError("it cannot be read as an .npz file", file=file) from error
 
 
 def _arrays(
@@ -64,21 +62,22 @@ def _arrays(
 ) -> dict[str, Array]:
     members = {one.filename.removesuffix(".npy"): one for one in archive.infolist()}
     if len(members) > MOST_ARRAYS:
-        msg = f"it has {len(members)} arrays; {MOST_ARRAYS} are the most"
-        raise InputError(msg, file=file)
+        raise InputError(f"it has {len(members)} arrays; {MOST_ARRAYS} are the most", file=file)
     wanted = [name for name in members if only is None or name in only]
     size = sum(members[name].file_size for name in wanted)
     if size > MOST_UNPACKED:
-        msg = f"its arrays have {size:,} bytes; {MOST_UNPACKED:,} are the most"
-        raise InputError(msg, file=file)
+        raise InputError(
+            f"its arrays have {size:,} bytes; {MOST_UNPACKED:,} are the most", file=file
+        )
     found = {}
     for name in wanted:
         try:
             with archive.open(members[name]) as stream:
                 found[name] = _read(stream, members[name].file_size)
         except (ValueError, zlib.error, zipfile.BadZipFile, NotImplementedError) as error:
-            msg = f"it is malformed: {error}"
-            raise InputError(msg, file=file, element=f"array {name}") from error
+            raise InputError(
+                f"it is malformed: {error}", file=file, element=f"array {name}"
+            ) from error
     return found
 
 
@@ -90,20 +89,16 @@ def _read(stream: IO[bytes], size: int) -> Array:
         (2, 0): np.lib.format.read_array_header_2_0,
     }
     if version not in readers:
-        msg = f"its format is {version[0]}.{version[1]}, not 1.0 or 2.0"
-        raise ValueError(msg)
+        raise ValueError(f"its format is {version[0]}.{version[1]}, not 1.0 or 2.0")
     try:
         shape, by_columns, dtype = readers[version](stream)
     except Exception as error:  # numpy reads it as Python, and passes on whatever that raises
-        msg = "its header cannot be read"
-        raise ValueError(msg) from error
+        raise ValueError("its header cannot be read") from error
     if dtype.kind not in _KINDS:
-        msg = f"it has values of {dtype}, not numbers or text"
-        raise ValueError(msg)
+        raise ValueError(f"it has values of {dtype}, not numbers or text")
     count, left = math.prod(shape), size - stream.tell()
     if min(shape, default=0) < 0 or count * dtype.itemsize != left or count > left:
-        msg = f"its header says {shape} values of {dtype}, and {left} bytes follow"
-        raise ValueError(msg)
+        raise ValueError(f"its header says {shape} values of {dtype}, and {left} bytes follow")
     values = np.frombuffer(bytearray(stream.read(left)), dtype=dtype)
     values = values.astype(dtype.newbyteorder("="), copy=False)
     if dtype.kind == "U" and count:
@@ -117,5 +112,4 @@ def _refuse_no_text(values: Array) -> None:
     low, high = _SURROGATES
     odd = (letters > _MOST_CHARACTER) | ((letters >= low) & (letters <= high))
     if np.any(odd):
-        msg = f"{int(letters[odd][0]):#x} is no character"
-        raise ValueError(msg)
+        raise ValueError(f"{int(letters[odd][0]):#x} is no character")

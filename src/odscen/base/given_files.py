@@ -28,11 +28,12 @@ def read_given(file: Path, *, most: int = MOST) -> bytes:
         found = file.stat()
         if not stat.S_ISREG(found.st_mode):
             what = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe, device or socket"
-            msg = f"this is {what}, not a regular file"
-            raise InputError(msg, file=printable(str(file)))
+            raise InputError(f"this is {what}, not a regular file", file=printable(str(file)))
         if found.st_size > most:
-            msg = f"the file has {found.st_size} bytes; the limit is {most}"
-            raise InputError(msg, file=printable(str(file)))
+            raise InputError(
+                f"the file has {found.st_size} bytes; the limit is {most}",
+                file=printable(str(file)),
+            )
         return file.read_bytes()
     except (OSError, ValueError) as error:  # a name with a NUL is a ValueError
         reason = getattr(error, "strerror", None) or str(error)
@@ -50,5 +51,7 @@ def read_given_text(file: Path) -> str:
     try:
         return read_given(file).decode("utf-8")
     except UnicodeDecodeError as error:
-        msg = f"not text in UTF-8: byte {error.start} is {error.object[error.start]:#04x}"
-        raise InputError(msg, file=printable(str(file))) from error
+        raise InputError(
+            f"not text in UTF-8: byte {error.start} is {error.object[error.start]:#04x}",
+            file=printable(str(file)),
+        ) from error

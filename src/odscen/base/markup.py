@@ -2,7 +2,7 @@
 
 Map names, actor ids and messages come from files that are not vetted. Everything that becomes
 text goes through :func:`element`, which escapes whatever is not already :class:`Markup`; pages are
-put together by templates (:mod:`odscen.results.report.page_templates`) by the same rule.
+put together by templates (:mod:`odscen.reports.page_templates`) by the same rule.
 """
 
 from __future__ import annotations

@@ -29,11 +29,9 @@ def read_json(text: str | bytes, *, what: str) -> dict[str, Any]:
     try:
         data = orjson.loads(text)
     except ValueError as error:
-        msg = f"not {what}: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"not {what}: {error}") from error
     if not isinstance(data, dict):
-        msg = f"not {what}: the document must be a JSON object"
-        raise InputError(msg)
+        raise InputError(f"not {what}: the document must be a JSON object")
     return data
 
 
@@ -54,8 +52,9 @@ def read_document(text: str | bytes, *, form: str, version: int, what: str) -> d
     """
     data = read_json(text, what=what)
     if (data.get("format"), data.get("version")) != (form, version):
-        msg = f"format {data.get('format')!r} version {data.get('version')!r} is not {what}"
-        raise InputError(msg)
+        raise InputError(
+            f"format {data.get('format')!r} version {data.get('version')!r} is not {what}"
+        )
     return data
 
 
@@ -76,14 +75,11 @@ def documents(what: str, *more: type[Exception]) -> Iterator[None]:
     try:
         yield
     except KeyError as error:
-        msg = f"not {what}: {error.args[0]!r} is missing or not known"
-        raise InputError(msg) from error
+        raise InputError(f"not {what}: {error.args[0]!r} is missing or not known") from error
     except (TypeError, ValueError, ArithmeticError, AttributeError, LookupError) as error:
-        msg = f"not {what}: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"not {what}: {error}") from error
     except more as error:
-        msg = f"not {what}: {_first_line(error)}"
-        raise InputError(msg) from error
+        raise InputError(f"not {what}: {_first_line(error)}") from error
 
 
 @contextmanager
@@ -113,11 +109,13 @@ def tables(place: str) -> Iterator[None]:
     try:
         yield
     except (OSError, pl.exceptions.PolarsError) as error:
-        msg = f"files of the run cannot be read: {_first_line(error)}"
-        raise InputError(msg, file=place) from error
+        raise InputError(
+            f"files of the run cannot be read: {_first_line(error)}", file=place
+        ) from error
     except pl.exceptions.PanicException as error:  # no Exception, and no crash either
-        msg = f"files of the run cannot be read: {_first_line(error)}"
-        raise InputError(msg, file=place) from None
+        raise InputError(
+            f"files of the run cannot be read: {_first_line(error)}", file=place
+        ) from None
 
 
 def _first_line(error: BaseException) -> str:
@@ -135,8 +133,7 @@ def typed_rows(kind: Callable[..., _Row]) -> Callable[[Mapping[str, Any]], _Row]
     def make(row: Mapping[str, Any]) -> _Row:
         for name, value in row.items():
             if name in known and type(value) not in known[name]:
-                msg = f"{name} cannot be {value!r:.60}"
-                raise TypeError(msg)
+                raise TypeError(f"{name} cannot be {value!r:.60}")
         return kind(**{**row, **{name: enum(row[name]) for name, enum in enums.items()}})
 
     return make

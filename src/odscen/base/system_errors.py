@@ -67,5 +67,4 @@ def disk_errors(place: str, *, advice: str = "") -> Iterator[None]:
     except OSError as error:
         raise system_error(place, error, advice=advice) from error
     except MemoryError as error:
-        msg = f"{place}: {NO_MEMORY}"
-        raise ResourceError(msg) from error
+        raise ResourceError(f"{place}: {NO_MEMORY}") from error

@@ -49,14 +49,11 @@ def read_xml(text: str | bytes, *, huge: bool = False, bare: bool = False) -> et
         if getattr(error, "code", None) == etree.ErrorTypes.ERR_NO_MEMORY:
             raise _out_of_memory(len(data)) from error
         # What lxml's own text adds is "(<string>, line 1)".
-        msg = f"not well-formed XML: {error.msg}"
-        raise InputError(msg) from error
+        raise InputError(f"not well-formed XML: {error.msg}") from error
     except (ValueError, LookupError) as error:
-        msg = f"not well-formed XML: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"not well-formed XML: {error}") from error
     if root is None:
-        msg = "not well-formed XML: no element"
-        raise InputError(msg)
+        raise InputError("not well-formed XML: no element")
     return root
 
 

@@ -12,7 +12,7 @@ from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, pri
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.workspace.asset_catalogue import Blueprint
+    from odscen.maps.asset_catalogue import Blueprint
 
 app = typer.Typer(help="Models of road users, and weather presets.", no_args_is_help=True)
 
@@ -31,7 +31,7 @@ def list_(
     as_json: JsonOption = False,
 ) -> None:
     """List the models with their size, and the weather presets."""
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     assets = Workspace.open(workspace).assets()
     models = list(assets.blueprints.values())
@@ -73,8 +73,8 @@ def update(
     from odscen.carla.server.carla_server import Server
     from odscen.carla.server.client import Address
     from odscen.carla.server.server_models import SOURCE, fetch_models
-    from odscen.workspace.asset_catalogue import BLUEPRINTS_FILE, blueprint_row
-    from odscen.workspace.store import Workspace
+    from odscen.maps.asset_catalogue import BLUEPRINTS_FILE, blueprint_row
+    from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     old = store.assets()

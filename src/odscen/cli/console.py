@@ -88,15 +88,17 @@ def _seeds(text: str) -> tuple[int, ...]:
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,10})(?:-(\d{1,10}))?\s*", part)
         if match is None:
-            msg = f"{text!r} are no seeds; write for example 10 (for 1 to 10), 1,2,7 or 101-150"
-            raise typer.BadParameter(msg)
+            raise typer.BadParameter(
+                f"{text!r} are no seeds; write for example 10 (for 1 to 10), 1,2,7 or 101-150"
+            )
         first = int(match[1])
         found += range(first, min(int(match[2] or first), first + _MOST_SEEDS) + 1)
     if len(found) == 1 and text.strip().isdecimal():
         found = list(range(1, min(found[0], _MOST_SEEDS + 1) + 1))
     if not 0 < len(found) <= _MOST_SEEDS or max(found) >= 2**31:
-        msg = f"{text!r}: at least 1 and at most {_MOST_SEEDS} seeds, below 2^31"
-        raise typer.BadParameter(msg)
+        raise typer.BadParameter(
+            f"{text!r}: at least 1 and at most {_MOST_SEEDS} seeds, below 2^31"
+        )
     return tuple(dict.fromkeys(found))
 
 
@@ -257,8 +259,7 @@ def option_settings(settings: Iterable[str], *, element: str) -> dict[str, Optio
     for setting in settings:
         name, equals, text = setting.partition("=")
         if not (name.strip().isidentifier() and equals):
-            msg = f"{setting!r} sets nothing; write NAME=VALUE"
-            raise InputError(msg, element=element)
+            raise InputError(f"{setting!r} sets nothing; write NAME=VALUE", element=element)
         try:
             value = json.loads(text)
         except ValueError:
@@ -279,8 +280,7 @@ def behaviour_door(
     """
     if name is None and command is None:
         if given:
-            msg = "--behaviour-set needs --behaviour"
-            raise InputError(msg)
+            raise InputError("--behaviour-set needs --behaviour")
         return None
     from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 

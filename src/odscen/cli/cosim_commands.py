@@ -24,15 +24,15 @@ from odscen.cli.console import (
     progress,
 )
 from odscen.cli.cosim_selfcheck import run_selfcheck
-from odscen.results.records.outcomes import RunStatus
+from odscen.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
     from odscen.carla.mirror.cosim_report import CosimReport
     from odscen.carla.mirror.foreign_actors import ForeignRoles
     from odscen.carla.native.native_run import NativeOptions
     from odscen.carla.sensors.sensor_file import SensorWish
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.runs.finished_run import Run
+    from odscen.runs.run_settings import RunSettings
     from odscen.sumo.worker.protocol import Progress
 
 
@@ -194,13 +194,12 @@ def cosim(
     from odscen.carla.sensors.pictures import Wish
     from odscen.carla.server.client import Address
     from odscen.carla.server.protocol_recording import recorded_protocol
-    from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
+    from odscen.runs.run_settings import RunSettings
 
     address = Address.parse(carla, timeout=timeout)
     if scenario is None and not check:
-        msg = "no scenario is named: name its file, or ask for --selfcheck"
-        raise InputError(msg)
+        raise InputError("no scenario is named: name its file, or ask for --selfcheck")
     if record_protocol is not None:
         address = context.with_resource(recorded_protocol(address, record_protocol))
     if check or scenario is None:
@@ -229,11 +228,11 @@ def cosim(
         pictures=Wish(frames, video, picture_rate),
     )
     if native and follow:
-        msg = "--native drives with the Traffic Manager, which has to tick: leave --follow out"
-        raise InputError(msg)
+        raise InputError(
+            "--native drives with the Traffic Manager, which has to tick: leave --follow out"
+        )
     if native and settings.behaviour is not None:
-        msg = "--native drives with the Traffic Manager: leave --behaviour out"
-        raise InputError(msg)
+        raise InputError("--native drives with the Traffic Manager: leave --behaviour out")
     if native:
         _run_native(
             scenario,
@@ -275,8 +274,9 @@ def _sensors(file: Path | None) -> tuple[SensorWish, ...]:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        problem = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-        raise InputError(problem, file=str(file)) from error
+        raise InputError(
+            f"cannot be read: {getattr(error, 'strerror', None) or error}", file=str(file)
+        ) from error
     return parse_sensors(text, file=str(file))
 
 
@@ -300,7 +300,7 @@ def _run_native(
 ) -> NoReturn:
     from odscen.carla.native.native_run import run_native
     from odscen.carla.server.interruption import INTERRUPTED
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     with progress("driving in CARLA") as step:
         result, report = run_native(

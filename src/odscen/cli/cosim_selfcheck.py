@@ -33,7 +33,7 @@ def run_selfcheck(
     from odscen.carla.selfcheck.selfcheck_page import DATA, PAGE, selfcheck_data, selfcheck_page
     from odscen.carla.selfcheck.selfcheck_run import selfcheck
     from odscen.carla.server.interruption import INTERRUPTED
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     with progress("checking") as step:
         report = selfcheck(Workspace.open(workspace), address, scenario=scenario, notify=step)

@@ -34,7 +34,7 @@ def fit(
     Of a scenario, traffic as planned, without congestion; of a run, as simulated.
     """
     from odscen.app.demand import demands
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     found = demands.fit(Workspace.open(workspace), what)
     if page is not None:
@@ -76,7 +76,7 @@ def routes(
     """Say how trips of the demand choose their routes; what is not given stays as it is."""
     from odscen.app import scenarios
     from odscen.app.demand import demands
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     given = {
         "by": by, "iterations": iterations, "gap": gap, "interval": interval,
@@ -114,7 +114,7 @@ def parking(
     """Say which trips of the demand park; what is not given stays as it is."""
     from odscen.app import scenarios
     from odscen.app.demand import demands
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     given = {"begin": begin, "end": end, "stay": stay, "within": within}
     fields = {name: value for name, value in given.items() if value is not None}
@@ -150,7 +150,7 @@ def correct(
     """
     from odscen.app import scenarios
     from odscen.app.demand import demand_correction
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
     found = demand_correction.correct_matrix(

@@ -82,7 +82,7 @@ def import_(
     """
     from odscen.app import scenarios
     from odscen.app.demand import demands
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     document = scenarios.read_scenario(scenario)
@@ -96,8 +96,7 @@ def import_(
     }
     given = {kind: file for kind, file in tables.items() if file is not None}
     if not given:
-        msg = "name a table to import: --od, --inputs, --counts, --profile or --zones"
-        raise InputError(msg)
+        raise InputError("name a table to import: --od, --inputs, --counts, --profile or --zones")
     for kind, file in given.items():
         document = demands.import_table(
             store, document, file, kind=kind, name=name, day=day, **common
@@ -135,7 +134,7 @@ def add(
     """
     from odscen.app import scenarios
     from odscen.app.demand import demands, sized_demand
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     amounts = {"fill": fill, "per_km": per_km, "trips": trips}
     fields: dict[str, Any] = {key: value for key, value in amounts.items() if value is not None}
@@ -187,7 +186,7 @@ def inflow(
     """
     from odscen.app import scenarios
     from odscen.app.demand import demands
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     fields: dict[str, Any] = {"segment": segment, "per_hour": per_hour, "direction": direction}
     if lanes:
@@ -212,7 +211,7 @@ def list_entries(
     """List where vehicles can drive into the region of a scenario: segment, direction, lanes."""
     from odscen.app import maps, scenarios
     from odscen.app.demand import demands
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
     graph = maps.map_of(Workspace.open(workspace), document).sumo.graph
@@ -249,7 +248,7 @@ def weekday(
     """
     from odscen.app import scenarios
     from odscen.app.demand import demands, sized_demand
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     document, load = demands.whole_day(store, map_name, trips=trips, day=day, seed=seed)
@@ -290,7 +289,7 @@ def size(
     """
     from odscen.app import scenarios
     from odscen.app.demand import sized_demand
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
     document, sizing = sized_demand.sized(Workspace.open(workspace), document, only=name, tell=log)
@@ -326,8 +325,7 @@ def parse_shares(text: str, *, example: str) -> dict[str, float]:
         try:
             found[name.strip()] = float(share or "1")
         except ValueError:
-            msg = f"shares are written as {example}, not {text!r}"
-            raise InputError(msg) from None
+            raise InputError(f"shares are written as {example}, not {text!r}") from None
     return found
 
 
@@ -335,8 +333,7 @@ def _lane_ids(text: str) -> tuple[int, ...]:
     try:
         return tuple(int(part) for part in text.split(","))
     except ValueError:
-        msg = f"lanes are written as -1,-2, not {text!r}"
-        raise InputError(msg) from None
+        raise InputError(f"lanes are written as -1,-2, not {text!r}") from None
 
 
 def _report(demand: dict[str, Any], path: Path, *, as_json: bool) -> None:

@@ -21,9 +21,9 @@ def demo(
     """Build the maps that ship, sample a scenario, run it, and name the report to open."""
     from odscen.app import scenarios
     from odscen.app.running import runs
+    from odscen.maps.shipped import shipped_maps
+    from odscen.maps.store import Workspace
     from odscen.scenario.sampling.generation_settings import GenerationSettings
-    from odscen.workspace.shipped import shipped_maps
-    from odscen.workspace.store import Workspace
 
     store = Workspace.open(workspace)
     for path in shipped_maps():

@@ -36,7 +36,7 @@ def diff_maps(
     """
     from odscen.app.differences import compare_maps
     from odscen.base.text_files import write_text
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     found = compare_maps(Workspace.open(workspace), before, after)
     if svg is not None:

@@ -85,7 +85,7 @@ def doctor(
 
 def _steps(workspace: Path | None, runs: list[Path], *, repair: bool) -> Iterator[RepairStep]:
     from odscen.app.doctor import examine
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     return examine(Workspace.open(workspace), runs, repair=repair)
 
@@ -121,7 +121,7 @@ def _allocator() -> dict[str, Any]:
 
 
 def _workspace(workspace: Any) -> dict[str, Any]:
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     try:
         found, advice = str(Workspace.open(workspace).root), ""

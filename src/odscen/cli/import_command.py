@@ -22,7 +22,7 @@ from odscen.cli.console import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 
 class EgoChoice(StrEnum):
@@ -62,13 +62,15 @@ def import_(
     scenario that they were written of, with what was changed in them; its problems are listed.
     """
     from odscen.app.scenario_imports import import_scenario
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     if file.suffix == ".npz":
         if maps is not None or on_map is not None:
-            msg = "--maps and --map are for OpenSCENARIO; arrays name a map of the workspace"
-            raise InputError(msg, file=str(file))
+            raise InputError(
+                "--maps and --map are for OpenSCENARIO; arrays name a map of the workspace",
+                file=str(file),
+            )
         _import_arrays(store, file, out, as_json=as_json)
         return
     try:

@@ -46,7 +46,7 @@ def data(
     it resumes after an interruption.
     """
     from odscen.app.learned.snapshot_data import DataSettings, make_shards
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     settings = DataSettings(runs=runs, seed=seed, duration=until, warm_up=0.4 * until)
 
@@ -76,7 +76,7 @@ def train(
     """Train a model of traffic on snapshots; one thread, without a graphics card."""
     from odscen.app.learned.model_files import train as trained
     from odscen.learning.reference.model_training import TrainingSettings
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     model = trained(
         Workspace.open(workspace),
@@ -117,7 +117,7 @@ def evaluate(
     The docs page "Learned traffic" explains the columns; values in brackets are 90 % intervals.
     """
     from odscen.app.learned import evaluation, model_files, snapshot_data
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     store, shards = Workspace.open(workspace), snapshot_data.read_shards(data)
     chosen = shards
@@ -166,7 +166,7 @@ def driver(
 ) -> None:
     """Learn from SUMO's drivers how to accelerate: weights of the behaviour model imitation."""
     from odscen.app.learned.learned_driving import learn_driving
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     names = maps or [entry.name for entry in store.maps()]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from odscen.convert.verify.fidelity_result import Fidelity
-    from odscen.workspace.map_entry import MapEntry
+    from odscen.maps.map_entry import MapEntry
 
 UNITS = dict.fromkeys(
     ("bounds", "road_length", "connecting_road_length", "driving_lane_length", "spacing"), ", m"
@@ -75,12 +75,11 @@ def add(
     needs more memory or time than it may have is refused too, with exit code 3.
     """
     from odscen.convert.model.conversion_settings import ConversionSettings
-    from odscen.workspace.allowances import BuildLimits
-    from odscen.workspace.store import Workspace
+    from odscen.maps.allowances import BuildLimits
+    from odscen.maps.store import Workspace
 
     if name is not None and len(files) > 1:
-        msg = f"--name takes one file, {len(files)} are given"
-        raise InputError(msg)
+        raise InputError(f"--name takes one file, {len(files)} are given")
     limits = BuildLimits(memory, minutes)
     store = Workspace.open(workspace)
     rows: list[dict[str, Any]] = []
@@ -111,7 +110,7 @@ def add(
 
 def names_for(files: list[Path], name: str | None) -> list[str]:
     """Names for the maps; files of the same name in one call also get their folder's name."""
-    from odscen.workspace.folder_names import name_from_file
+    from odscen.maps.folder_names import name_from_file
 
     if name is not None:
         return [name]
@@ -127,7 +126,7 @@ def names_for(files: list[Path], name: str | None) -> list[str]:
 @app.command("list")
 def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> None:
     """List the maps with their statistics."""
-    from odscen.workspace.store import Workspace, is_outdated
+    from odscen.maps.store import Workspace, is_outdated
 
     entries, broken = Workspace.open(workspace).catalogue()
     rows = [{**_row(entry), "outdated": is_outdated(entry)} for entry in entries]
@@ -169,7 +168,7 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """Show a map: statistics, graph, SUMO network, files, and what was lost on the way."""
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     entry = Workspace.open(workspace).map(name)
     if as_json:
@@ -205,8 +204,8 @@ def render(
     as_json: JsonOption = False,
 ) -> None:
     """Draw a map as SVG or PNG."""
-    from odscen.workspace.map_pictures import draw_map
-    from odscen.workspace.store import Workspace
+    from odscen.maps.map_pictures import draw_map
+    from odscen.maps.store import Workspace
 
     draw_map(Workspace.open(workspace).map(name), out, width=width, with_graph=graph)
     log(f"Wrote {out}")
@@ -228,12 +227,12 @@ def verify(
 
     The exit code is 1 if a limit is not held.
     """
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     entry = Workspace.open(workspace).map(name)
     fidelity = entry.fidelity()
     if drawing is not None:
-        from odscen.workspace.map_pictures import draw_fidelity
+        from odscen.maps.map_pictures import draw_fidelity
 
         draw_fidelity(entry, fidelity, drawing)
         log(f"Wrote {drawing}")
@@ -357,7 +356,7 @@ def pull(
     from odscen.base.errors import NotFoundError
     from odscen.carla.server.carla_server import Server
     from odscen.carla.server.client import Address
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     rows = []

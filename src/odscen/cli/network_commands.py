@@ -50,12 +50,11 @@ def network(
     """
     from odscen.app.networks import bring_in
     from odscen.base.text_files import write_text
-    from odscen.workspace.allowances import BuildLimits
-    from odscen.workspace.store import Workspace
+    from odscen.maps.allowances import BuildLimits
+    from odscen.maps.store import Workspace
 
     if source is not None and out is not None:
-        msg = "give either --from, to bring a network in, or --out, to write the map's"
-        raise InputError(msg)
+        raise InputError("give either --from, to bring a network in, or --out, to write the map's")
     store = Workspace.open(workspace)
     if source is not None:
         with progress(name) as step:
@@ -118,7 +117,7 @@ def compare_networks(
 ) -> None:
     """Put both converters side by side on a map: fidelity, losses, and what the networks carry."""
     from odscen.app.map_comparison import ComparisonSettings, compare_converters
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     settings = ComparisonSettings(
         levels=_numbers("levels", levels),
@@ -139,8 +138,7 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(",") if part.strip())
     except ValueError as error:
-        msg = f"--{option} takes numbers with commas between, not {text!r}"
-        raise InputError(msg) from error
+        raise InputError(f"--{option} takes numbers with commas between, not {text!r}") from error
 
 
 def _print_comparison(found: MapComparison) -> None:

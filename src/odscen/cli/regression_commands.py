@@ -21,8 +21,8 @@ from odscen.cli.console import (
 )
 
 if TYPE_CHECKING:
-    from odscen.regression.case_results import SuiteResult
-    from odscen.workspace.store import Workspace
+    from odscen.experiments.regression.case_results import SuiteResult
+    from odscen.maps.store import Workspace
 
 HtmlOption = Annotated[
     Path | None, typer.Option("--html", help="Write a page for people.", dir_okay=False)
@@ -33,8 +33,9 @@ def _shard(text: str) -> tuple[int, int]:
     """Read ``2/3``."""
     match = re.fullmatch(r"([1-9]\d{0,3})/([1-9]\d{0,3})", text)
     if match is None or int(match[1]) > int(match[2]):
-        msg = f"{text!r} is no part of a suite; write for example 1/3, 2/3 and 3/3"
-        raise typer.BadParameter(msg)
+        raise typer.BadParameter(
+            f"{text!r} is no part of a suite; write for example 1/3, 2/3 and 3/3"
+        )
     return int(match[1]), int(match[2])
 
 
@@ -92,11 +93,11 @@ def gate(
     Exit code 0: all pass; 1: something differs or falls short; 2: bad input; 3: a run failed. The
     largest that a scenario has is that of the suite.
     """
-    from odscen.regression.gates import Update, run_suite
-    from odscen.regression.suites.suite import read_suite
-    from odscen.regression.suites.suite_parts import read_parts
-    from odscen.regression.suites.suite_words import to_dict
-    from odscen.workspace.store import Workspace
+    from odscen.experiments.regression.gates import Update, run_suite
+    from odscen.experiments.suites.suite import read_suite
+    from odscen.experiments.suites.suite_parts import read_parts
+    from odscen.experiments.suites.suite_words import to_dict
+    from odscen.maps.store import Workspace
 
     read, store = read_suite(suite), Workspace.open(workspace)
     if force and not update_baseline:
@@ -132,10 +133,10 @@ def _write(
     results: Path | None,
 ) -> None:
     from odscen.base.text_files import write_text
-    from odscen.regression.junit import junit_xml
-    from odscen.regression.suites.suite_page import suite_page
-    from odscen.regression.suites.suite_parts import results_json
-    from odscen.regression.suites.suite_summary import suite_summary
+    from odscen.experiments.regression.junit import junit_xml
+    from odscen.experiments.suites.suite_page import suite_page
+    from odscen.experiments.suites.suite_parts import results_json
+    from odscen.experiments.suites.suite_summary import suite_summary
 
     if junit is not None:
         write_text(junit, junit_xml(result))
@@ -152,7 +153,7 @@ def _write(
 
 
 def _show(result: SuiteResult, *, as_json: bool) -> None:
-    from odscen.regression.suites.suite_words import lines
+    from odscen.experiments.suites.suite_words import lines
 
     if not as_json:
         rows = [
@@ -176,9 +177,9 @@ def compare(
 ) -> None:
     """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
     from odscen.base.text_files import write_text
-    from odscen.regression.compare import compare as compare_sides
-    from odscen.regression.comparison_page import comparison_page
-    from odscen.workspace.store import Workspace
+    from odscen.experiments.regression.compare import compare as compare_sides
+    from odscen.experiments.regression.comparison_page import comparison_page
+    from odscen.maps.store import Workspace
 
     # The page draws the map, if the workspace has it.
     store = None if html is None else Workspace.open(workspace)

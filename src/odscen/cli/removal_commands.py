@@ -14,8 +14,8 @@ from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, pri
 
 if TYPE_CHECKING:
     from odscen.app.removal import RemovalFacts
-    from odscen.workspace.store import Workspace
-    from odscen.workspace.wastebasket import RemovedItem, RemovedKind
+    from odscen.maps.store import Workspace
+    from odscen.maps.wastebasket import RemovedItem, RemovedKind
 
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask; for scripts.")]
 ItemsArgument = Annotated[
@@ -46,7 +46,7 @@ def remove(
 
     ``odscen trash restore`` brings them back.
     """
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     remove_all(Workspace.open(workspace), kind.value, names, yes=yes, as_json=as_json)
 
@@ -61,7 +61,7 @@ def remove_map(
 
     ``odscen trash restore`` brings them back.
     """
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     remove_all(Workspace.open(workspace), "map", names, yes=yes, as_json=as_json)
 
@@ -90,8 +90,8 @@ def remove_all(
 @trash.command("list")
 def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> None:
     """List what was removed, the newest first, and until when it is kept."""
-    from odscen.workspace.store import Workspace
-    from odscen.workspace.wastebasket import Wastebasket
+    from odscen.maps.store import Workspace
+    from odscen.maps.wastebasket import Wastebasket
 
     items = Wastebasket(Workspace.open(workspace)).items()
     rows = [{**_row(item), "size": item.size()} for item in items]
@@ -111,8 +111,8 @@ def restore(
     items: ItemsArgument, workspace: WorkspaceOption = None, as_json: JsonOption = False
 ) -> None:
     """Put maps, scenarios and runs back where they were."""
-    from odscen.workspace.store import Workspace
-    from odscen.workspace.wastebasket import Wastebasket
+    from odscen.maps.store import Workspace
+    from odscen.maps.wastebasket import Wastebasket
 
     basket = Wastebasket(Workspace.open(workspace))
     rows = []
@@ -135,8 +135,8 @@ def empty(
     as_json: JsonOption = False,
 ) -> None:
     """Delete for good what is in the wastebasket."""
-    from odscen.workspace.store import Workspace
-    from odscen.workspace.wastebasket import Wastebasket
+    from odscen.maps.store import Workspace
+    from odscen.maps.wastebasket import Wastebasket
 
     basket = Wastebasket(Workspace.open(workspace))
     chosen = [basket.item(item) for item in items] if items else basket.items()
@@ -153,11 +153,9 @@ def _ask(question: str, *, yes: bool) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
-        msg = "this is no terminal, so there is no answer; --yes says that it is meant"
-        raise InputError(msg)
+        raise InputError("this is no terminal, so there is no answer; --yes says that it is meant")
     if not typer.confirm(question, err=True):
-        msg = "nothing was removed"
-        raise ConflictError(msg)
+        raise ConflictError("nothing was removed")
 
 
 def _words(facts: RemovalFacts) -> str:

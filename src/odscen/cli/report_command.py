@@ -46,14 +46,12 @@ def report(
     --json prints the figures too, and those of each interval and place.
     """
     from odscen.app.running.reports import interval_rows, renew_report
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     if (first is None) != (last is None):
-        msg = "--from and --to belong together"
-        raise typer.BadParameter(msg)
+        raise typer.BadParameter("--from and --to belong together")
     if corridor is not None and first is not None:
-        msg = "give either --corridor, or --from and --to"
-        raise typer.BadParameter(msg)
+        raise typer.BadParameter("give either --corridor, or --from and --to")
     segments = [name.strip() for name in (corridor or "").split(",") if name.strip()]
     store = Workspace.open(workspace)
     written = renew_report(

@@ -30,17 +30,17 @@ from odscen.cli.console import (
     print_table,
     progress,
 )
-from odscen.results.records.outcomes import RunStatus
+from odscen.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
+    from odscen.runs.run_settings import RunSettings, SliceLength
     from odscen.scenario.sampling.redrawn_traffic import Redraw
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import RunSettings, SliceLength
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
-    from odscen.workspace.store import Workspace
 
 
 @contextmanager
@@ -183,10 +183,10 @@ def run(
     gc.disable()  # what is imported stays, and need not be gone through again and again
     from odscen.app.running import batches
     from odscen.app.scenarios import scenario_files
-    from odscen.results.judging.expectations import parse_expectation
-    from odscen.sumo.realize.recording import Recording, parse_recording
-    from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.workspace.store import Workspace
+    from odscen.figures.judging.expectations import parse_expectation
+    from odscen.maps.store import Workspace
+    from odscen.runs.recording import Recording, parse_recording
+    from odscen.runs.run_settings import RunSettings
 
     gc.freeze()
     gc.enable()
@@ -288,8 +288,8 @@ def _run_until_confident(
 
 def _warn_of_seeds(results: Sequence[Run], seeds: int) -> None:
     """Say of which scenario the seeds hardly vary; runs of one scenario follow each other."""
-    from odscen.regression.scatter import VARYING, hardly_varying
-    from odscen.results.measures.registry import run_figure
+    from odscen.experiments.regression.scatter import VARYING, hardly_varying
+    from odscen.figures.measures.registry import run_figure
 
     figure = run_figure(VARYING)
     if figure is None:
@@ -314,7 +314,7 @@ def resume(
     Exit codes as of ``run``.
     """
     from odscen.app.running import resumed_runs
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     with progress("resuming") as step:
 
@@ -330,7 +330,7 @@ def resume(
 
 def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> None:
     """Print finished runs: a table for people, JSON for scripts."""
-    from odscen.results.measures.usability import UsabilityLevel
+    from odscen.figures.measures.usability import UsabilityLevel
 
     if as_json:
         runs = [result.to_dict() for result in results]
@@ -361,8 +361,8 @@ def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> Non
 
 def _say_verdicts(result: Run) -> None:
     """Say of each criterion whether it is met, and which expectations are not."""
-    from odscen.results.judging.criteria import missed_words
-    from odscen.results.judging.expectations import CRITERIA, USABLE
+    from odscen.figures.judging.criteria import missed_words
+    from odscen.figures.judging.expectations import CRITERIA, USABLE
 
     for row in result.known.get("criteria") or ():
         met = f"met: {row['words']}" if row["passed"] else f"not met: {missed_words(row)}"

@@ -22,7 +22,7 @@ from odscen.cli.console import (
 
 if TYPE_CHECKING:
     from odscen.learning.fill_check import CheckedFill
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 _MOST_REMARKS = 10
 """Repairs of a fill that are printed."""
@@ -34,8 +34,7 @@ ScenarioArgument = Annotated[
 
 def _format(text: str) -> str:
     if text not in EXPORTERS:
-        msg = f"{text!r} is not one of {', '.join(EXPORTERS)}"
-        raise typer.BadParameter(msg)
+        raise typer.BadParameter(f"{text!r} is not one of {', '.join(EXPORTERS)}")
     return text
 
 
@@ -88,8 +87,8 @@ def generate(
     """Sample scenarios on a map: region, weather, actors, goals. The same seed, the same bytes."""
     from odscen.app import scenarios
     from odscen.app.generators import GeneratorDoor
+    from odscen.maps.store import Workspace
     from odscen.scenario.sampling.generation_settings import GenerationSettings
-    from odscen.workspace.store import Workspace
 
     settings = GenerationSettings(
         map_name=map_name,
@@ -104,8 +103,7 @@ def generate(
         given = option_settings(generator_option or (), element="--generator-option")
         door = GeneratorDoor(generator, generator_cmd, generator_timeout, given)
     elif generator_option:
-        msg = "--generator-option is of a generator: name one with --generator"
-        raise InputError(msg)
+        raise InputError("--generator-option is of a generator: name one with --generator")
     fills: dict[str, CheckedFill] = {}
     with progress("generating") as step:
         paths = scenarios.generate(
@@ -159,7 +157,7 @@ def check(
     Exit code 0 without errors (warnings are allowed), 2 with errors. Of several files, one that
     cannot be read does not keep the others from being checked.
     """
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     if len(scenarios) == 1:  # an error of reading it is the command's own
@@ -282,7 +280,7 @@ def export(
     """
     from odscen.app.export import export as as_scenario
     from odscen.app.export import export_runs
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     given = {"version": version, "begin": begin, "end": end}
     options = {name: value for name, value in given.items() if value is not None}
@@ -321,7 +319,7 @@ def variant(
     edits. The kinds of edits are the functions of odscen.scenario.edits.
     """
     from odscen.app import scenarios, variants
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     asked = [edit for path in edits or () for edit in variants.read_edits(path)]
     asked += variants.edits_of_settings(settings or ())

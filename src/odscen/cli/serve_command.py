@@ -41,8 +41,8 @@ def serve(
     be seen by all users of the machine: give a token of your own as $ODSCEN_TOKEN.
     """
     from odscen.carla.server.client import Address
+    from odscen.maps.store import Workspace
     from odscen.web.http_server import serve as run_server
-    from odscen.workspace.store import Workspace
 
     run_server(
         Workspace.open(workspace),

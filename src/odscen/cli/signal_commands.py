@@ -14,9 +14,9 @@ from odscen.cli.scenario_commands import ScenarioArgument
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from odscen.maps.store import Workspace
     from odscen.scenario.signals.green_wave import Favoured
     from odscen.sumo.calibrate.light_timing import TimedLight
-    from odscen.workspace.store import Workspace
 
 JunctionOption = Annotated[
     list[str] | None, typer.Option("--junction", help="Only this light; may be given again.")
@@ -49,7 +49,7 @@ def show(
     """Show signal groups, stages and plans of the lights of a scenario."""
     from odscen.app.signals.signal_plans import lights_of
     from odscen.app.signals.signal_views import chosen_lights
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     space = Workspace.open(workspace)
     lights = chosen_lights(lights_of(space, scenario), junction or ())
@@ -105,7 +105,7 @@ def import_(
     """
     from odscen.app import scenarios
     from odscen.app.signals.signal_plans import import_signals
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     document, notes = import_signals(
         Workspace.open(workspace), scenario, file, junctions=junction or ()
@@ -131,7 +131,7 @@ def export(
     """Write the programs of a scenario's lights as an additional file for SUMO."""
     from odscen.app.signals.signal_plans import export_signals
     from odscen.base.text_files import write_text
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     path = write_text(out, export_signals(Workspace.open(workspace), scenario))
     if as_json:
@@ -169,7 +169,7 @@ def webster(
     from odscen.app import scenarios
     from odscen.app.signals.signal_optimisation import time_signals
     from odscen.app.signals.turn_arrows import arrow_words, with_turn_arrows
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     given, arrows = (
@@ -232,7 +232,7 @@ def coordinate(
     from odscen.app import scenarios
     from odscen.app.signals.green_waves import coordinate_signals
     from odscen.base.text_files import write_text
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     found = coordinate_signals(
         Workspace.open(workspace),
@@ -270,8 +270,7 @@ def _listed(text: str | None) -> tuple[str, ...]:
 def _direction(text: str) -> Favoured:
     known: dict[str, Favoured] = {"both": "both", "out": "out", "back": "back"}
     if text not in known:
-        msg = f"{text!r} is not both, out or back"
-        raise typer.BadParameter(msg, param_hint="--direction")
+        raise typer.BadParameter(f"{text!r} is not both, out or back", param_hint="--direction")
     return known[text]
 
 

@@ -21,10 +21,10 @@ from odscen.cli.console import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.app.studies.executors import Executor
-    from odscen.app.studies.study_report import StudyGroup
-    from odscen.app.studies.study_runs import StudyState
-    from odscen.workspace.store import Workspace
+    from odscen.experiments.studies.executors import Executor
+    from odscen.experiments.studies.study_report import StudyGroup
+    from odscen.experiments.studies.study_runs import StudyState
+    from odscen.maps.store import Workspace
 
 app = typer.Typer(
     name="study",
@@ -82,10 +82,10 @@ def run(
     resumes with the same command, or with `odscen study resume`. Exit code 0: all have
     completed; 2: bad input; 3: a run failed or was not possible.
     """
-    from odscen.app.studies.study_grid import found_sources, grid_of
-    from odscen.app.studies.study_plan import read_study_plan
-    from odscen.app.studies.study_runs import begin_study
-    from odscen.workspace.store import Workspace
+    from odscen.experiments.studies.study_grid import found_sources, grid_of
+    from odscen.experiments.studies.study_plan import read_study_plan
+    from odscen.experiments.studies.study_runs import begin_study
+    from odscen.maps.store import Workspace
 
     place = Workspace.open(workspace)
     folder = out or Path(f"{plan.name.partition('.')[0]}-study")
@@ -112,7 +112,7 @@ def resume(
     as_json: JsonOption = False,
 ) -> None:
     """Run what is missing of a study; none is run twice. Exit codes as of `odscen study run`."""
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     place = Workspace.open(workspace)
     _carry_out(place, study, jobs, executor, scheduler, target, again=failed, as_json=as_json)
@@ -140,15 +140,14 @@ def extend(
 
     Runs that have ended stay as they are. Exit codes as of `odscen study run`.
     """
-    from odscen.app.studies.study_folder import read_study
-    from odscen.app.studies.study_plan import StudyPlan, read_study_plan
-    from odscen.app.studies.study_runs import extend_study
+    from odscen.experiments.studies.study_folder import read_study
+    from odscen.experiments.studies.study_plan import StudyPlan, read_study_plan
+    from odscen.experiments.studies.study_runs import extend_study
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.validation import validated
-    from odscen.workspace.store import Workspace
 
     if (plan is None) == (seeds is None):
-        msg = "give --plan or --seeds, one of them"
-        raise InputError(msg)
+        raise InputError("give --plan or --seeds, one of them")
     place = Workspace.open(workspace)
     if plan is not None:
         extend_study(place, study, read_study_plan(plan), beside=plan.parent)
@@ -162,7 +161,7 @@ def extend(
 @app.command()
 def status(study: FolderArgument, as_json: JsonOption = False) -> None:
     """Say how far a study is, and why runs failed; also while it runs."""
-    from odscen.app.studies.study_runs import study_state
+    from odscen.experiments.studies.study_runs import study_state
 
     _show_state(study_state(study), as_json=as_json)
 
@@ -181,8 +180,12 @@ def report(
     as_json: JsonOption = False,
 ) -> None:
     """Write a page: means with confidence intervals by scenario and variant, and failures."""
-    from odscen.app.studies.study_folder import PAGE_FILE
-    from odscen.app.studies.study_report import SHOWN_FIGURES, study_groups, write_study_page
+    from odscen.experiments.studies.study_folder import PAGE_FILE
+    from odscen.experiments.studies.study_report import (
+        SHOWN_FIGURES,
+        study_groups,
+        write_study_page,
+    )
 
     figures = tuple(figure or SHOWN_FIGURES)
     means, differences = study_groups(study, figures)
@@ -210,17 +213,15 @@ def _show_groups(title: str, groups: Sequence[StudyGroup], figures: Sequence[str
 
 def open_executor(place: Workspace, name: str, jobs: int, scheduler: str | None) -> Executor:
     """The executor that the options name."""
-    from odscen.app.studies.executors import LocalExecutor
+    from odscen.experiments.studies.executors import LocalExecutor
 
     if name == "local":
         if scheduler is not None:
-            msg = "--scheduler is of --executor dask"
-            raise InputError(msg)
+            raise InputError("--scheduler is of --executor dask")
         return LocalExecutor(place, jobs)
     if name != "dask":
-        msg = f"--executor {name!r} is not local or dask"
-        raise InputError(msg)
-    from odscen.app.studies.dask_executor import DaskExecutor
+        raise InputError(f"--executor {name!r} is not local or dask")
+    from odscen.experiments.studies.dask_executor import DaskExecutor
 
     return DaskExecutor(place, scheduler)
 
@@ -236,7 +237,7 @@ def _carry_out(
     again: bool,
     as_json: bool,
 ) -> None:
-    from odscen.app.studies.study_runs import carry_out_study
+    from odscen.experiments.studies.study_runs import carry_out_study
 
     with progress("study") as step:
         ended = carry_out_study(
@@ -251,7 +252,7 @@ def _carry_out(
 
 
 def _show_state(state: StudyState, *, as_json: bool) -> None:
-    from odscen.app.studies.study_folder import TABLE_FILE
+    from odscen.experiments.studies.study_folder import TABLE_FILE
 
     if as_json:
         print_json(state.to_dict() | {"table": str(state.folder / TABLE_FILE)})
@@ -295,9 +296,9 @@ def dataset(
     The same command after an interruption runs what is missing. Runs that failed or that the
     plan leaves out are counted in the card. Exit code 0: the dataset is complete; 2: bad input.
     """
-    from odscen.app.datasets.dataset_plan import read_dataset_plan
-    from odscen.app.datasets.dataset_runs import CARD_FILE, make_dataset
-    from odscen.workspace.store import Workspace
+    from odscen.experiments.datasets.dataset_plan import read_dataset_plan
+    from odscen.experiments.datasets.dataset_runs import CARD_FILE, make_dataset
+    from odscen.maps.store import Workspace
 
     place = Workspace.open(workspace)
     asked = read_dataset_plan(plan)

@@ -30,11 +30,11 @@ from odscen.cli.scenario_commands import ScenarioArgument
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from odscen.app.sweeps.critical_search import SearchResult
-    from odscen.app.sweeps.sweep_table import Sweep
+    from odscen.experiments.sweeps.critical_search import SearchResult
+    from odscen.experiments.sweeps.sweep_table import Sweep
+    from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import Method, SweepPlan
-    from odscen.sumo.folder.finished_run import Run
 
 _SHOWN = 20
 """Cases that are listed on a terminal."""
@@ -112,9 +112,9 @@ def sweep(
     0, whether cases are safe or not; 2: bad input; 3: a run failed.
     """
     from odscen.app import scenarios
-    from odscen.app.sweeps.sweep_folder import SweepSettings
-    from odscen.app.sweeps.sweep_runs import sweep as run_sweep
-    from odscen.workspace.store import Workspace
+    from odscen.experiments.sweeps.sweep_folder import SweepSettings
+    from odscen.experiments.sweeps.sweep_runs import sweep as run_sweep
+    from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
     planned = _plan(document, vary, plan, samples, method, sample_seed)
@@ -152,14 +152,14 @@ def _plan(
 
     if file is not None:
         if vary or samples or method or seed:
-            msg = "give --plan or --vary, --samples, --method and --sample-seed, not both"
-            raise InputError(msg)
+            raise InputError(
+                "give --plan or --vary, --samples, --method and --sample-seed, not both"
+            )
         with in_file(str(file)):
             return plan_from_data(_read(file))
     how = method or ("grid" if samples is None else "sobol")
     if how not in ("grid", "latin", "sobol", "random"):
-        msg = f"method {how!r} is not one of sobol, latin, random"
-        raise InputError(msg)
+        raise InputError(f"method {how!r} is not one of sobol, latin, random")
     axes = tuple(map(axis_from_text, vary or ())) or _bounds(scenario)
     return SweepPlan(axes, cast("Method", how), samples, seed)
 
@@ -182,18 +182,16 @@ def _read(file: Path) -> dict[str, Any]:
     try:
         data = tomllib.loads(text) if file.suffix == ".toml" else json.loads(text)
     except (ValueError, RecursionError) as error:
-        msg = f"not a plan of a sweep: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"not a plan of a sweep: {error}") from error
     if not isinstance(data, dict):
-        msg = "not a plan of a sweep: it must be an object with vary"
-        raise InputError(msg)
+        raise InputError("not a plan of a sweep: it must be an object with vary")
     return data
 
 
 def _figures(
     given: Sequence[str],
 ) -> tuple[dict[str, Callable[[Run], float | None]], tuple[str, ...]]:
-    from odscen.regression.own_figures import own_column
+    from odscen.experiments.regression.own_figures import own_column
 
     own = {}
     for text in given:
@@ -289,11 +287,11 @@ def search(
     whether there are critical cases or not; 2: bad input; 3: a run failed.
     """
     from odscen.app import scenarios
-    from odscen.app.sweeps.critical_search import SearchSettings
-    from odscen.app.sweeps.critical_search import search as find
-    from odscen.app.sweeps.sweep_folder import SweepSettings
+    from odscen.experiments.sweeps.critical_search import SearchSettings
+    from odscen.experiments.sweeps.critical_search import search as find
+    from odscen.experiments.sweeps.sweep_folder import SweepSettings
+    from odscen.maps.store import Workspace
     from odscen.scenario.sweeps.sweep_plan import axis_from_text
-    from odscen.workspace.store import Workspace
 
     document = scenarios.read_scenario(scenario)
     driven = behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout)

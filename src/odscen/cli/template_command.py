@@ -54,13 +54,12 @@ def new(
         _list(as_json=as_json)
         return
     from odscen.app.template_scenarios import write_template
+    from odscen.maps.store import Workspace
     from odscen.scenario.templates.template_registry import find_template
-    from odscen.workspace.store import Workspace
 
     find_template(template)
     if map_name is None:
-        msg = "name the map to place it on with --map"
-        raise InputError(msg)
+        raise InputError("name the map to place it on with --map")
     numbers = _numbers(values or ())
     store = Workspace.open(workspace)
     file = write_template(store, template, map_name, values=numbers, name=name, out=out)
@@ -112,6 +111,5 @@ def _numbers(given: Sequence[str]) -> dict[str, float]:
         except ValueError:
             equals = ""
         if not equals:
-            msg = f"--set wants NAME=NUMBER, such as ego_speed=8, not {text!r}"
-            raise InputError(msg)
+            raise InputError(f"--set wants NAME=NUMBER, such as ego_speed=8, not {text!r}")
     return found

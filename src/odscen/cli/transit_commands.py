@@ -48,7 +48,7 @@ def import_(
     """
     from odscen.app import scenarios
     from odscen.app.demand import transit_feeds
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
     document, placed = transit_feeds.import_feed(
         Workspace.open(workspace),
@@ -73,5 +73,4 @@ def _day(text: str | None) -> date | None:
     try:
         return None if text is None else date.fromisoformat(text)
     except ValueError:
-        msg = f"a day is written as 2026-11-23, not {text!r}"
-        raise InputError(msg) from None
+        raise InputError(f"a day is written as 2026-11-23, not {text!r}") from None

@@ -213,6 +213,5 @@ def _lines(packed: dict[str, list[int]]) -> Lines:
     steps = np.asarray(packed["steps"], dtype=np.int64).reshape(-1, 2)
     start = offsets(np.asarray(packed["sizes"], dtype=np.int64))
     if start[-1] != len(steps):
-        msg = f"{len(steps)} points for lines of {start[-1]}"
-        raise ValueError(msg)
+        raise ValueError(f"{len(steps)} points for lines of {start[-1]}")
     return Lines(np.cumsum(steps, axis=0) / 100.0, start)

@@ -291,11 +291,10 @@ def svg_to_png(svg: str, *, width: int = 2400) -> bytes:
     try:
         import cairosvg
     except (ImportError, OSError) as error:
-        msg = (
+        raise MissingDependencyError(
             "drawing PNG needs the package cairosvg and the cairo library: "
             "pip install 'odscen[png]' (and on Debian or Ubuntu: apt install libcairo2); "
             "SVG needs neither"
-        )
-        raise MissingDependencyError(msg) from error
+        ) from error
     png: bytes = cairosvg.svg2png(bytestring=svg.encode(), output_width=width, unsafe=False)
     return png

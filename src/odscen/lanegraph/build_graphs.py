@@ -61,8 +61,7 @@ def build_map_graph(
         If the lanes together are longer, need too many nodes, or lie on each other.
     """
     if not MIN_SPACING <= spacing <= MAX_SPACING:
-        problem = f"spacing {spacing} m is not within {MIN_SPACING} to {MAX_SPACING} m"
-        raise InputError(problem)
+        raise InputError(f"spacing {spacing} m is not within {MIN_SPACING} to {MAX_SPACING} m")
     table = RoadTable.of(odr) if table is None else table
     successors = lane_successors(odr)
     nodes = place_nodes(table, spacing, most=most_lanes)

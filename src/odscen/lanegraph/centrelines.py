@@ -93,11 +93,11 @@ class CentreLines:
         total = float(np.sum(extent)) / SAMPLE_STEP + 2 * len(rows)
         if not total < most / SAMPLE_STEP:
             longest = table.lane_keys[int(rows[np.argmax(extent)])]
-            problem = (
+            raise OpenDriveError(
                 f"the lanes of the map are {np.sum(extent):.3g} m long together, "
-                f"more than {most:.3g} m; {MORE_LANES}; this road has the longest"
+                f"more than {most:.3g} m; {MORE_LANES}; this road has the longest",
+                element=f"road {shown_id(longest.road)}",
             )
-            raise OpenDriveError(problem, element=f"road {shown_id(longest.road)}")
         count = np.ceil(extent / SAMPLE_STEP).astype(np.int64) + 1
         count = np.maximum(count, 2)
         first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
@@ -154,8 +154,9 @@ def _check_lengths(
         f"is {lengths[longest]:.3g} m long on {extent[longest]:.3g} m of its road; all lanes "
         f"together are {total:.3g} m, the limit is {most:.3g} m; {MORE_LANES}"
     )
-    place = f"road {shown_id(road)} > laneSection {section} > lane {lane}"
-    raise OpenDriveError(problem, element=place)
+    raise OpenDriveError(
+        problem, element=f"road {shown_id(road)} > laneSection {section} > lane {lane}"
+    )
 
 
 def node_offsets(
@@ -185,11 +186,10 @@ def node_offsets(
     """
     wanted = float(np.sum(lengths)) / spacing
     if not wanted <= (limit := NODES_PER_METRE * most):
-        problem = (
+        raise OpenDriveError(
             f"{np.sum(lengths):.3g} m of lanes have {wanted:.3g} nodes at a spacing of {spacing:g} "
             f"m; the limit is {limit:g}: choose a larger spacing"
         )
-        raise OpenDriveError(problem)
     count = np.maximum(np.rint(lengths / spacing), 1).astype(np.int64)
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     lane = np.repeat(np.arange(len(lengths), dtype=np.int64), count)

@@ -68,15 +68,12 @@ def from_npz_bytes(data: bytes, *, file: str | None = None) -> MapGraph:
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             if not isinstance(archive, np.lib.npyio.NpzFile):
-                problem = "it is a single array, not a map graph"
-                raise GraphFormatError(problem, file=file)
+                raise GraphFormatError("it is a single array, not a map graph", file=file)
             arrays = {name: archive[name] for name in archive.files}
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, MemoryError) as err:
-        problem = "it cannot be read as an .npz file"
-        raise GraphFormatError(problem, file=file) from err
+        raise GraphFormatError("it cannot be read as an .npz file", file=file) from err
     except (ValueError, TypeError, SyntaxError, NotImplementedError) as err:
-        msg = f"an array is malformed: {err}"
-        raise GraphFormatError(msg, file=file) from err
+        raise GraphFormatError(f"an array is malformed: {err}", file=file) from err
     return graph_from_arrays(arrays, file=file)
 
 
@@ -94,21 +91,17 @@ def graph_from_arrays(arrays: Mapping[str, Array], *, file: str | None = None) -
         error.file = error.file or file
         raise
     except KeyError as err:
-        problem = f"an array is missing: {err.args[0]}"
-        raise GraphFormatError(problem, file=file) from err
+        raise GraphFormatError(f"an array is missing: {err.args[0]}", file=file) from err
     except (ValueError, TypeError, IndexError) as err:
-        msg = f"an array is malformed: {err}"
-        raise GraphFormatError(msg, file=file) from err
+        raise GraphFormatError(f"an array is malformed: {err}", file=file) from err
 
 
 def _graph(arrays: Mapping[str, Array]) -> MapGraph:
     if _texts(arrays, "format") != (FORMAT,):
-        problem = "it is not an odscen map graph"
-        raise GraphFormatError(problem)
+        raise GraphFormatError("it is not an odscen map graph")
     version = _column(arrays, "version", np.int32).tolist()
     if version != [VERSION]:
-        problem = f"version is {version}; this odscen reads {VERSION}"
-        raise GraphFormatError(problem)
+        raise GraphFormatError(f"version is {version}; this odscen reads {VERSION}")
     name, sha256 = _texts(arrays, "map")
     return MapGraph(
         map_name=name,
@@ -141,8 +134,7 @@ def _segments(arrays: Mapping[str, Array]) -> Segments:
     ]
     ends = np.cumsum(_column(arrays, "segment_part_counts", np.int32)).tolist()
     if (ends[-1] if ends else 0) != len(parts):
-        problem = "the counts of parts do not add up"
-        raise GraphFormatError(problem, element="segments")
+        raise GraphFormatError("the counts of parts do not add up", element="segments")
     return Segments(
         ids=tuple(map(SegmentId, _texts(arrays, "segment_ids"))),
         kinds=_texts(arrays, "segment_kinds"),  # type: ignore[arg-type]  # checked afterwards
@@ -262,8 +254,7 @@ def _strings(values: Sequence[str]) -> Array:
 def _texts(arrays: Mapping[str, Array], name: str) -> tuple[str, ...]:
     values = arrays[name]
     if values.dtype.kind != "U" or values.ndim != 1:
-        msg = "it is not a list of strings"
-        raise GraphFormatError(msg, element=f"array {name}")
+        raise GraphFormatError("it is not a list of strings", element=f"array {name}")
     texts: list[str] = values.tolist()
     return tuple(texts)
 
@@ -271,6 +262,7 @@ def _texts(arrays: Mapping[str, Array], name: str) -> tuple[str, ...]:
 def _column(arrays: Mapping[str, Array], name: str, kind: type, *, dimensions: int = 1) -> Any:
     values = arrays[name]
     if values.dtype != np.dtype(kind) or values.ndim != dimensions:
-        problem = f"it has type {values.dtype} and {values.ndim} dimensions"
-        raise GraphFormatError(problem, element=f"array {name}")
+        raise GraphFormatError(
+            f"it has type {values.dtype} and {values.ndim} dimensions", element=f"array {name}"
+        )
     return values

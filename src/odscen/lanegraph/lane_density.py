@@ -59,8 +59,9 @@ def check_density(table: RoadTable, lane: IntArray, places: FloatArray) -> None:
         f"{other.lane} of road {shown_id(other.road)}, laneSection {other.section}; "
         f"the limit is {MOST_TOGETHER}"
     )
-    place = f"road {shown_id(one.road)} > laneSection {one.section} > lane {one.lane}"
-    raise OpenDriveError(problem, element=place)
+    raise OpenDriveError(
+        problem, element=f"road {shown_id(one.road)} > laneSection {one.section} > lane {one.lane}"
+    )
 
 
 def check_ends(table: RoadTable, rows: IntArray, ends: FloatArray, *, reach: float) -> None:
@@ -95,5 +96,7 @@ def check_ends(table: RoadTable, rows: IntArray, ends: FloatArray, *, reach: flo
         f"{counts[worst]} ends of lanes or lane sections with a walk beside or on them lie within "
         f"{reach:g} m of ({x:.6g}, {y:.6g}); the limit is {MOST_ENDS}"
     )
-    place = f"road {shown_id(lane.road)} > laneSection {lane.section} > lane {lane.lane}"
-    raise OpenDriveError(problem, element=place)
+    raise OpenDriveError(
+        problem,
+        element=f"road {shown_id(lane.road)} > laneSection {lane.section} > lane {lane.lane}",
+    )

@@ -80,8 +80,7 @@ def to_graphml(graph: MapGraph) -> bytes:
     walk_names: list[str] = [*walk_node_ids(graph)]
     names = [*segment_names, *lane_names, *walk_names]
     if len(set(names)) != len(names):
-        problem = "two nodes would have the same id"
-        raise GraphFormatError(problem, file=graph.map_name)
+        raise GraphFormatError("two nodes would have the same id", file=graph.map_name)
     segments, lanes, walks = map(_escaped, (segment_names, lane_names, walk_names))
     parts = [
         _head(graph),

@@ -64,8 +64,7 @@ def from_graphml(data: bytes, *, file: str | None = None) -> MapGraph:
         error.file = error.file or file
         raise
     except etree.XMLSyntaxError as err:
-        problem = f"it is not XML: {err.msg}"
-        raise GraphFormatError(problem, file=file) from err
+        raise GraphFormatError(f"it is not XML: {err.msg}", file=file) from err
 
 
 def _parse(data: bytes) -> _GraphmlDocument:
@@ -113,11 +112,9 @@ def _take(document: _GraphmlDocument, tag: str, element: Any, values: Attributes
 def _map_graph(document: _GraphmlDocument) -> MapGraph:
     about = document.about
     if about.get("format") != FORMAT:
-        problem = "it is not an odscen map graph"
-        raise GraphFormatError(problem)
+        raise GraphFormatError("it is not an odscen map graph")
     if about.get("version") != str(VERSION):
-        problem = f"version is {about.get('version')}; this odscen reads {VERSION}"
-        raise GraphFormatError(problem)
+        raise GraphFormatError(f"version is {about.get('version')}; this odscen reads {VERSION}")
     index = {
         node["id"]: (kind, row)
         for kind, nodes in document.nodes.items()

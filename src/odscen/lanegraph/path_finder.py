@@ -318,8 +318,7 @@ class PathFinder:
 
     def _from(self, source: int) -> Tree:
         if not self._holds(source):
-            msg = f"{self._name(source)} is outside the region of interest"
-            raise InputError(msg)
+            raise InputError(f"{self._name(source)} is outside the region of interest")
         tree = KEPT_TREES.get(self._number, source)
         if tree is None:
             self._searched += 1

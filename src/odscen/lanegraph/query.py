@@ -96,8 +96,7 @@ def walk_node_index(graph: MapGraph, name: str) -> int:
         If the map has no such node.
     """
     if not name.startswith(WALK_PREFIX):
-        msg = "pedestrian node"
-        raise NotFoundError(msg, name, [])
+        raise NotFoundError("pedestrian node", name, [])
     bare = name.removeprefix(WALK_PREFIX)
     return _index(name, bare, graph.walks.lane_keys, graph.walks.first_node)
 
@@ -120,8 +119,7 @@ def segment_rows(segments: Segments, ids: Iterable[str]) -> Int32Array:
     for name in ids:
         row = known.get(name)
         if row is None:
-            msg = "segment"
-            raise NotFoundError(msg, name, segments.ids)
+            raise NotFoundError("segment", name, segments.ids)
         rows.add(row)
     return np.array(sorted(rows), dtype=np.int32)
 

@@ -175,13 +175,15 @@ def fill_from_arrays(arrays: Mapping[str, Array], *, file: str | None = None) ->
     given = {name: np.asarray(value) for name, value in arrays.items() if value is not None}
     for name in ("node", "category"):
         if name not in given:
-            msg = f"array {name!r} is missing"
-            raise InputError(msg, file=file, element=name)
+            raise InputError(f"array {name!r} is missing", file=file, element=name)
     count = len(given["node"]) if given["node"].ndim == 1 else -1
     for name, array in given.items():
         if array.shape != (count,):
-            msg = f"it has shape {array.shape}, not one value for each road user"
-            raise InputError(msg, file=file, element=name)
+            raise InputError(
+                f"it has shape {array.shape}, not one value for each road user",
+                file=file,
+                element=name,
+            )
     columns = {
         name: _whole(given[name], name, file) if name in ("node", "goal") else
         _categories(given[name], file) if name == "category" else
@@ -198,16 +200,18 @@ def _whole(array: Array, name: str, file: str | None) -> Array:
     numbers = _numbers(array, name, file)
     odd = np.flatnonzero(~(np.isnan(numbers) | (numbers == np.round(numbers))))
     if len(odd):
-        msg = f"{float(numbers[odd[0]])!r} of road user {odd[0]} is no whole number"
-        raise InputError(msg, file=file, element=name)
+        raise InputError(
+            f"{float(numbers[odd[0]])!r} of road user {odd[0]} is no whole number",
+            file=file,
+            element=name,
+        )
     known = np.isfinite(numbers) & (np.abs(numbers) < 2**53)
     return np.where(known, numbers, NO_NODE).astype(np.int64)
 
 
 def _numbers(array: Array, name: str, file: str | None) -> Array:
     if array.dtype.kind not in "fiu":
-        msg = f"it has values of {array.dtype}, not numbers"
-        raise InputError(msg, file=file, element=name)
+        raise InputError(f"it has values of {array.dtype}, not numbers", file=file, element=name)
     return array.astype(np.float64)
 
 
@@ -221,5 +225,8 @@ def _categories(array: Array, file: str | None) -> Array:
     if array.dtype.kind in "iu":
         names = [*(str(one) for one in Category)]
         return np.array([names[k] if 0 <= k < len(names) else str(k) for k in array.tolist()])
-    msg = f"it has values of {array.dtype}, not names of categories or their numbers"
-    raise InputError(msg, file=file, element="category")
+    raise InputError(
+        f"it has values of {array.dtype}, not names of categories or their numbers",
+        file=file,
+        element="category",
+    )

@@ -52,12 +52,12 @@ def read_arrays(path: Path) -> dict[str, Array]:
     arrays = arrays_from_npz(read_given(path, most=MOST_UNPACKED), file=str(path))
     known = _format(arrays)
     if known is None:
-        msg = "these are no arrays of a run or a scenario"
-        raise InputError(msg, file=str(path))
+        raise InputError("these are no arrays of a run or a scenario", file=str(path))
     if _KNOWN.get(known[0]) != known[1]:
         offered = " and ".join(f"{name} {version}" for name, version in _KNOWN.items())
-        msg = f"it is {known[0]} {known[1]}; this odscen reads {offered}"
-        raise InputError(msg, file=str(path))
+        raise InputError(
+            f"it is {known[0]} {known[1]}; this odscen reads {offered}", file=str(path)
+        )
     return arrays
 
 
@@ -111,8 +111,7 @@ def arrays_of(data: Any) -> dict[str, Array]:
         If it is not of a scenario: what happened in a run is not made again from numbers.
     """
     if "actor" not in data.node_types:
-        msg = "it has no actors: only the data of a scenario goes back to arrays"
-        raise InputError(msg)
+        raise InputError("it has no actors: only the data of a scenario goes back to arrays")
     return scenario_arrays_of(data)
 
 

@@ -36,8 +36,7 @@ def named_object(name: str, *, group: str, what: str, shipped: str) -> Any:
             return getattr(_of_file(Path(module)), attribute)
         return getattr(importlib.import_module(module), attribute)
     except Exception as error:  # whatever an import may raise
-        msg = f"it cannot be imported: {error!r}"
-        raise InputError(msg, element=name) from error
+        raise InputError(f"it cannot be imported: {error!r}", element=name) from error
 
 
 def _entry_point(name: str, *, group: str, what: str, shipped: str) -> Any:
@@ -49,23 +48,23 @@ def _entry_point(name: str, *, group: str, what: str, shipped: str) -> Any:
             if known
             else "no installed package offers one"
         )
-        msg = (
+        raise InputError(
             f"there is no {what} {name!r}; {shipped} with odscen, {offered}, and "
-            "package.module:Class is one"
+            "package.module:Class is one",
+            element=what,
         )
-        raise InputError(msg, element=what)
     try:
         return points[0].load()
     except Exception as error:  # whatever an import may raise
-        msg = f"it cannot be imported from {points[0].value}: {error!r}"
-        raise InputError(msg, element=name) from error
+        raise InputError(
+            f"it cannot be imported from {points[0].value}: {error!r}", element=name
+        ) from error
 
 
 def _of_file(file: Path) -> Any:
     spec = importlib.util.spec_from_file_location(f"odscen_given_{file.stem}", file)
     if spec is None or spec.loader is None or not file.is_file():
-        msg = f"{file} is no Python file"
-        raise ImportError(msg)
+        raise ImportError(f"{file} is no Python file")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

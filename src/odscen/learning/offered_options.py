@@ -88,12 +88,12 @@ def options_of(made_by: Any) -> tuple[OfferedOption, ...]:
     try:
         schema = said.model_json_schema() if hasattr(said, "model_json_schema") else said
     except Exception as error:  # whatever code from outside may raise
-        msg = f"its options have no schema: {error!r}"
-        raise InputError(msg) from error
+        raise InputError(f"its options have no schema: {error!r}") from error
     properties = schema.get("properties") if isinstance(schema, dict) else None
     if not isinstance(properties, dict) or len(properties) > _MOST:
-        msg = "its `options` are no JSON Schema with `properties`, and no pydantic model"
-        raise InputError(msg)
+        raise InputError(
+            "its `options` are no JSON Schema with `properties`, and no pydantic model"
+        )
     return tuple(_option(str(name), one) for name, one in properties.items())
 
 
@@ -111,14 +111,12 @@ def option_values(
     for name in given:
         if name not in known:
             offered = f"there are {', '.join(known)}" if known else "it has none"
-            msg = f"it has no option {name!r}; {offered}"
-            raise InputError(msg)
+            raise InputError(f"it has no option {name!r}; {offered}")
     found = {}
     for name, one in known.items():
         value = given.get(name, one.usual)
         if value is None:
-            msg = f"option {name!r} has to be given: {_CALLED[one.kind]}"
-            raise InputError(msg)
+            raise InputError(f"option {name!r} has to be given: {_CALLED[one.kind]}")
         found[name] = _checked(one, value)
     return found
 
@@ -167,12 +165,10 @@ def _option(name: str, schema: Any) -> OfferedOption:
     choices = schema.get("enum", ()) if isinstance(schema, dict) else ()
     texts = isinstance(choices, list | tuple) and all(isinstance(one, str) for one in choices)
     if kind not in _KINDS or not texts or len(choices) > _MOST or (choices and kind != "string"):
-        msg = f"option {name!r} is not one of {', '.join(_KINDS)}; an enum has texts"
-        raise InputError(msg)
+        raise InputError(f"option {name!r} is not one of {', '.join(_KINDS)}; an enum has texts")
     bounds = [schema.get("minimum"), schema.get("maximum")]
     if not all(one is None or _is_number(one) for one in bounds):
-        msg = f"bounds of option {name!r} are no numbers: {bounds}"
-        raise InputError(msg)
+        raise InputError(f"bounds of option {name!r} are no numbers: {bounds}")
     option = OfferedOption(
         name=name,
         kind=kind,
@@ -197,17 +193,14 @@ def _checked(option: OfferedOption, value: Any) -> OptionValue:
         "string": isinstance(value, str) and len(value) <= _LONGEST,
     }[kind]
     if not fits:
-        msg = f"option {name!r} is {value!r}, not {_CALLED[kind]}"
-        raise InputError(msg)
+        raise InputError(f"option {name!r} is {value!r}, not {_CALLED[kind]}")
     if option.choices and value not in option.choices:
-        msg = f"option {name!r} is {value!r}, not one of {', '.join(option.choices)}"
-        raise InputError(msg)
+        raise InputError(f"option {name!r} is {value!r}, not one of {', '.join(option.choices)}")
     if kind in ("number", "integer"):
         low, high = option.low, option.high
         if (low is not None and value < low) or (high is not None and value > high):
             bounds = f"{'' if low is None else f'{low:g}'}..{'' if high is None else f'{high:g}'}"
-            msg = f"option {name!r} is {value:g}, not within {bounds}"
-            raise InputError(msg)
+            raise InputError(f"option {name!r} is {value:g}, not within {bounds}")
         return int(value) if kind == "integer" else float(value)
     found: OptionValue = bool(value) if kind == "boolean" else value
     return found

@@ -159,8 +159,9 @@ def shard_from_bytes(data: bytes, *, file: str) -> Shard:
             arrays = {name: archive[name] for name in archive.files}
         about = json.loads(str(arrays["about"][0]))
         if about["version"] != VERSION:
-            msg = f"version is {about['version']}; this odscen reads {VERSION}"
-            raise InputError(msg, file=file)
+            raise InputError(
+                f"version is {about['version']}; this odscen reads {VERSION}", file=file
+            )
         return Shard(
             about["map"], about["sha256"], about["town"], about["about"], _snapshots(arrays)
         )
@@ -168,8 +169,7 @@ def shard_from_bytes(data: bytes, *, file: str) -> Shard:
         zipfile.BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError, TypeError,
         IndexError,
     ) as error:  # fmt: skip
-        msg = f"it is no shard of snapshots: {error}"
-        raise InputError(msg, file=file) from error
+        raise InputError(f"it is no shard of snapshots: {error}", file=file) from error
 
 
 def _lit(snapshots: tuple[Snapshot, ...]) -> IntArray:

@@ -262,5 +262,6 @@ def _check_lane_length(roads: list[Road]) -> None:
         for section in road.sections
     )
     if total > rules.MAX_LANE_LENGTH:
-        msg = f"all lanes together are {total:.6g} m long; the limit is {rules.MAX_LANE_LENGTH:g} m"
-        raise OpenDriveError(msg)
+        raise OpenDriveError(
+            f"all lanes together are {total:.6g} m long; the limit is {rules.MAX_LANE_LENGTH:g} m"
+        )

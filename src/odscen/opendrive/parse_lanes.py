@@ -66,11 +66,11 @@ def parse_sections(
     if not elements:
         layers = [tag for tag in groups if "layer" in tag.lower()]
         if layers:
-            problem = (
+            raise refusal(
+                lanes,
                 f"the lanes are in <{shown_id(layers[0])}> elements: lane layers, as OpenDRIVE 1.9 "
-                "has them, are not supported; save the map as 1.8 or older"
+                "has them, are not supported; save the map as 1.8 or older",
             )
-            raise refusal(lanes, problem)
         raise refusal(lanes, "there is no laneSection")
     starts: list[float] = []
     for element in elements:

@@ -204,8 +204,9 @@ def _behind(geometry: list[Geometry], new: Geometry, element: Element, notes: No
         # Files of single precision do not tell s apart that are nearer to each other than this.
         least = max(S_TOLERANCE, float(np.spacing(np.float32(before.s))))
         if new.s < before.s - S_TOLERANCE or min(new.length, before.length) > least:
-            problem = f"s={new.s:g} is not beyond the s={before.s:g} of the geometry before"
-            raise refusal(element, problem)
+            raise refusal(
+                element, f"s={new.s:g} is not beyond the s={before.s:g} of the geometry before"
+            )
         rule = Rule.SAME_S if new.s == before.s else Rule.RECORD_ORDER
         which = "geometry" if new.length <= before.length else "geometry before"
         detail = f"s={new.s:.9g} is not beyond the s={before.s:.9g} of the geometry before"
@@ -230,8 +231,7 @@ def _geometry(element: Element, s: float) -> Geometry:
     params = _params(shape, kind, length)
     turning = length * max(map(abs, params), default=0.0)
     if kind in {GeometryKind.ARC, GeometryKind.SPIRAL} and turning > MAX_TURNING:
-        problem = f"turns by about {turning:g} rad; the limit is {MAX_TURNING:g}"
-        raise refusal(shape, problem)
+        raise refusal(shape, f"turns by about {turning:g} rad; the limit is {MAX_TURNING:g}")
     return Geometry(
         s,
         number(element, "x", limit=MAX_COORDINATE),

@@ -60,11 +60,9 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     """
     data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
     if len(data) > max_bytes:
-        msg = f"the file has {len(data)} bytes; the limit is {max_bytes}"
-        raise OpenDriveError(msg)
+        raise OpenDriveError(f"the file has {len(data)} bytes; the limit is {max_bytes}")
     if data.count(b"<") > max_tags:
-        msg = f"the file has {data.count(b'<')} tags; the limit is {max_tags}"
-        raise OpenDriveError(msg)
+        raise OpenDriveError(f"the file has {data.count(b'<')} tags; the limit is {max_tags}")
     try:
         root = read_xml(text, bare=True)
     except LimitError:
@@ -73,8 +71,7 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
         raise OpenDriveError(err.problem) from err
     dtd = root.getroottree().docinfo.internalDTD
     if dtd is not None and any(dtd.iterentities()):  # type: ignore[attr-defined]  # stubs
-        msg = "the file declares XML entities; these are refused"
-        raise OpenDriveError(msg)
+        raise OpenDriveError("the file declares XML entities; these are refused")
     if b"xmlns" in data:
         _drop_namespaces(root)
     return root

@@ -18,12 +18,12 @@ from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import SUFFIX, read_scenario
 from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
 from odscen.carla.served.served_run import ServedJob, run_served
-from odscen.results.records.run_plan import Plan
+from odscen.records.run_plan import Plan
+from odscen.runs import layout
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
+from odscen.runs.run_status import read_status
 from odscen.scenario.document.json_form import dumps
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.run_status import read_status
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.worker.behaviour.behaviour_doors import chosen_behaviour
 from odscen.sumo.worker.protocol import Command, Failed, Pace
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
 
     from odscen.app.running.runs import CheckedRun
     from odscen.carla.server.client import Address
-    from odscen.results.records.assignment_steps import AssignmentStep
+    from odscen.maps.store import Workspace
+    from odscen.maps.wastebasket import RemovedItem
+    from odscen.records.assignment_steps import AssignmentStep
+    from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
     from odscen.web.wire.run_messages import GoOn, NewRun, RunControl
-    from odscen.workspace.store import Workspace
-    from odscen.workspace.wastebasket import RemovedItem
 
 MOST = 8
 """Runs that can go on at a time."""
@@ -74,15 +74,15 @@ class Runs:
         """
         run = check_run(self._workspace, scenario, name=name, settings=_settings(wish))
         if wish.carla and (wish.every is not None or not wish.trajectories):
-            msg = (
+            raise InputError(
                 "a run that CARLA shows is recorded step by step; leave every and trajectories out"
             )
-            raise InputError(msg)
         with self._lock:
             self._refuse_more()
             if wish.carla and any(one.carla and one.ended is None for one in self._active.values()):
-                msg = "CARLA shows another run already; stop that one, or wait for its end"
-                raise ConflictError(msg)
+                raise ConflictError(
+                    "CARLA shows another run already; stop that one, or wait for its end"
+                )
             pace = Pace(paused=wish.paused, speed=wish.speed)
             active = Active(self._free_id(name), scenario, Live(pace), carla=wish.carla)
             self._active[active.id] = active
@@ -128,8 +128,7 @@ class Runs:
         """
         folder = self.kept.folder(run)
         if (state := self.info(run).state) != "interrupted":
-            msg = f"run {run!r} is {state}; only an interrupted one can be resumed"
-            raise ConflictError(msg)
+            raise ConflictError(f"run {run!r} is {state}; only an interrupted one can be resumed")
         scenario = read_scenario(folder / layout.SCENARIO_FILE)
         plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
         with self._lock:
@@ -173,8 +172,7 @@ class Runs:
         """
         with self._lock:
             if run not in self._active:
-                what = "run of this server"
-                raise NotFoundError(what, run, list(self._active))
+                raise NotFoundError("run of this server", run, list(self._active))
             return self._active[run]
 
     def control(self, run: str, control: RunControl) -> RunInfo:
@@ -187,12 +185,12 @@ class Runs:
         """
         active = self.active(run)
         if active.live.ended:
-            msg = f"run {run!r} has ended"
-            raise ConflictError(msg)
+            raise ConflictError(f"run {run!r} has ended")
         if control.action == "interrupt":
             if not active.long:
-                msg = f"run {run!r} is not in slices and could not be resumed; stop it"
-                raise ConflictError(msg)
+                raise ConflictError(
+                    f"run {run!r} is not in slices and could not be resumed; stop it"
+                )
             active.interrupted = True
             active.live.kill()
             return self.info(run)
@@ -253,8 +251,7 @@ class Runs:
         with self._lock:
             active = self._active.get(run)
             if active is not None and active.ended is None:
-                msg = f"run {run!r} is under way; stop it first"
-                raise ConflictError(msg)
+                raise ConflictError(f"run {run!r} is under way; stop it first")
             self._active.pop(run, None)
         if active is not None:
             active.forget()
@@ -341,8 +338,7 @@ class Runs:
 
     def _refuse_more(self) -> None:
         if sum(one.ended is None for one in self._active.values()) >= MOST:
-            msg = f"{MOST} runs are under way; stop one, or wait for the end of one"
-            raise ConflictError(msg)
+            raise ConflictError(f"{MOST} runs are under way; stop one, or wait for the end of one")
 
     def _mirror(
         self, active: Active, plan: Plan, settings: RunSettings, wish: NewRun

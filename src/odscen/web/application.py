@@ -18,6 +18,7 @@ from starlette.staticfiles import StaticFiles
 
 from odscen.base.version import __version__
 from odscen.carla.server.client import Address
+from odscen.maps.child_process import keep_ready
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.web.error_answers import RESPONSES, add_error_handlers, error_response
 from odscen.web.exchange import exchange_routes
@@ -40,14 +41,13 @@ from odscen.web.services import Services, Shared
 from odscen.web.studies import study_routes
 from odscen.web.sweeps import sweep_routes
 from odscen.web.wire.live_messages import LiveMessage
-from odscen.workspace.child_process import keep_ready
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Collection
 
     from starlette.types import Scope
 
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 STATIC = Path(__file__).parent / "static"
 """Where the built front end lies."""

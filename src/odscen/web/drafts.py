@@ -23,21 +23,21 @@ from odscen.base.errors import (
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
+from odscen.maps.folder_names import check_name, is_name
+from odscen.maps.wastebasket import HISTORY, Wastebasket
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.web import history
 from odscen.web.history import History
 from odscen.web.messages import ScenarioRow
-from odscen.workspace.folder_names import check_name, is_name
-from odscen.workspace.wastebasket import HISTORY, Wastebasket
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from odscen.maps.store import Workspace
+    from odscen.maps.wastebasket import RemovedItem
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.web.large.large_documents import LargeDocuments
-    from odscen.workspace.store import Workspace
-    from odscen.workspace.wastebasket import RemovedItem
 
 
 _PATIENCE = 30.0
@@ -108,8 +108,7 @@ class Drafts:
         with self._lock, disk_errors("scenarios"):
             path = self._path(name)
             if not path.is_file():
-                what = "scenario"
-                raise NotFoundError(what, name, [row.name for row in self.rows()])
+                raise NotFoundError("scenario", name, [row.name for row in self.rows()])
             text = path.read_text(encoding="utf-8", errors="replace")
             known = self._open.get(name)
             sha256 = history.digest(text)
@@ -194,8 +193,7 @@ class Drafts:
         """Move a scenario and its history into the wastebasket."""
         with self._lock:
             if not self._path(name).is_file():
-                what = "scenario"
-                raise NotFoundError(what, name, [row.name for row in self.rows()])
+                raise NotFoundError("scenario", name, [row.name for row in self.rows()])
             self._open.pop(name, None)
             return remove(self._workspace, "scenario", name)
 
@@ -220,8 +218,9 @@ class Drafts:
         with self._lock, disk_errors("scenarios"):
             old = self.of_version(name, version)
             if (old.history.undo if step < 0 else old.history.redo) is None:
-                msg = f"there is nothing to {'undo' if step < 0 else 'redo'}"
-                raise ConflictError(msg, current=version)
+                raise ConflictError(
+                    f"there is nothing to {'undo' if step < 0 else 'redo'}", current=version
+                )
             new, text = history.moved(old.history, step, self._history(name))
             scenario = history.document(text, file=f"{name}{SUFFIX}")
             return self._save(Draft(name, scenario, new, old.scenario), text)
@@ -236,8 +235,10 @@ class Drafts:
         draft = self.get(name)
         current = draft.history.version
         if version != current:
-            msg = f"scenario {name!r} has changed: it is at version {current}, not {version}"
-            raise ConflictError(msg, current=current)
+            raise ConflictError(
+                f"scenario {name!r} has changed: it is at version {current}, not {version}",
+                current=current,
+            )
         return draft
 
     def _row(self, name: str) -> ScenarioRow:
@@ -265,8 +266,7 @@ class Drafts:
 
     def _refuse_taken(self, name: str) -> None:
         if self._path(name).exists():
-            msg = f"there is a scenario named {name!r} already"
-            raise ConflictError(msg)
+            raise ConflictError(f"there is a scenario named {name!r} already")
 
     def _path(self, name: str) -> Path:
         return self._folder / f"{check_name(name, what='scenario')}{SUFFIX}"

@@ -18,9 +18,9 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from odscen.base.errors import InputError, WorkspaceError
 from odscen.carla.server.client import Address
+from odscen.maps.wastebasket import Wastebasket
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK, check_token
-from odscen.workspace.wastebasket import Wastebasket
 
 if TYPE_CHECKING:
     import asyncio
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from starlette.types import ASGIApp
 
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 _ANY = ("0.0.0.0", "::", "")  # noqa: S104 - compared with, not bound to
 MOST_CONNECTIONS = 2000
@@ -124,8 +124,9 @@ def serve(
     """
     local = host in LOOPBACK
     if open_to_all and not local:
-        msg = f"--no-token is for this machine only, and {host} can be reached from others"
-        raise InputError(msg)
+        raise InputError(
+            f"--no-token is for this machine only, and {host} can be reached from others"
+        )
     token = None if open_to_all else check_token(token or secrets.token_urlsafe(24))
     hosts = None if host in _ANY else LOOPBACK | {host.lower()}
     bound = _bind(host, port)
@@ -200,6 +201,7 @@ def _bind(host: str, port: int) -> socket.socket:
         bound.bind(address)
         bound.listen()  # whoever comes before the application is ready waits
     except OSError as error:
-        msg = f"cannot listen on {host}:{port}: {error.strerror or error}; try another --port"
-        raise WorkspaceError(msg) from error
+        raise WorkspaceError(
+            f"cannot listen on {host}:{port}: {error.strerror or error}; try another --port"
+        ) from error
     return bound

@@ -15,7 +15,7 @@ from odscen.web.messages import DayMade, ErrorInfo, JobInfo
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.workspace.store import ProgressCallback
+    from odscen.maps.store import ProgressCallback
 
 _KEPT = 200
 """Finished jobs that are remembered."""
@@ -66,8 +66,9 @@ class Jobs:
         with self._lock:
             other = self._subjects.get(subject)
             if other is not None:
-                msg = f"{subject} is being worked on (job {other}); wait for its end, or cancel it"
-                raise ConflictError(msg)
+                raise ConflictError(
+                    f"{subject} is being worked on (job {other}); wait for its end, or cancel it"
+                )
             name = f"job-{next(self._numbers)}"
             self._subjects[subject] = name
             self._jobs[name] = JobInfo(id=name, state="queued", step="waiting", share=0.0)
@@ -98,8 +99,7 @@ class Jobs:
         with self._lock:
             job = self._known(name)
             if job.state not in _LIVE:
-                msg = f"{name} is {job.state}; it cannot be cancelled any more"
-                raise ConflictError(msg)
+                raise ConflictError(f"{name} is {job.state}; it cannot be cancelled any more")
             self._cancelled.add(name)
             return job
 
@@ -111,8 +111,7 @@ class Jobs:
 
     def _known(self, name: str) -> JobInfo:
         if name not in self._jobs:
-            what = "job"
-            raise NotFoundError(what, name, [])
+            raise NotFoundError("job", name, [])
         return self._jobs[name]
 
     def _run(self, name: str, work: Callable[[ProgressCallback], JobResult], subject: str) -> None:

@@ -14,11 +14,12 @@ from odscen.app.scenarios import SUFFIX
 from odscen.base.checksums import read_checked, read_sums
 from odscen.base.durations import clock
 from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.deferred_figures import measured_summary
-from odscen.sumo.folder.ended import RECORDS_ONLY, read_summary
-from odscen.sumo.folder.run_status import going, read_status, unfinished, unfinished_words
-from odscen.sumo.folder.run_sums import REPAIR, check_run_files
+from odscen.maps.folder_names import check_name
+from odscen.runs import layout
+from odscen.runs.deferred_figures import measured_summary
+from odscen.runs.ended import RECORDS_ONLY, read_summary
+from odscen.runs.run_status import going, read_status, unfinished, unfinished_words
+from odscen.runs.run_sums import REPAIR, check_run_files
 from odscen.sumo.runner.long_runs import about
 from odscen.web.wire.run_messages import (
     RunContent,
@@ -29,7 +30,6 @@ from odscen.web.wire.run_messages import (
     RunState,
 )
 from odscen.web.wire.summary_messages import RunSummary
-from odscen.workspace.folder_names import check_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -59,8 +59,7 @@ class KeptRuns:
         """
         folder = self._runs / check_name(run, what="run")
         if _shown(folder) is None:
-            what = "run"
-            raise NotFoundError(what, run, self.by_age())
+            raise NotFoundError("run", run, self.by_age())
         return folder
 
     def whole(self, run: str) -> Path:
@@ -114,8 +113,7 @@ class KeptRuns:
         if not path.is_file():
             if (words := unfinished_words(path.parent)) is not None:
                 raise ConflictError(words)
-            what = f"{name} of run"
-            raise NotFoundError(what, run, [])
+            raise NotFoundError(f"{name} of run", run, [])
         return path
 
     def by_age(self) -> list[str]:
@@ -182,8 +180,7 @@ class KeptRuns:
             said.pop("description", None)
             counts = sum(len(part["rows"]) for part in said.get("demand", {}).get("counts", ()))
         except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
-            what = "scenario of run"
-            raise NotFoundError(what, run, []) from error
+            raise NotFoundError("scenario of run", run, []) from error
         digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
         return RunContent(digest=digest, counts=counts)
 
@@ -199,8 +196,7 @@ class KeptRuns:
         """One of :meth:`files`; :class:`NotFoundError` for any other name."""
         known = [one.name for one in self.files(run)]
         if name not in known:
-            what = f"file of run {run!r}"
-            raise NotFoundError(what, name, known)
+            raise NotFoundError(f"file of run {run!r}", name, known)
         return self.folder(run) / name
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from starlette.websockets import WebSocket
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.runner.live_run import Live, LivePicture
     from odscen.web.messages import Answer

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from starlette.requests import Request
 
-    from odscen.workspace.map_entry import MapEntry
+    from odscen.maps.map_entry import MapEntry
 
 
 UNCHANGED: Responses = {304: {"description": "What the client has is right."}}

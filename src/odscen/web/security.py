@@ -152,8 +152,7 @@ def check_token(token: str) -> str:
         If it is short, or has characters that an address or a cookie cannot have as they are.
     """
     if not _TOKEN.fullmatch(token):
-        msg = "the token must have 16 to 256 letters, digits, '-' or '_'"
-        raise InputError(msg)
+        raise InputError("the token must have 16 to 256 letters, digits, '-' or '_'")
     return token
 
 

@@ -15,6 +15,8 @@ from starlette.requests import HTTPConnection
 
 from odscen.app.maps import LoadedMap, map_of
 from odscen.base.errors import ConflictError
+from odscen.maps.guarded_build import read_scenario_in_child
+from odscen.maps.store import Workspace
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region
 from odscen.web.active_runs import Runs
@@ -24,8 +26,6 @@ from odscen.web.jobs import Jobs
 from odscen.web.large.large_documents import LARGE, LargeDocuments
 from odscen.web.studies.active_studies import Studies
 from odscen.web.sweeps.active_sweeps import Sweeps
-from odscen.workspace.guarded_build import read_scenario_in_child
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.carla.server.client import Address
@@ -93,8 +93,7 @@ class Services:
     @contextmanager
     def _reading(self) -> Iterator[None]:
         if not self._readers.acquire(timeout=_WAIT):
-            msg = "the server is reading other uploads; try again in a minute"
-            raise ConflictError(msg)
+            raise ConflictError("the server is reading other uploads; try again in a minute")
         try:
             yield
         finally:

@@ -9,10 +9,10 @@ from odscen.app.demand.sized_demand import MARGIN, SEEDS, largest_share, propose
 from odscen.app.maps import load_map
 from odscen.app.running.runs import run
 from odscen.base.errors import InputError, NotFoundError
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
 from tests.app.conftest import CROSSING
 
 

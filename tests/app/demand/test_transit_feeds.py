@@ -15,11 +15,11 @@ from odscen.app.maps import load_map
 from odscen.base.errors import InputError
 from odscen.base.ids import LaneKey, RoadId
 from odscen.lanegraph.query import node_id
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.placing.region import Region, place_of
-from odscen.workspace.store import Workspace
 from tests.app.conftest import CROSSING
 
 CRS = "+proj=tmerc +lat_0=48 +lon_0=11 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m +no_defs"

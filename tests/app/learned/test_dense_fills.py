@@ -11,7 +11,7 @@ from odscen.app.learned.learned_maps import whole_map
 from odscen.learning.fill_check import checked_fill
 from odscen.learning.reference.reference_generator import ReferenceGenerator
 from odscen.learning.traffic_snapshots import no_lights
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tests.app.conftest import MAPS
 
 if TYPE_CHECKING:

@@ -28,9 +28,9 @@ from odscen.app.scenarios import generate
 from odscen.base.errors import InputError
 from odscen.learning.reference.model_training import TrainingSettings
 from odscen.learning.traffic_snapshots import SignalAhead
+from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.sumo.realize.signals_ahead import lights_at, lights_at_start
-from odscen.workspace.store import Workspace
 
 CROSSING = "signal_crossing"
 MAPS = Path(__file__).parents[3] / "maps"

@@ -9,8 +9,8 @@ from scipy.stats import t
 
 from odscen.app.running.confident_runs import confidence_of, parse_share, run_until_confident
 from odscen.base.errors import InputError, NotFoundError
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 
 DELAYS = (20.0, 22.0, 18.0, 21.0, 19.0)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import odscen
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.runs.run_settings import RunSettings
 
 ROOT = Path(odscen.__file__).parent
 STEPS = {
@@ -21,7 +21,7 @@ STEPS = {
     "run_prepared": {"app"},
     "run_many": {"app"},
     "run_worker": set[str](),
-    "realize": {"app", "interchange"},  # the SUMO files alone, of which nothing is run
+    "realize": {"app", "formats"},  # the SUMO files alone, of which nothing is run
 }
 
 

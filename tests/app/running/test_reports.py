@@ -10,9 +10,9 @@ from odscen.app.running.runs import run
 from odscen.app.scenarios import read_scenario
 from odscen.base.checksums import SUMS_FILE
 from odscen.base.errors import DamagedError, InputError
-from odscen.regression.compare import read_runs
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.experiments.regression.compare import read_runs
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from odscen.app.running.batches import run_all, run_many
 from odscen.app.running.runs import carry_out, check_file, check_run, prepare_run
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.base.errors import ScenarioError
-from odscen.results.judging.expectations import parse_expectation
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.figures.judging.expectations import parse_expectation
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 
 SHORT = RunSettings(until=5.0)
 

@@ -14,8 +14,8 @@ from odscen.app.running.trajectories import attach_trajectory
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.base.errors import InputError, ScenarioError
 from odscen.cli.commands import command_line
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 
 SETTINGS = RunSettings(until=20.0)
 

@@ -11,11 +11,11 @@ from odscen.app.running.runs import run
 from odscen.app.running.watched_runs import watch
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import ConflictError, ScenarioError
-from odscen.results.records.run_events import events_from_json
+from odscen.maps.store import Workspace
+from odscen.records.run_events import events_from_json
+from odscen.runs.finished_run import Run
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
 
 SETTINGS = RunSettings(until=20.0)
 

@@ -10,10 +10,10 @@ from odscen.app.maps import load_map
 from odscen.app.signals.green_waves import coordinate_signals
 from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.signals.green_wave import green_bands
-from odscen.workspace.store import Workspace
 from tests.signal_case import ROOT
 
 AVENUE = ("10002", "10007", "10016", "10022", "10028", "10036")

@@ -10,15 +10,15 @@ from odscen.app.maps import map_of
 from odscen.app.signals.program_editing import stretch_cycle, take_over_program
 from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.records.light_programs import stage_spans
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import Workspace
+from odscen.records.light_programs import stage_spans
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import MapReference
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import Workspace
 from tests.signal_case import JUNCTION, MAP, program, scenario
 
 if TYPE_CHECKING:
-    from odscen.results.records.light_programs import StageSpan
+    from odscen.records.light_programs import StageSpan
     from odscen.scenario.document.scenario_document import Scenario
 
 

@@ -11,13 +11,13 @@ from odscen.app.maps import map_of
 from odscen.app.signals.program_editing import take_over_program
 from odscen.app.signals.signal_views import DETECTABLE, detector_lanes, group_pairs
 from odscen.base.errors import ScenarioError
+from odscen.maps.store import Workspace
+from odscen.runs.recorded import read_calls, read_light_states
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.scenario.signals.light import find_light
 from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.scenario.signals.stage_sequence import beginning_groups, cycle_length
-from odscen.sumo.folder.recorded import read_calls, read_light_states
-from odscen.workspace.store import Workspace
 from tests.signal_case import JUNCTION, carried_out, light, one_plan, scenario
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from odscen.app.signals.program_editing import take_over_program
 from odscen.app.signals.signal_optimisation import time_signals
 from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError, NotFoundError
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.scenario.edits.edited_parts import changed_part
 from odscen.sumo.calibrate.light_timing import with_timings
 from odscen.sumo.realize.realization import realize
-from odscen.workspace.store import Workspace
 from tests.signal_case import MAP, ROOT, crossing, one_plan, program, scenario
 
 if TYPE_CHECKING:

@@ -16,11 +16,11 @@ from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.app.signals.signal_plans import export_signals, import_signals, lights_of
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
 from odscen.convert.model.conversion_settings import ConversionSettings
-from odscen.results.records.light_programs import programs_from_json, stage_spans
+from odscen.maps.netconvert import NetconvertLimits, run_netconvert
+from odscen.maps.store import Workspace
+from odscen.records.light_programs import programs_from_json, stage_spans
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.scenario.document.signals_document import JunctionTiming, Signals
-from odscen.workspace.netconvert import NetconvertLimits, run_netconvert
-from odscen.workspace.store import Workspace
 from tests.signal_case import MAP, one_plan, program, scenario
 from tests.sumo.conftest import BIN
 

@@ -14,10 +14,10 @@ from odscen.app.signals.signal_optimisation import time_signals
 from odscen.app.signals.signal_plans import lights_of
 from odscen.app.signals.turn_arrows import PRODUCTS, with_turn_arrows
 from odscen.base.errors import InputError
+from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.sumo.calibrate.turning_volumes import planned_vehicles, turning_volumes
-from odscen.workspace.store import Workspace
 from tests.signal_case import (
     JUNCTION,
     MAP,

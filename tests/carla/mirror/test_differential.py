@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tests.carla.conftest import MAPS
 
 pytest.importorskip("carla", reason="the client's own components are compared with")
@@ -142,7 +142,7 @@ def shown(
 ) -> list[Command]:
     """Commands by which the mirror shows road users at places: x, y, z, hdg, pitch, speed."""
     from odscen.carla.mirror.actor_mirror import Mirror
-    from odscen.results.records.run_plan import Plan, PlannedActor
+    from odscen.records.run_plan import Plan, PlannedActor
     from odscen.sumo.runner.in_step import Step
 
     count = len(places)

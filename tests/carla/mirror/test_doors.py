@@ -15,12 +15,12 @@ from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.mirror.doors import Doors
 from odscen.carla.server.batch import DoorMove
 from odscen.carla.server.client import Address
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
 from odscen.sumo.worker.simulation.observed import VehicleSignal
-from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS
 from tests.carla.mirror.test_wheels import plan_of, step_of
 from tests.carla_standin.process import StandIn

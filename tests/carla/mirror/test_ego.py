@@ -14,9 +14,9 @@ from odscen.carla.mirror.cosim import cosim
 from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.mirror.cosim_report import CosimReport
 from odscen.carla.server.client import Address
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.finished_run import Run
+from odscen.runs.run_settings import RunSettings
 from tests.carla.conftest import MAPS, hero_pose, scenario_of
 from tests.carla.driver import Car, Driver
 from tests.carla_standin.process import StandIn

@@ -18,9 +18,9 @@ from odscen.carla.mirror.cosim_report import CosimReport
 from odscen.carla.mirror.tick_hook import load_hook
 from odscen.carla.sensors.sensor_file import parse_sensors
 from odscen.carla.server.client import Address
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.finished_run import Run
+from odscen.runs.run_settings import RunSettings
 from tests.carla.conftest import MAPS, scenario_of
 from tests.carla_standin.process import StandIn
 

@@ -19,7 +19,7 @@ from typing import Any
 import psutil
 import pytest
 
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
 

@@ -11,9 +11,9 @@ import pytest
 from odscen.carla.mirror.cosim import cosim
 from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.server.client import Address
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
-from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
 

@@ -14,9 +14,9 @@ from odscen.carla.server.blueprints import Shape, choose_blueprints
 from odscen.carla.server.environment import vehicle_lights
 from odscen.convert.lane_table.light_heads import Heads
 from odscen.convert.lane_table.table import SumoLight
-from odscen.results.records.run_plan import Plan, PlannedActor
+from odscen.maps.asset_catalogue import shipped_assets
+from odscen.records.run_plan import Plan, PlannedActor
 from odscen.sumo.runner.in_step import Step
-from odscen.workspace.asset_catalogue import shipped_assets
 
 
 def actor(name: str, category: str = "car", *, length: float = 4.5, **more: object) -> PlannedActor:

@@ -23,8 +23,8 @@ from odscen.carla.server.protocol_transcript import (
     header_line,
     parse_transcript,
 )
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from tests.carla.conftest import MAPS, Sample, hero_pose, scenario_of
 from tests.carla.driver import Car, Driver
 from tests.carla_standin.process import Replay, StandIn

@@ -13,9 +13,9 @@ from odscen.app.scenarios import write_scenario
 from odscen.carla.mirror.cosim import cosim
 from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.server.client import Address
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
-from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS
 from tests.carla_standin.process import StandIn
 from tests.sumo.story_case import document, node_at, walk_node_at

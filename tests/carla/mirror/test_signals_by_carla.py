@@ -12,8 +12,8 @@ import pytest
 from odscen.carla.mirror.cosim import cosim
 from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.server.client import Address
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from tests.carla.conftest import MAPS, Sample
 from tests.carla.observer import Observer
 from tests.carla_standin.process import StandIn

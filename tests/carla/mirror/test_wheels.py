@@ -14,10 +14,10 @@ from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.mirror.wheels import NEAR, RADIUS, WHEELBASE_SHARE, Wheels
 from odscen.carla.server.batch import WHEEL_CALLS
 from odscen.carla.server.client import Address
-from odscen.results.records.run_plan import Plan, PlannedActor
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.maps.store import Workspace
+from odscen.records.run_plan import Plan, PlannedActor
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
-from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, scenario_of
 from tests.carla_standin.process import StandIn
 

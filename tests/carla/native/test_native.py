@@ -21,12 +21,12 @@ from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError
 from odscen.carla.native.native_plan import native_actors
 from odscen.carla.native.native_run import NativeOptions, left_out
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.measures_document import SpeedLimit
 from odscen.scenario.document.parking_document import TripParking
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.sumo.runner.prepare import prepare
-from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
 

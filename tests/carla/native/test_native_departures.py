@@ -13,8 +13,8 @@ import pytest
 
 from odscen.carla.native.native_run import NativeOptions, run_native
 from odscen.carla.server.client import Address
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from tests.carla.conftest import MAPS, Sample, scenario_of
 from tests.carla_standin.process import StandIn
 

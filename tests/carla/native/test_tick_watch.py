@@ -26,7 +26,7 @@ from tests.carla_standin.process import StandIn
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 msgpack = pytest.importorskip("msgpack", reason="comes with the extra carla")
 

@@ -22,7 +22,7 @@ from odscen.carla.selfcheck.selfcheck_run import selfcheck
 from odscen.carla.server.client import Address
 from odscen.carla.server.protocol_recording import recorded_protocol
 from odscen.cli.commands import command_line
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 from tests.carla.conftest import MAPS
 from tests.carla_standin.process import Replay, StandIn
 

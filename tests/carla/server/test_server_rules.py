@@ -12,9 +12,9 @@ from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.server.batch import Batch
 from odscen.carla.server.carla_server import Server
 from odscen.carla.server.client import Address
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
-from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample, scenario_of
 from tests.carla_standin.bumps import HALF, HIGH, LANE, bumps
 from tests.carla_standin.generated import SIDEWALK_LIFT

@@ -14,9 +14,9 @@ from odscen.convert.building.network import build_network
 from odscen.convert.imported.imported_lights import LightLetters, imported_letters
 from odscen.convert.imported.net_import import read_network
 from odscen.lanegraph.build_graphs import build_map_graph
+from odscen.maps.netconvert import NetconvertLimits, run_netconvert
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
-from odscen.workspace.netconvert import NetconvertLimits, run_netconvert
 
 if TYPE_CHECKING:
     from odscen.convert.lane_table.table import SumoLight

@@ -14,13 +14,13 @@ from odscen.base.errors import InputError, ScenarioError
 from odscen.base.given_arrays import Array, npz_bytes
 from odscen.lanegraph.graph_npz import from_npz_bytes, to_npz_bytes
 from odscen.lanegraph.query import node_ids, walk_node_ids
+from odscen.maps.store import Workspace
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Actor, Flow, MapReference, Scenario
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.array_form import to_arrays
 from odscen.scenario.forms.array_reading import from_arrays
-from odscen.workspace.store import Workspace
 from tests.graphs import SHA256, fork
 from tests.scenario.strategies import scenarios
 

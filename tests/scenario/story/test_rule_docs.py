@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from odscen.results.measures.figure_docs import between_markers
+from odscen.figures.measures.figure_docs import between_markers
 from odscen.scenario.document.actions_document import Action
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.story.action_kinds import ACTIONS

@@ -7,13 +7,13 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
-from odscen.results.by_place.traffic import over_run
-from odscen.results.report.place_shapes import place_shapes
-from odscen.results.report.report_corridor import NONE_RECORDED
-from odscen.sumo.folder.measured import read_figures
+from odscen.figures.by_place.corridors import busiest_corridor, corridor_along, path_between
+from odscen.figures.by_place.traffic import over_run
+from odscen.reports.place_shapes import place_shapes
+from odscen.reports.report_corridor import NONE_RECORDED
+from odscen.runs.measured import read_figures
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.outputs.corridor_traces import corridor_traces
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.runner.test_on_maps import built, net_file, sampled

@@ -9,12 +9,12 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from odscen.results.measures import safety
-from odscen.results.measures.conflicts import SEEN_TTC
-from odscen.results.measures.figure import RunData
-from odscen.results.measures.registry import figure_values
-from odscen.sumo.folder.recorded import read_conflicts, read_trajectories
-from odscen.sumo.realize.recording import Recording
+from odscen.figures.measures import safety
+from odscen.figures.measures.conflicts import SEEN_TTC
+from odscen.figures.measures.figure import RunData
+from odscen.figures.measures.registry import figure_values
+from odscen.runs.recorded import read_conflicts, read_trajectories
+from odscen.runs.recording import Recording
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
 from tests.sumo.conftest import LENGTH, UNTIL

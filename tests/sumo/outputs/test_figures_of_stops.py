@@ -14,10 +14,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from odscen.results.measures.registry import figure_values
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.measures.timetable import stops_served
-from odscen.sumo.folder.measured import read_run_data
+from odscen.figures.measures.registry import figure_values
+from odscen.figures.measures.summary import actors_from_json
+from odscen.figures.measures.timetable import stops_served
+from odscen.runs.measured import read_run_data
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.parking_case import PLACES, parking_scenario, parking_town
@@ -26,7 +26,7 @@ from tests.sumo.realize.transit.test_lines_on_maps import MAP, line
 from tests.sumo.runner.test_on_maps import built, net_file
 
 if TYPE_CHECKING:
-    from odscen.results.measures.figure import RunData
+    from odscen.figures.measures.figure import RunData
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.sumo_map import SumoMap
 

@@ -18,25 +18,25 @@ import pytest
 import sumo
 from lxml import etree
 
-from odscen.results.by_place.control_delay import lost_time, vehicle_passages
-from odscen.results.by_place.facilities import (
+from odscen.figures.by_place.control_delay import lost_time, vehicle_passages
+from odscen.figures.by_place.facilities import (
     FacilityData,
     NetFacts,
     highway_density,
     movement_facilities,
     passage_sums,
 )
-from odscen.results.by_place.lane_groups import LaneGroups, lane_groups
-from odscen.results.by_place.queue_metres import GAP, QUEUED, queue_backs, queue_sums
-from odscen.results.by_place.queues import queue_lengths
-from odscen.results.by_place.station_figures import station_figures
-from odscen.results.by_place.traffic import TrafficFigures, over_run, traffic_figures
-from odscen.results.by_place.traffic_sums import intervals
-from odscen.results.measures.figure import RunData
-from odscen.results.measures.registry import figure_values
-from odscen.results.records.planned_stations import PlannedStation, StationKind
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.net_facts import read_net_facts
+from odscen.figures.by_place.lane_groups import LaneGroups, lane_groups
+from odscen.figures.by_place.queue_metres import GAP, QUEUED, queue_backs, queue_sums
+from odscen.figures.by_place.queues import queue_lengths
+from odscen.figures.by_place.station_figures import station_figures
+from odscen.figures.by_place.traffic import TrafficFigures, over_run, traffic_figures
+from odscen.figures.by_place.traffic_sums import intervals
+from odscen.figures.measures.figure import RunData
+from odscen.figures.measures.registry import figure_values
+from odscen.records.planned_stations import PlannedStation, StationKind
+from odscen.runs import layout
+from odscen.runs.net_facts import read_net_facts
 from odscen.sumo.outputs.lane_measures import lane_table
 from odscen.sumo.outputs.trip_table import trip_table
 from odscen.sumo.realize.measure_files import measures_xml

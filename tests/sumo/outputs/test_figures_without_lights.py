@@ -17,12 +17,12 @@ import pytest
 import sumo
 from lxml import etree
 
-from odscen.results.by_place.control_delay import vehicle_passages
-from odscen.results.by_place.facility_levels import place_level
-from odscen.results.by_place.group_figures import group_rates, group_sums
-from odscen.results.by_place.queue_metres import GAP, QUEUED
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.net_facts import read_net_facts
+from odscen.figures.by_place.control_delay import vehicle_passages
+from odscen.figures.by_place.facility_levels import place_level
+from odscen.figures.by_place.group_figures import group_rates, group_sums
+from odscen.figures.by_place.queue_metres import GAP, QUEUED
+from odscen.runs import layout
+from odscen.runs.net_facts import read_net_facts
 from odscen.sumo.realize.sumo_lane_places import lane_places
 from tests.sumo.conftest import BIN
 from tests.sumo.runner.test_on_maps import built, net_file

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import polars as pl
 import pytest
 
+from odscen.runs.finished_run import Run
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.edits.demand_edits import set_input
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.realize.test_routes_file import empty

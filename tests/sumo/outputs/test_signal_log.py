@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import polars as pl
 import pytest
 
+from odscen.runs import layout
+from odscen.runs.recorded import read_calls, read_light_states
 from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.recorded import read_calls, read_light_states
 from tests.signal_case import carried_out, light, program, scenario, timing
 
 if TYPE_CHECKING:

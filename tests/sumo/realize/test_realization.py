@@ -8,6 +8,8 @@ from lxml import etree
 
 from odscen.base.categories import Body, Category
 from odscen.base.errors import ScenarioError
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings, SliceLength
 from odscen.scenario.document.scenario_document import (
     Actor,
     Environment,
@@ -17,8 +19,6 @@ from odscen.scenario.document.scenario_document import (
     Simulation,
 )
 from odscen.sumo.realize.realization import Realization, realize, slices_of
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings, SliceLength
 from tests.graphs import SHA256
 from tests.sumo.toys import sumo_map
 

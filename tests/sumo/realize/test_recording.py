@@ -8,8 +8,8 @@ import pytest
 
 from odscen.base.durations import clock, parse_duration
 from odscen.base.errors import InputError, SimulationError
-from odscen.sumo.folder.parts import tidy_part
-from odscen.sumo.realize.recording import Recording, parse_recording, region_xml
+from odscen.runs.parts import tidy_part
+from odscen.runs.recording import Recording, parse_recording, region_xml
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.worker.route_slices import RouteSlices

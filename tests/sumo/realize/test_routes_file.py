@@ -12,7 +12,8 @@ import pytest
 
 from odscen.base.categories import Category
 from odscen.base.errors import ToolError
-from odscen.results.records.run_plan import PlannedActor
+from odscen.records.run_plan import PlannedActor
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds
@@ -23,7 +24,6 @@ from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import approach_capacities, peak_share, town_day
 from odscen.sumo.realize.passages import planned_passages
 from odscen.sumo.realize.realization import all_road_users, realize
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_tools import run_tool
 from odscen.sumo.realize.usable import usable_places
 from odscen.sumo.runner.prepare import prepare

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.results.judging.expectations import parse_expectation
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.figures.judging.expectations import parse_expectation
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 
 
 @pytest.mark.parametrize(

@@ -12,16 +12,16 @@ from lxml import etree
 from odscen.app.maps import LoadedMap, load_map
 from odscen.app.running.reports import write_report
 from odscen.app.running.runs import check_run, prepare_run
-from odscen.results.records.assignment_steps import Assignment, AssignmentStep
-from odscen.results.records.run_plan import Plan
+from odscen.maps.store import Workspace
+from odscen.records.assignment_steps import Assignment, AssignmentStep
+from odscen.records.run_plan import Plan
+from odscen.runs.layout import ASSIGNMENT_FILE, ROUTES_FILE
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.scenario_document import MapReference, Scenario
-from odscen.sumo.folder.layout import ASSIGNMENT_FILE, ROUTES_FILE
 from odscen.sumo.realize.realization import realize
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.assignment import AssignedRoutes, assign_routes
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.store import Workspace
 from tests.sumo.runner.test_long_runs import TOWN, killed, results
 
 pytestmark = pytest.mark.slow(together=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from odscen.sumo.folder import layout
+from odscen.runs import layout
 from odscen.sumo.runner import forked_worker
 from odscen.sumo.runner.left_results import left_results
 from odscen.sumo.runner.run_folder import write_run_folder

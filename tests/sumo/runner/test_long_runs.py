@@ -13,22 +13,22 @@ import pytest
 from bench.kills import traffic
 from odscen.app.running.runs import check_file, prepare_run
 from odscen.base.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
-from odscen.results.judging.expectations import parse_expectation
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_events import EventKind, events_from_json
-from odscen.sumo.folder import checkpoint, layout, run_status
-from odscen.sumo.folder.layout import RECORDED
-from odscen.sumo.folder.parts import check_room
-from odscen.sumo.folder.recorded import read_trajectories, recorded_files, trajectory_files
-from odscen.sumo.folder.run_sums import seal_start
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.figures.judging.expectations import parse_expectation
+from odscen.figures.measures.summary import actors_from_json
+from odscen.maps.store import Workspace
+from odscen.records.run_events import EventKind, events_from_json
+from odscen.runs import checkpoint, layout, run_status
+from odscen.runs.layout import RECORDED
+from odscen.runs.parts import check_room
+from odscen.runs.recorded import read_trajectories, recorded_files, trajectory_files
+from odscen.runs.run_settings import RunSettings
+from odscen.runs.run_sums import seal_start
 from odscen.sumo.runner import forecast, forked_worker
 from odscen.sumo.runner.allocator import fast_allocator
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.long_runs import resume, run_lock
 from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
 from odscen.sumo.worker.protocol import Command, Pace, Progress
-from odscen.workspace.store import Workspace
 from tests.sumo.conftest import SLICE, TYPES, UNTIL, start_killed_workers
 
 TOWN = Path(__file__).parents[3] / "maps" / "town_5x5.xodr"

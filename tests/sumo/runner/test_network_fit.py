@@ -10,9 +10,9 @@ import pytest
 from odscen.app.maps import LoadedMap, load_map
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.lanegraph.query import node_id, walk_node_id
+from odscen.maps.store import Workspace
 from odscen.scenario.document.scenario_document import Actor, Flow, MapReference, Scenario
 from odscen.sumo.runner.network_fit import ASIDE, place_fit, route_fit
-from odscen.workspace.store import Workspace
 
 MAPS = Path(__file__).parents[3] / "maps"
 

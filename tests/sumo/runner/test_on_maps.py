@@ -15,23 +15,23 @@ import pytest
 from odscen.app.running.reports import write_report
 from odscen.base.categories import Category
 from odscen.convert.building.network import build_network
+from odscen.figures.measures.summary import actors_from_json
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.query import node_id
+from odscen.maps.asset_catalogue import shipped_assets
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_plan import Plan
+from odscen.records.run_plan import Plan
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.sampling_config import SamplingConfig, overridden
 from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.edits.actor_edits import add_actor
 from odscen.scenario.sampling.sampler import sample_scenario
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap, pos_per_metre
 from odscen.sumo.realize.usable import usable_places
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.asset_catalogue import shipped_assets
 from tests.sumo.conftest import BIN
 
 MAPS = Path(__file__).parents[3] / "maps"

@@ -13,10 +13,10 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError, WorkspaceError
-from odscen.results.judging.expectations import parse_expectation
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_events import EventKind, events_from_json
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.figures.judging.expectations import parse_expectation
+from odscen.figures.measures.summary import actors_from_json
+from odscen.records.run_events import EventKind, events_from_json
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.run_jobs import PreparedRun, RunJob, run_many, run_prepared
 from tests.sumo.conftest import BIN, Prepare
 
@@ -194,8 +194,7 @@ def test_a_run_that_cannot_be_prepared_ends_the_others_and_tells_its_reason(
     prepare: Prepare, tmp_path: Path
 ) -> None:
     def broken() -> PreparedRun:
-        msg = "no such map"
-        raise WorkspaceError(msg)
+        raise WorkspaceError("no such map")
 
     jobs = [
         RunJob("broken", broken, tmp_path / "broken"),
@@ -210,8 +209,7 @@ def test_a_run_that_cannot_be_prepared_is_left_out_where_somebody_is_told(
     prepare: Prepare, tmp_path: Path
 ) -> None:
     def broken() -> PreparedRun:
-        msg = "no such place"
-        raise InputError(msg)
+        raise InputError("no such place")
 
     jobs = [
         RunJob("broken", broken, tmp_path / "broken"),

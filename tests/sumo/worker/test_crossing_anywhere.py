@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from odscen.results.records.run_plan import Plan
+from odscen.records.run_plan import Plan
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.realize.realization import realize
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.conftest import start_killed_workers

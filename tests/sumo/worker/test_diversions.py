@@ -10,22 +10,22 @@ import pytest
 from bench.measures import accident, counted, motorway, queue
 from odscen.app.maps import LoadedMap, load_map
 from odscen.app.running.runs import check_file, prepare_run
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_events import EventKind, events_from_json
+from odscen.figures.measures.summary import actors_from_json
+from odscen.maps.store import Workspace
+from odscen.records.run_events import EventKind, events_from_json
+from odscen.runs.recorded import read_trajectories
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import MapReference, Scenario
-from odscen.sumo.folder.recorded import read_trajectories
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_lane_places import lane_segments
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.store import Workspace
 from tests.sumo.runner.test_long_runs import TOWN, killed, results
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.results.records.run_events import Event
+    from odscen.records.run_events import Event
     from odscen.sumo.runner.run_jobs import PreparedRun
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from odscen.lanegraph.graphs import WalkKind
 from odscen.lanegraph.query import walk_node_id
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.placing.region import Region
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.realize.lights.test_program_files import crossing, net_file

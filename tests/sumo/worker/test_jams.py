@@ -7,8 +7,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from odscen.results.records.outcomes import StopReason
-from odscen.results.records.run_events import EventKind, events_from_json
+from odscen.records.outcomes import StopReason
+from odscen.records.run_events import EventKind, events_from_json
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner.forked_worker import expect_runs
 from odscen.sumo.runner.run_folder import write_run_folder

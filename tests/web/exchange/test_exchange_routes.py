@@ -15,11 +15,11 @@ from lxml import etree
 from starlette.testclient import TestClient
 
 from odscen.app.scenario_imports import import_scenario
-from odscen.interchange.openscenario_import.import_report import VERDICTS
+from odscen.formats.openscenario_import.import_report import VERDICTS
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import loads
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
-from odscen.workspace.store import Workspace
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
 from tests.web.conftest import CROSSING, finished, job
 

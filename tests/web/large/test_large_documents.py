@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from odscen.maps.store import Workspace
 from odscen.web import active_runs, history
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
-from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, finished, wait_for
 from tests.web.test_long_runs import WISH, interrupted_after, made_busy, outcome
 from tests.web.test_runs import start, watch
@@ -23,8 +23,7 @@ def far(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestC
     """A server for which every document is large, and that cannot read any itself."""
 
     def refuse(*_: object, **__: object) -> None:
-        msg = "the server has read a document itself"
-        raise AssertionError(msg)
+        raise AssertionError("the server has read a document itself")
 
     monkeypatch.setattr(history, "loads", refuse)
     with TestClient(create_app(workspace, hosts=HOSTS, large=1)) as opened:
@@ -108,8 +107,8 @@ def test_small_and_large_scenarios_have_one_history(
 def test_a_large_scenario_that_needs_more_than_its_limit_is_refused_and_nothing_is_left(
     far: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    from odscen.maps.allowances import Allowance
     from odscen.web.large import large_documents
-    from odscen.workspace.allowances import Allowance
 
     scratch = tmp_path / "scratch"
     scratch.mkdir()

@@ -8,8 +8,8 @@ import polars as pl
 import pytest
 from starlette.testclient import TestClient
 
-from odscen.app.studies.study_report import study_groups
-from odscen.workspace.store import Workspace
+from odscen.experiments.studies.study_report import study_groups
+from odscen.maps.store import Workspace
 from tests.web.conftest import wait_for
 
 WET = "HardRainNoon"

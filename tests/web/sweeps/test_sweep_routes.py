@@ -11,13 +11,13 @@ from starlette.testclient import TestClient
 
 from odscen.app.running.runs import run
 from odscen.app.scenarios import SUFFIX
-from odscen.app.sweeps.sweep_estimate import estimate
-from odscen.app.sweeps.sweep_folder import SweepSettings, begin_sweep
+from odscen.experiments.sweeps.sweep_estimate import estimate
+from odscen.experiments.sweeps.sweep_folder import SweepSettings, begin_sweep
+from odscen.runs.finished_run import Run
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.sweeps.sweep_plan import SweepPlan, axis_from_text
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
 from tests.sumo.story_case import MIDDLE, RIGHT, document, node_at, workspace

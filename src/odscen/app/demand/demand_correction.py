@@ -8,21 +8,21 @@ from odscen.app.maps import map_of
 from odscen.base.errors import InputError
 from odscen.base.markup import join
 from odscen.base.text_files import write_text
-from odscen.results.report.page_templates import html_page, page_head
-from odscen.results.report.report_demand import ShownCount, counts_section
+from odscen.reports.page_templates import html_page, page_head
+from odscen.reports.report_demand import ShownCount, counts_section
+from odscen.runs.run_settings import AS_DESIGNED
 from odscen.sumo.calibrate.matrix_correction import corrected, pair_passages, with_more_trips
-from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.runner.assignment import assign_routes, wants_assignment
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from odscen.results.records.assignment_steps import AssignmentStep
+    from odscen.maps.store import Workspace
+    from odscen.records.assignment_steps import AssignmentStep
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.count_fit import CountFits
     from odscen.sumo.calibrate.matrix_correction import CorrectedMatrix, Pair, PairPassages
-    from odscen.workspace.store import Workspace
 
 
 def correct_matrix(
@@ -56,11 +56,9 @@ def correct_matrix(
         If the scenario has errors.
     """
     if not 0.0 < trust <= 1e6:
-        msg = f"trust must be above 0 and at most 1e6, not {trust:g}"
-        raise InputError(msg)
+        raise InputError(f"trust must be above 0 and at most 1e6, not {trust:g}")
     if not 1 <= rounds <= 20:
-        msg = f"rounds must be 1 to 20, not {rounds}"
-        raise InputError(msg)
+        raise InputError(f"rounds must be 1 to 20, not {rounds}")
     loaded = map_of(workspace, scenario)
     if not wants_assignment(scenario):
         return corrected(scenario, loaded.sumo, pair_passages(scenario, loaded.sumo), trust=trust)

@@ -13,6 +13,8 @@ from odscen.app.maps import load_map, map_of
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ScenarioError, in_file
 from odscen.base.given_files import read_given_text
+from odscen.runs.layout import SCENARIO_FILE
+from odscen.runs.recorded import trajectory_files
 from odscen.scenario import edits
 from odscen.scenario.checks.parking_checks import parking_problems
 from odscen.scenario.demand.day_profiles import DAY
@@ -29,8 +31,6 @@ from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import TOWN_MIX, town_day
-from odscen.sumo.folder.layout import SCENARIO_FILE
-from odscen.sumo.folder.recorded import trajectory_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 
     from odscen.app.maps import LoadedMap
     from odscen.lanegraph.graphs import MapGraph
+    from odscen.maps.store import Workspace
     from odscen.scenario.demand.entries import Entry
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.count_fit import CountFits
     from odscen.sumo.calibrate.town_day import Load
-    from odscen.workspace.store import Workspace
 
 MOST_TRIPS = 1e7
 """Of a day, as of a matrix of the document."""
@@ -225,8 +225,7 @@ def with_whole_day(
         If there is no such day, or no trips are possible, or so many.
     """
     if not 0.0 < trips <= MOST_TRIPS:
-        msg = f"trips must be above 0 and at most {MOST_TRIPS:g}, not {trips:g}"
-        raise InputError(msg)
+        raise InputError(f"trips must be above 0 and at most {MOST_TRIPS:g}, not {trips:g}")
     graph = loaded.sumo.graph
     empty = edits.new_scenario(
         graph, name=scenario.name, roi=graph.segments.ids, seed=scenario.seed
@@ -258,15 +257,16 @@ def fit(workspace: Workspace, what: Path) -> CountFits:
     folder = what if what.is_dir() else None
     scenario = read_scenario(what if folder is None else folder / SCENARIO_FILE)
     if not scenario.demand.counts:
-        msg = "the scenario has no counts; import some with: odscen demand import --counts"
-        raise InputError(msg, file=str(what))
+        raise InputError(
+            "the scenario has no counts; import some with: odscen demand import --counts",
+            file=str(what),
+        )
     loaded = map_of(workspace, scenario)
     if folder is None:
         return planned_fit(scenario, loaded.sumo)
     trajectories = trajectory_files(folder)
     if not trajectories:
-        msg = "the run has no trajectories to count in"
-        raise InputError(msg, file=str(what))
+        raise InputError("the run has no trajectories to count in", file=str(what))
     return run_fit(scenario, loaded.sumo, pl.scan_parquet(trajectories))
 
 
@@ -304,5 +304,4 @@ def _by_line(scenario: Scenario, kind: str, name: str, lines: Sequence[int]) -> 
         found = [own.sub(told, problem, count=1) for problem in problems]
         if len(found) == 1:
             raise ScenarioError(found[0]) from error
-        msg = f"{len(found)} problems"
-        raise ScenarioError(msg, problems=found) from error
+        raise ScenarioError(f"{len(found)} problems", problems=found) from error

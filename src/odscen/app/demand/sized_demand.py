@@ -4,7 +4,7 @@ Capacities of lanes and signals only propose an amount: spillback, lane changes,
 oncoming traffic and whatever else a map has that nobody has seen are not part of them. So the
 busiest hour is run with :data:`MARGIN` times what is to be promised, and the largest amount is
 taken with which that run is ``usable`` with each of :data:`SEEDS` seeds: no gridlock, nearly no
-teleports, everyone inserted and served (:mod:`odscen.results.measures.usability`).
+teleports, everyone inserted and served (:mod:`odscen.figures.measures.usability`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ import numpy as np
 from odscen.app.maps import map_of
 from odscen.app.running.runs import check_run, prepare_run
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.measures.usability import UsabilityLevel
+from odscen.figures.measures.usability import UsabilityLevel
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.demand.scaled_demand import (
     excerpt,
     part_trips,
@@ -29,18 +31,16 @@ from odscen.scenario.demand.scaled_demand import (
 )
 from odscen.scenario.document.scenario_document import Background
 from odscen.sumo.calibrate.town_day import carried_background
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_jobs import run_prepared
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.maps.store import Workspace
+    from odscen.records.run_plan import Plan
+    from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.worker.protocol import OnProgress, Progress
-    from odscen.workspace.store import Workspace
 
 MARGIN = 1.1
 """Times the promised demand that is tried."""
@@ -170,17 +170,14 @@ def sized(
     """
     known = scalable(scenario.demand)
     if not known:
-        msg = "the scenario has no matrices and no background traffic to be sized"
-        raise InputError(msg)
+        raise InputError("the scenario has no matrices and no background traffic to be sized")
     if only is not None and only not in known:
-        what = "matrix or background traffic"
-        raise NotFoundError(what, only, known)
+        raise NotFoundError("matrix or background traffic", only, known)
     trials = _Trials(workspace, scenario, only, tell)
     share = largest_share(trials.usable)
     if share is None:
         last = trials.done[-1]
-        msg = f"even {_percent(last.share)} of the demand is too much: {last.headline}"
-        raise InputError(msg)
+        raise InputError(f"even {_percent(last.share)} of the demand is too much: {last.headline}")
     if share < 1.0:
         demand = scaled(scenario.demand, share, only=only)
         scenario = scenario.model_copy(update={"demand": demand})

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from odscen.app.maps import map_of
 from odscen.base.errors import InputError, in_file
 from odscen.base.given_files import MOST, read_given, read_given_text
-from odscen.interchange.gtfs_feed import CALENDARS, NEEDED, read_feed
-from odscen.interchange.gtfs_lines import place_feed
+from odscen.formats.gtfs_feed import CALENDARS, NEEDED, read_feed
+from odscen.formats.gtfs_lines import place_feed
 from odscen.opendrive.parse import parse
 from odscen.scenario.checks.transit_checks import transit_problems
 from odscen.scenario.document.problems import refuse_errors
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.arrays import FloatArray
-    from odscen.interchange.gtfs_lines import PlacedFeed
+    from odscen.formats.gtfs_lines import PlacedFeed
+    from odscen.maps.store import Workspace
     from odscen.opendrive.road_model import Header
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 WITHIN = 30.0
 """Metres that a stop of a feed may be from its lane."""
@@ -48,7 +48,7 @@ def import_feed(
     file
         A zip archive, or the folder of its tables.
     routes, within
-        As of :func:`odscen.interchange.gtfs_lines.place_feed`.
+        As of :func:`odscen.formats.gtfs_lines.place_feed`.
 
     Raises
     ------
@@ -87,12 +87,16 @@ def projection(
     import pyproj
 
     if header.crs is None:
-        msg = "the map has no georeference that is understood, so stops cannot be placed on it"
-        raise InputError(msg, element="geoReference")
+        raise InputError(
+            "the map has no georeference that is understood, so stops cannot be placed on it",
+            element="geoReference",
+        )
     x, y, _, hdg = header.offset
     if hdg:
-        msg = f"the map is turned by {hdg:g} rad against its georeference, which is not supported"
-        raise InputError(msg, element="offset")
+        raise InputError(
+            f"the map is turned by {hdg:g} rad against its georeference, which is not supported",
+            element="offset",
+        )
     transformer = pyproj.Transformer.from_crs("EPSG:4326", header.crs, always_xy=True)
 
     def project(lon: FloatArray, lat: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -114,15 +118,14 @@ def _tables(file: Path) -> dict[str, str]:
                 name = member.filename.rpartition("/")[2]
                 if name in names:
                     if member.file_size > MOST:
-                        msg = f"{name} has {member.file_size} bytes; the limit is {MOST}"
-                        raise InputError(msg)
+                        raise InputError(
+                            f"{name} has {member.file_size} bytes; the limit is {MOST}"
+                        )
                     found[name] = archive.read(member).decode("utf-8")
             return found
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
-        msg = f"this is no zip archive that can be read: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"this is no zip archive that can be read: {error}") from error
     except UnicodeDecodeError as error:
-        msg = (
+        raise InputError(
             f"a table is not text in UTF-8: byte {error.start} is {error.object[error.start]:#04x}"
-        )
-        raise InputError(msg) from error
+        ) from error

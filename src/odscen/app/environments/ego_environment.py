@@ -22,8 +22,7 @@ from odscen.base.errors import InputError, MissingDependencyError
 try:
     import gymnasium
 except ImportError as error:
-    msg = "environments need gymnasium: pip install 'odscen[rl]'"
-    raise MissingDependencyError(msg) from error
+    raise MissingDependencyError("environments need gymnasium: pip install 'odscen[rl]'") from error
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,9 +30,9 @@ if TYPE_CHECKING:
     from odscen.app.environments.driving_tasks import Reward
     from odscen.learning.behaviour.behaviour_model import RoadObservation
     from odscen.learning.fill import Array
+    from odscen.maps.store import Workspace
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.workspace.store import Workspace
 
 
 class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without the extra
@@ -98,23 +97,22 @@ class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without 
         self._run = SteppedRun(workspace, scenario, settings=replace(settings, seed=drawn))
         egos = np.flatnonzero(self._run.scene.ego)
         if len(egos) != 1:
-            msg = f"the scenario has {len(egos)} egos that drive; this environment is of one"
-            raise InputError(msg)
+            raise InputError(
+                f"the scenario has {len(egos)} egos that drive; this environment is of one"
+            )
         self._ego = int(egos[0])
         seen = self._run.see()
         while seen is not None and not self._find(seen):
             self._run.drive(*accelerated(seen, self._run.scene, {}))
             seen = self._run.see()
         if seen is None:
-            msg = "the ego never departs"
-            raise InputError(msg)
+            raise InputError("the ego never departs")
         return self._look(), {"time": seen.time}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Drive for a step."""
         if self._run is None:
-            msg = "reset the environment first"
-            raise InputError(msg)
+            raise InputError("reset the environment first")
         scene = self._run.scene
         wanted = {self._row: float(np.asarray(action).reshape(-1)[0])}
         self._run.drive(*accelerated(self._seen, scene, wanted))

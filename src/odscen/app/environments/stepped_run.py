@@ -23,9 +23,9 @@ from odscen.learning.behaviour.behaviour_messages import (
     scene_from_bytes,
 )
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
-from odscen.results.records.outcomes import RunStatus
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.records.outcomes import RunStatus
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
         DrivingAction,
         RoadObservation,
     )
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.workspace.store import Workspace
 
 LEAN = RunSettings(recording=Recording(emissions=False), slice_length=None)
 """How such a run is made if nothing else is said."""

@@ -23,8 +23,9 @@ try:
     import gymnasium
     import pettingzoo
 except ImportError as error:
-    msg = "environments need gymnasium and pettingzoo: pip install 'odscen[rl]'"
-    raise MissingDependencyError(msg) from error
+    raise MissingDependencyError(
+        "environments need gymnasium and pettingzoo: pip install 'odscen[rl]'"
+    ) from error
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,9 +34,9 @@ if TYPE_CHECKING:
     from odscen.app.environments.driving_tasks import Reward
     from odscen.learning.behaviour.behaviour_model import RoadObservation
     from odscen.learning.fill import Array
+    from odscen.maps.store import Workspace
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.workspace.store import Workspace
 
 
 class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of Gymnasium
@@ -105,8 +106,7 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
         self._run = SteppedRun(workspace, scenario, settings=replace(settings, seed=drawn))
         self._seen = self._run.see()
         if self._seen is None:
-            msg = "no vehicle ever departs"
-            raise InputError(msg)
+            raise InputError("no vehicle ever departs")
         self.agents = self._names(self._seen)
         return self._views(self._seen), {name: {} for name in self.agents}
 
@@ -121,8 +121,7 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
     ]:
         """Drive for a step."""
         if self._run is None or self._seen is None:
-            msg = "reset the environment first"
-            raise InputError(msg)
+            raise InputError("reset the environment first")
         before = self._seen
         rows = {name: row for row, name in enumerate(self._names(before))}
         wanted = {

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from odscen.app.exchange.xosc_files import GivenXosc, SentFiles, read_tree
 from odscen.app.scenario_imports import plan_text, read_files, wanted_map
 from odscen.base.errors import InputError
+from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -67,7 +67,10 @@ def _main(given: tuple[GivenXosc, ...]) -> int:
             return found[0]
         if found:
             names = ", ".join(given[row].name for row in found)
-            msg = f"these are {len(found)} scenarios ({names}): send one at a time, with its map"
-            raise InputError(msg)
-    msg = "there is no scenario among the files: none has a Storyboard"
-    raise InputError(msg, file=", ".join(one.name for one in given))
+            raise InputError(
+                f"these are {len(found)} scenarios ({names}): send one at a time, with its map"
+            )
+    raise InputError(
+        "there is no scenario among the files: none has a Storyboard",
+        file=", ".join(one.name for one in given),
+    )

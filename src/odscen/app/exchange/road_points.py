@@ -11,7 +11,7 @@ from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 
 if TYPE_CHECKING:
-    from odscen.workspace.map_entry import MapEntry
+    from odscen.maps.map_entry import MapEntry
 
 
 class RoadPoints:

@@ -11,18 +11,18 @@ from odscen.app.exchange.xosc_files import bare_map
 from odscen.base.checksums import digest
 from odscen.base.errors import InputError
 from odscen.base.shown import printable
+from odscen.maps.allowances import for_import
+from odscen.maps.child_process import work_in_child
+from odscen.maps.folder_names import check_name, name_from_file
 from odscen.scenario.document.json_form import loads
-from odscen.workspace.allowances import for_import
-from odscen.workspace.child_process import work_in_child
-from odscen.workspace.folder_names import check_name, name_from_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.interchange.openscenario_import.xosc_reader import EgoDriver
+    from odscen.formats.openscenario_import.xosc_reader import EgoDriver
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import ProgressCallback, Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.store import ProgressCallback, Workspace
 
 _JOBS = "odscen.app.exchange.import_jobs"
 _MOST_FILES = 40
@@ -138,8 +138,9 @@ def _map(
     if not bare:
         if len(maps) == 1:
             return _added(workspace, maps[0], progress)
-        msg = "it names no map (RoadNetwork/LogicFile): send one map together with it"
-        raise InputError(msg, file=file)
+        raise InputError(
+            "it names no map (RoadNetwork/LogicFile): send one map together with it", file=file
+        )
     for one in maps:
         if bare_map(one.name).lower() == bare.lower():
             return _added(workspace, one, progress)
@@ -149,11 +150,11 @@ def _map(
             return workspace.map(name), False
     sent = ", ".join(one.name for one in maps)
     others = f" What was sent is {sent}." if sent else ""
-    msg = (
+    raise InputError(
         f"it plays on the map {bare + '.xodr'!r}, which is neither among the files nor in the "
-        f"workspace.{others} Send that map together with the scenario, or add it first."
+        f"workspace.{others} Send that map together with the scenario, or add it first.",
+        file=file,
     )
-    raise InputError(msg, file=file)
 
 
 def _added(

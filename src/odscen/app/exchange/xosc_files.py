@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.store import Workspace
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import Workspace
 
 _MOST = 20_000_000
 """Bytes of an OpenSCENARIO file or catalog."""
@@ -172,8 +172,10 @@ class SentFiles:
         for row, one in enumerate(self.given):
             if one.name == bare and row != self.main:
                 return SentFiles(row, self.given, self.map_name)
-        msg = f"it varies the scenario {bare!r}, which was not sent with it; send both files"
-        raise InputError(msg, file=self.name)
+        raise InputError(
+            f"it varies the scenario {bare!r}, which was not sent with it; send both files",
+            file=self.name,
+        )
 
     def catalogs(self, folders: tuple[str, ...]) -> Iterator[tuple[_Element, str]]:  # noqa: ARG002 - they are told by their names
         """All other files of OpenSCENARIO, whatever folders are named."""
@@ -233,8 +235,7 @@ def read_tree(path: Path, *, name: str) -> _Element:
     except InputError as error:
         raise InputError(error.problem, file=name) from error
     if root.tag != "OpenSCENARIO":
-        msg = f"the root element is {root.tag!r}, not 'OpenSCENARIO'"
-        raise InputError(msg, file=name)
+        raise InputError(f"the root element is {root.tag!r}, not 'OpenSCENARIO'", file=name)
     return root
 
 

@@ -14,8 +14,8 @@ from odscen.app.export import export, export_run
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 NOTES = ".export.json"
 """Ending of the file that says what a format cannot."""

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from odscen.app.learned.learned_maps import WholeMap
     from odscen.learning.fill import FillRequest
     from odscen.learning.traffic_snapshots import LightView, Shard
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Actor
-    from odscen.workspace.store import Workspace
 
 
 def scenes_of(workspace: Workspace, shards: Sequence[Shard]) -> list[TrafficScene]:
@@ -43,8 +43,7 @@ def scenes_of(workspace: Workspace, shards: Sequence[Shard]) -> list[TrafficScen
                     )
                 )
     if not found:
-        msg = f"the snapshots of {shards[0].map_name} have no vehicles to compare with"
-        raise InputError(msg)
+        raise InputError(f"the snapshots of {shards[0].map_name} have no vehicles to compare with")
     return found
 
 

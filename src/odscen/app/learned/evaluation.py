@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from odscen.learning.reference.traffic_model import TrafficModel
     from odscen.learning.traffic_metrics import VehicleRows
     from odscen.learning.traffic_snapshots import LightView, Shard
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Actor, Scenario
-    from odscen.workspace.store import Workspace
 
 FLOOR, REFERENCE, BINNED, RANDOM = "SUMO", "reference", "binned statistics", "random fill"
 NEAR = 1
@@ -187,8 +187,11 @@ def evaluate_scenarios(
         mine = [one for one in shards if one.map_name == name]
         if not mine:
             known = ", ".join(sorted({one.map_name for one in shards}))
-            msg = f"there are no snapshots of map {name!r} to compare with; there are of {known}"
-            raise InputError(msg, file=str(folder), element="data")
+            raise InputError(
+                f"there are no snapshots of map {name!r} to compare with; there are of {known}",
+                file=str(folder),
+                element="data",
+            )
         on = whole_map(workspace.map_for(name, mine[0].map_sha256))
         compared = _ComparedMap(on, scenes_of(workspace, mine), workspace)
         own = [one for one in scenarios if one.map.name == name]

@@ -13,15 +13,15 @@ from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.base.arrays import FloatArray
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 HARD = 4.0
 """m/s²; a vehicle that brakes harder brakes hard. SUMO's cars brake with up to 4.5 as a habit."""
@@ -64,8 +64,9 @@ def first_seconds(workspace: Workspace, scenarios: Sequence[Scenario]) -> list[F
         found = []
         for run in run_all(checked, reports=False, figures=False):
             if run.exit_code == 3:
-                msg = f"the run has failed: {run.known.get('error')}"
-                raise InputError(msg, file=run.known.get("scenario"))
+                raise InputError(
+                    f"the run has failed: {run.known.get('error')}", file=run.known.get("scenario")
+                )
             rows = run.trajectories()
             rows = rows.filter(rows["category"] != str(Category.PEDESTRIAN))
             first = rows.filter(rows["time"] < STEP / 2.0)["id"].to_list()

@@ -18,17 +18,17 @@ from odscen.base.version import __version__
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.learning.behaviour.imitation_driver import BINS, learned_driver, network_bytes
 from odscen.learning.reference.small_network import softmax
-from odscen.results.records.outcomes import RunStatus
+from odscen.records.outcomes import RunStatus
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.named_random import stream
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from odscen.base.arrays import FloatArray
     from odscen.learning.fill import Array
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 RECORDER = "odscen.learning.behaviour.driving_recorder:DrivingRecorder"
 _DENSITY = (4.0, 14.0)
@@ -86,8 +86,9 @@ def learn_driving(
     kept = [name for name in maps if town_of(name) not in hold_out]
     rows = [one for name in kept for one in recorded[name] if len(one[0])]
     if not rows:
-        msg = "nothing is left to learn from: no maps, or all are held out"
-        raise InputError(msg, element="hold-out")
+        raise InputError(
+            "nothing is left to learn from: no maps, or all are held out", element="hold-out"
+        )
     x, acceleration = (np.concatenate([one[k] for one in rows]) for k in (0, 1))
     network = learned_driver(x, acceleration, np.random.default_rng(seed))
     about = {"maps": kept, "runs": runs, "rows": len(x), "seed": seed, "odscen": __version__}
@@ -119,7 +120,7 @@ def _recorded(
         )
         (run,) = run_all([checked], reports=False)
         if run.status is not RunStatus.COMPLETED:
-            raise SimulationError(f"{name}: {run.summary['error']}")  # noqa: EM102
+            raise SimulationError(f"{name}: {run.summary['error']}")
         with np.load(file) as arrays:
             return arrays["x"].astype(np.float32), arrays["acceleration"]
 

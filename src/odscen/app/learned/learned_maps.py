@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
     from odscen.app.maps import LoadedMap
     from odscen.learning.traffic_snapshots import LightView, Shard
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import Workspace
     from odscen.scenario.placing.supply import Supply
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.store import Workspace
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from odscen.learning.reference.traffic_model import TrafficModel
     from odscen.learning.traffic_snapshots import Shard
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 
 def train(
@@ -82,8 +82,10 @@ def kept(shards: Sequence[Shard], hold_out: Sequence[str]) -> list[Shard]:
     towns = sorted({one.town for one in shards})
     for town in hold_out:
         if town not in towns:
-            msg = f"there is no town {town!r} in the data; there are {', '.join(towns)}"
-            raise InputError(msg, element="hold-out")
+            raise InputError(
+                f"there is no town {town!r} in the data; there are {', '.join(towns)}",
+                element="hold-out",
+            )
     return [one for one in shards if one.town not in hold_out]
 
 

@@ -31,6 +31,8 @@ from odscen.learning.traffic_snapshots import (
     shard_bytes,
     shard_from_bytes,
 )
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.scenario_document import (
@@ -40,8 +42,6 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Simulation,
 )
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.signals_ahead import lights_at
 
 if TYPE_CHECKING:
@@ -52,9 +52,9 @@ if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
     from odscen.lanegraph.graphs import MapGraph
     from odscen.learning.traffic_snapshots import LightView
-    from odscen.sumo.folder.finished_run import Run
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
     from odscen.sumo.realize.signals_ahead import LightLog
-    from odscen.workspace.store import Workspace
 
 SUFFIX = ".shard.npz"
 SKIPPED = ".skipped.json"
@@ -104,14 +104,19 @@ class DataSettings:
     def __post_init__(self) -> None:
         low, high = self.density
         if not 0 < low <= high <= 200:
-            msg = f"densities lie between 0 and 200 vehicles per km, not {low:g} to {high:g}"
-            raise InputError(msg, element="density")
+            raise InputError(
+                f"densities lie between 0 and 200 vehicles per km, not {low:g} to {high:g}",
+                element="density",
+            )
         if self.runs < 1 or self.snapshots < 1:
-            msg = f"at least one run and one snapshot are needed, not {self.runs}"
-            raise InputError(msg, element="runs")
+            raise InputError(
+                f"at least one run and one snapshot are needed, not {self.runs}", element="runs"
+            )
         if self.duration < self.warm_up + BRAKING_SECONDS + 1.0:
-            msg = f"a run of {self.duration:g} s has no snapshot after {self.warm_up:g} s"
-            raise InputError(msg, element="duration")
+            raise InputError(
+                f"a run of {self.duration:g} s has no snapshot after {self.warm_up:g} s",
+                element="duration",
+            )
 
 
 class MadeShard(NamedTuple):
@@ -141,8 +146,9 @@ def make_shards(
     """
     names = list(maps) or [entry.name for entry in workspace.maps()]
     if not names:
-        msg = f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
-        raise InputError(msg)
+        raise InputError(
+            f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
+        )
     entries = [workspace.map(name) for name in names]
     out.mkdir(parents=True, exist_ok=True)
     made = []
@@ -166,8 +172,9 @@ def read_shards(folder: Path) -> list[Shard]:
     """
     files = sorted(folder.glob(f"*{SUFFIX}"))
     if not files:
-        msg = f"no *{SUFFIX} in this folder; make some with: odscen learn data"
-        raise InputError(msg, file=str(folder))
+        raise InputError(
+            f"no *{SUFFIX} in this folder; make some with: odscen learn data", file=str(folder)
+        )
     return [shard_from_bytes(file.read_bytes(), file=str(file)) for file in files]
 
 
@@ -372,7 +379,7 @@ def braking_of(rows: pl.DataFrame, time: float, ids: Sequence[str]) -> Any:
 def _light_logs(run: Run) -> dict[str, LightLog]:
     import polars as pl
 
-    from odscen.sumo.folder.layout import LIGHT_STATES_FILE
+    from odscen.runs.layout import LIGHT_STATES_FILE
 
     file = run.folder / LIGHT_STATES_FILE
     logs: dict[str, LightLog] = {}

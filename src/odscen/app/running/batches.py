@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.app.running.runs import check_given, prepare_run, report_run
 from odscen.app.scenarios import scenario_name
-from odscen.sumo.realize.run_settings import AS_DESIGNED
+from odscen.runs.run_settings import AS_DESIGNED
 from odscen.sumo.runner.run_jobs import RunJob
 from odscen.sumo.runner.run_jobs import run_many as run_jobs
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
     from odscen.app.running.runs import CheckedRun
     from odscen.base.errors import InputError
-    from odscen.results.records.assignment_steps import AssignmentStep
+    from odscen.maps.store import Workspace
+    from odscen.records.assignment_steps import AssignmentStep
+    from odscen.runs.finished_run import Run
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.run_jobs import PreparedRun
     from odscen.sumo.worker.protocol import Progress
-    from odscen.workspace.store import Workspace
 
 
 def run_all(

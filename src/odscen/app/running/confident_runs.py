@@ -20,18 +20,18 @@ from typing import TYPE_CHECKING, Any
 from odscen.app.running.batches import run_many
 from odscen.app.scenarios import scenario_name
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.measures.registry import names_of, run_figure
-from odscen.results.records.outcomes import RunStatus
-from odscen.sumo.realize.run_settings import AS_DESIGNED
+from odscen.figures.measures.registry import names_of, run_figure
+from odscen.records.outcomes import RunStatus
+from odscen.runs.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.workspace.store import Workspace
 
 FIGURE = "mean_delay"
 """The figure whose interval is wanted unless another is named."""
@@ -144,8 +144,7 @@ def parse_share(text: str) -> float:
     except ValueError:
         share, rest = math.nan, ""
     if rest or not 0.0 < share < 1.0:
-        msg = f"{text!r} is no share of the mean; write for example 5 % or 0.05"
-        raise InputError(msg)
+        raise InputError(f"{text!r} is no share of the mean; write for example 5 % or 0.05")
     return share
 
 
@@ -191,8 +190,7 @@ def run_until_confident(
         If there is no such figure.
     """
     if run_figure(figure) is None:
-        what = "figure"
-        raise NotFoundError(what, figure, names_of("run"))
+        raise NotFoundError("figure", figure, names_of("run"))
     done: list[Run] = []
     batch = list(seeds)[:most]
     while True:

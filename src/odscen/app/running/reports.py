@@ -12,34 +12,34 @@ from odscen.app.maps import load_map
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.stored_files import tables
 from odscen.base.text_files import write_text
-from odscen.results.by_place.analysis_times import AnalysisTimes
-from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
-from odscen.results.by_place.traffic import TABLES, over_run
-from odscen.results.measures.registry import figure_values
-from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.measures.traffic_files import read_stations, read_tables
-from odscen.results.records.assignment_steps import Assignment
-from odscen.results.records.light_programs import programs_from_json
-from odscen.results.records.outcomes import RunStatus
-from odscen.results.records.row_text import rounded
-from odscen.results.records.run_events import events_from_json
-from odscen.results.records.run_plan import Plan
-from odscen.results.report.place_shapes import place_shapes
-from odscen.results.report.run_report import render_report
-from odscen.results.report.signals.report_signals import LightsOfRun
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.deferred_figures import whole_summary
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.measured import read_parking, read_run_data
-from odscen.sumo.folder.recorded import (
+from odscen.figures.by_place.analysis_times import AnalysisTimes
+from odscen.figures.by_place.corridors import busiest_corridor, corridor_along, path_between
+from odscen.figures.by_place.traffic import TABLES, over_run
+from odscen.figures.measures.registry import figure_values
+from odscen.figures.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
+from odscen.figures.measures.summary import actors_from_json
+from odscen.figures.measures.traffic_files import read_stations, read_tables
+from odscen.records.assignment_steps import Assignment
+from odscen.records.light_programs import programs_from_json
+from odscen.records.outcomes import RunStatus
+from odscen.records.row_text import rounded
+from odscen.records.run_events import events_from_json
+from odscen.records.run_plan import Plan
+from odscen.reports.place_shapes import place_shapes
+from odscen.reports.run_report import render_report
+from odscen.reports.signals.report_signals import LightsOfRun
+from odscen.runs import layout
+from odscen.runs.deferred_figures import whole_summary
+from odscen.runs.finished_run import Run
+from odscen.runs.measured import read_parking, read_run_data
+from odscen.runs.recorded import (
     read_conflicts,
     read_light_states,
     read_trajectories,
     read_visits,
 )
-from odscen.sumo.folder.run_status import unfinished
-from odscen.sumo.folder.run_sums import damaged_in, seal_again
+from odscen.runs.run_status import unfinished
+from odscen.runs.run_sums import damaged_in, seal_again
 from odscen.sumo.outputs.corridor_traces import corridor_traces
 from odscen.sumo.runner.long_runs import run_lock
 
@@ -49,11 +49,11 @@ if TYPE_CHECKING:
     from typing import Any
 
     from odscen.app.maps import LoadedMap
-    from odscen.results.by_place.corridors import Corridor
-    from odscen.results.by_place.parking_use import ParkingUse
-    from odscen.results.by_place.traffic import TrafficFigures
-    from odscen.results.measures.figure import RunData
-    from odscen.workspace.store import Workspace
+    from odscen.figures.by_place.corridors import Corridor
+    from odscen.figures.by_place.parking_use import ParkingUse
+    from odscen.figures.by_place.traffic import TrafficFigures
+    from odscen.figures.measures.figure import RunData
+    from odscen.maps.store import Workspace
 
 REPORT_ROWS = 2_000_000
 """Rows of trajectories that a report is made from at most; a day of a town has far more."""
@@ -227,8 +227,7 @@ def _folder_of(workspace: Workspace, run: Run | Path) -> Path:
     folder = run if run.is_dir() else workspace.runs / run
     if not folder.is_dir():
         names = [path.name for path in workspace.runs.glob("*")]
-        msg = "run"
-        raise NotFoundError(msg, str(run), names)
+        raise NotFoundError("run", str(run), names)
     return folder
 
 
@@ -286,6 +285,5 @@ def _completed(folder: Path) -> dict[str, Any]:
     for one in damaged_in(folder, only=layout.REPORT_FILE):
         logging.getLogger("odscen").warning("%s: %s; it is written anew", folder, one)
     if summary["status"] != RunStatus.COMPLETED:
-        msg = f"run {folder.name!r} has not completed, it is {summary['status']!r}"
-        raise InputError(msg)
+        raise InputError(f"run {folder.name!r} has not completed, it is {summary['status']!r}")
     return summary

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from odscen.sumo.folder.finished_run import Run
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
     from odscen.sumo.runner.worker_process import Companion
     from odscen.sumo.worker.protocol import OnProgress
-    from odscen.workspace.store import Workspace
 
 
 def resume(

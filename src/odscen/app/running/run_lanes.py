@@ -9,18 +9,18 @@ import numpy as np
 from odscen.app.maps import map_of
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError
-from odscen.results.by_place.lane_places import LanePlaces
-from odscen.results.by_place.lane_traffic import LaneTraffic, lane_traffic
-from odscen.sumo.folder.ended import read_summary
-from odscen.sumo.folder.layout import LANE_PLACES_FILE, SCENARIO_FILE
-from odscen.sumo.folder.recorded import read_lanes
+from odscen.figures.by_place.lane_places import LanePlaces
+from odscen.figures.by_place.lane_traffic import LaneTraffic, lane_traffic
+from odscen.runs.ended import read_summary
+from odscen.runs.layout import LANE_PLACES_FILE, SCENARIO_FILE
+from odscen.runs.recorded import read_lanes
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.arrays import Int32Array
+    from odscen.maps.store import Workspace
     from odscen.sumo.realize.sumo_map import SumoMap
-    from odscen.workspace.store import Workspace
 
 
 class NodeStretches(NamedTuple):
@@ -48,8 +48,9 @@ def traffic_on_map(workspace: Workspace, run: Path) -> TrafficOnMap:
     """
     lanes, file = read_lanes(run), run / LANE_PLACES_FILE
     if lanes is None or not file.is_file():
-        msg = "the run has no lane data: nothing was measured, or no vehicle departed"
-        raise InputError(msg, file=str(run))
+        raise InputError(
+            "the run has no lane data: nothing was measured, or no vehicle departed", file=str(run)
+        )
     places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
     end = float(read_summary(run)["sim_seconds"])
     found = lane_traffic(lanes, places, end=end)

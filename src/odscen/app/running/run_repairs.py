@@ -18,22 +18,22 @@ from odscen.app.running.reports import write_report
 from odscen.base.checksums import SUMS_FILE, file_digest, read_sums, write_sums
 from odscen.base.errors import DamagedFile, InputError, OdscenError
 from odscen.base.folder_locks import is_locked
-from odscen.results.by_place.analysis_times import AnalysisTimes
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_plan import Plan
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.checkpoint import last_number, read_checkpoint
-from odscen.sumo.folder.ended import read_summary
-from odscen.sumo.folder.measured import read_run_data, write_figures
-from odscen.sumo.folder.run_status import read_status, unfinished, write_status
-from odscen.sumo.folder.run_sums import damaged_in, seal_again, seal_run, seal_start, without_sums
+from odscen.figures.by_place.analysis_times import AnalysisTimes
+from odscen.figures.measures.summary import actors_from_json
+from odscen.records.run_plan import Plan
+from odscen.runs import layout
+from odscen.runs.checkpoint import last_number, read_checkpoint
+from odscen.runs.ended import read_summary
+from odscen.runs.measured import read_run_data, write_figures
+from odscen.runs.run_status import read_status, unfinished, write_status
+from odscen.runs.run_sums import damaged_in, seal_again, seal_run, seal_start, without_sums
 from odscen.sumo.runner.long_runs import about, run_lock
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 _NET = f"{layout.SUMO_FOLDER}/{layout.NET_FILE}"
 _STATUS = DamagedFile(layout.STATUS_FILE, "its own checksum", "another one")
@@ -72,8 +72,7 @@ def _repaired(
         try:
             done = [_rebuild(workspace, run, one) for one in _in_order(damaged)]
             if left := _damage(run):
-                msg = f"still: {listed(left)}"
-                raise InputError(msg)
+                raise InputError(f"still: {listed(left)}")
         except (OdscenError, ValueError, KeyError) as error:
             root = workspace.root if run.parent == workspace.runs else run.parent
             place = set_aside(run, root)
@@ -111,8 +110,7 @@ def _rebuild(workspace: Workspace, run: Path, one: DamagedFile) -> str:
         return _report_again(workspace, run)
     if one.file == layout.LOG_FILE or (one.file == layout.SUMMARY_FILE and unfinished(run)):
         return _without(run, one.file)
-    msg = f"nothing else says what was in {one.file}"
-    raise InputError(msg)
+    raise InputError(f"nothing else says what was in {one.file}")
 
 
 def _is_figures(name: str) -> bool:
@@ -126,8 +124,7 @@ def _list_again(run: Path) -> str:
     names = [match[2].decode("utf-8", "replace") for match in found if match]
     wrong = [match for match in found if match is None or not _true(run, match)]
     if len(wrong) > 1:
-        msg = f"{len(wrong)} of its lines are not true"
-        raise InputError(msg)
+        raise InputError(f"{len(wrong)} of its lines are not true")
     whole = {name: file_digest(run / name) for name in names if (run / name).is_file()}
     if wrong:  # the damage is in this line, so that its file is looked for among the others
         (seal_start if unfinished(run) else _seal_all)(run)
@@ -153,8 +150,7 @@ def _net_again(workspace: Workspace, run: Path, one: DamagedFile) -> str:
     entry = workspace.map_for(str(known.get("map")), str(known.get("map_sha256")))
     net = entry.checked("net")
     if file_digest(net) != one.expected:
-        msg = f"map {entry.name!r} has another network today"
-        raise InputError(msg)
+        raise InputError(f"map {entry.name!r} has another network today")
     target = run / one.file
     target.unlink(missing_ok=True)
     try:

@@ -3,7 +3,7 @@
 The command line, the page, suites of tests, and CARLA beside or instead of SUMO all go this way:
 :func:`check_run`, then :func:`prepare_run`, then :func:`carry_out`; or :func:`run`, which does all
 of it, and :mod:`~odscen.app.running.batches` for several. What a run is to be like is one
-:class:`~odscen.sumo.realize.run_settings.RunSettings` from here down to SUMO's process.
+:class:`~odscen.runs.run_settings.RunSettings` from here down to SUMO's process.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import in_file
-from odscen.results.judging.criteria import criteria_problems
+from odscen.figures.judging.criteria import criteria_problems
+from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.problems import refuse_errors
-from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.runner.assignment import prepare_assigned
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from odscen.app.maps import LoadedMap
-    from odscen.results.records.assignment_steps import AssignmentStep
+    from odscen.maps.asset_catalogue import Assets
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import Workspace
+    from odscen.records.assignment_steps import AssignmentStep
+    from odscen.runs.finished_run import Run
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.run_jobs import PreparedRun
     from odscen.sumo.runner.worker_process import Companion, Ended
     from odscen.sumo.worker.protocol import OnProgress
-    from odscen.workspace.asset_catalogue import Assets
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.store import Workspace
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import ScenarioError, in_file
 from odscen.base.given_files import read_given
-from odscen.interchange.trajectory_table import read_trajectories_table, trajectory_rows
+from odscen.formats.trajectory_table import read_trajectories_table, trajectory_rows
+from odscen.runs.finished_run import Run
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.validation import validated
-from odscen.sumo.folder.finished_run import Run
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,7 +37,7 @@ def attach_trajectory(
     Parameters
     ----------
     source
-        CSV or Parquet, see :mod:`odscen.interchange.trajectory_table`, or the folder of a run.
+        CSV or Parquet, see :mod:`odscen.formats.trajectory_table`, or the folder of a run.
     of
         Who was recorded; not needed if there is one only.
     begin
@@ -53,8 +53,7 @@ def attach_trajectory(
     """
     if actor not in {one.id for one in scenario.actors}:
         known = ", ".join(one.id for one in scenario.actors[:8]) or "none"
-        msg = f"there is no actor {actor!r}; there are {known}"
-        raise ScenarioError(msg)
+        raise ScenarioError(f"there is no actor {actor!r}; there are {known}")
     with in_file(str(source)):
         recorded, rows = trajectory_rows(_table(source), of=of)
     name, step = f"replay-{actor}", scenario.simulation.step_length

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.app.running.runs import carry_out, check_given, prepare_run
 from odscen.base.errors import ConflictError
+from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.validation import validated
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.rules.story_files import story_plan
-from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.runner.elevation import ElevationLookup
 from odscen.sumo.runner.in_step import InStep
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.running.runs import CheckedRun
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.in_step import Step
-    from odscen.workspace.store import Workspace
 
 _LISTEN = 0.2
 """Wall seconds after which a wait looks for Ctrl-C, see ``run_jobs``."""
@@ -95,8 +95,9 @@ class WatchedRun:
             If it has not ended.
         """
         if self._run is None:
-            msg = "the run has not ended; it ends with its last step, or with the block of watch"
-            raise ConflictError(msg)
+            raise ConflictError(
+                "the run has not ended; it ends with its last step, or with the block of watch"
+            )
         return self._run
 
     def act(self, actor: str, **action: Any) -> None:
@@ -132,8 +133,7 @@ class WatchedRun:
             If no step is being looked at.
         """
         if not self._handed or self._over:
-            msg = "rules are given while a step is looked at, inside the loop"
-            raise ConflictError(msg)
+            raise ConflictError("rules are given while a step is looked at, inside the loop")
         made = validated(StoryRule, rule)
         known, on = self._checked.scenario, self._map
         whole = known.model_copy(update={"rules": (*self._rules, made)})

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import JunctionTiming
     from odscen.scenario.signals.green_wave import Favoured
     from odscen.sumo.calibrate.corridor_lights import CorridorDirection
     from odscen.sumo.calibrate.light_timing import LightTimes
-    from odscen.workspace.store import Workspace
 
 COORDINATION = "corridor"
 """Name of the coordination of lights with programs of their own."""
@@ -172,18 +172,19 @@ def coordinate_signals(
     scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
     if bool(junctions) == bool(along):
-        msg = "name either the junctions of the corridor or the roads along which it leads"
-        raise InputError(msg)
+        raise InputError(
+            "name either the junctions of the corridor or the roads along which it leads"
+        )
     if speed is not None and not speed > 0.0:
-        msg = f"a progression speed of {speed:g} m/s: it has to be positive"
-        raise InputError(msg)
+        raise InputError(f"a progression speed of {speed:g} m/s: it has to be positive")
     refuse_errors(signal_problems(scenario.signals, loaded.lights))
     finder = CorridorFinder(loaded.sumo)
     numbers = chosen_lights(loaded, junctions) if junctions else _along(loaded, along)
     if len(numbers) < 2:
         named = ", ".join(junctions or along)
-        msg = f"a corridor needs two traffic lights, but {named:.200} has {len(numbers)}"
-        raise InputError(msg)
+        raise InputError(
+            f"a corridor needs two traffic lights, but {named:.200} has {len(numbers)}"
+        )
     if along:
         numbers = finder.in_order(numbers)
     return _coordinated(scenario, loaded, finder, numbers, favoured, speed, cycle)
@@ -203,8 +204,9 @@ def _coordinated(
     views = [loaded.lights[n] for n in numbers]
     names = [", ".join(view.names) for view in views]
     if out is None and back is None:
-        msg = f"one cannot drive through junctions {' - '.join(names)} in this order, nor back"
-        raise InputError(msg)
+        raise InputError(
+            f"one cannot drive through junctions {' - '.join(names)} in this order, nor back"
+        )
     shown = [one.shown for one in realized_lights(scenario, loaded.sumo)]
     plans = [plan_at(shown[n], 0.0) for n in numbers]
     cycle = cycle or max(plan.cycle for plan in plans)

@@ -13,7 +13,7 @@ from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
 from odscen.app.signals.signal_optimisation import chosen_lights
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.records.light_programs import stage_spans
+from odscen.records.light_programs import stage_spans
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.signals_document import JunctionTiming, ProgramGroup, ProgramStage
@@ -23,9 +23,9 @@ from odscen.sumo.realize.lights.light_realization import realized_lights
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.results.records.light_programs import LightProgram
+    from odscen.maps.store import Workspace
+    from odscen.records.light_programs import LightProgram
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 _DAY = 86_400.0
 
@@ -64,8 +64,7 @@ def stretch_cycle(
     if plan is not None:
         own = [one for one in shown.plans if one.id == plan]
         if not own:
-            what = "plan of the day"
-            raise NotFoundError(what, plan, [one.id for one in shown.plans])
+            raise NotFoundError("plan of the day", plan, [one.id for one in shown.plans])
         shown = replace(shown, plans=tuple(own))
     timing = timing_of(scenario, shown.junctions)
     times = stretched(shown, loaded.lights[number], timing, cycle)
@@ -97,8 +96,9 @@ def take_over_program(workspace: Workspace, scenario: Scenario | Path, junction:
     view = loaded.lights[number]
     old = timing_of(scenario, view.names) or JunctionTiming(junction=view.names[0])
     if old.stages:
-        msg = f"the light of junction {junction!r} has a program of this scenario already"
-        raise InputError(msg)
+        raise InputError(
+            f"the light of junction {junction!r} has a program of this scenario already"
+        )
     # With fixed-time control every stage comes, and lasts its green.
     fixed = old.model_copy(update={"control": "fixed", "bus_priority": False, "detectors": ()})
     plain = with_timings(scenario, [fixed])

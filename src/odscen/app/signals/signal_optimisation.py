@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.turning_volumes import Volumes
-    from odscen.workspace.store import Workspace
 
 
 _MOST_SATURATION = 100_000.0
@@ -141,11 +141,10 @@ def time_signals(
     lights = {number: timer.timed(number) for number in chosen}
     timed = timer.in_step({n: one for n, one in lights.items() if one is not None})
     if not timed:
-        msg = (
+        raise InputError(
             f"no vehicle that departs between {volumes.begin:g} and {volumes.end:g} s comes to a "
             "traffic light"
         )
-        raise InputError(msg)
     without = tuple(", ".join(loaded.lights[n].names) for n, one in lights.items() if one is None)
     entries = [retimed(scenario, one.times) for one in timed.values()]
     new = with_timings(scenario, entries)
@@ -165,13 +164,11 @@ def chosen_lights(loaded: LoadedMap, junctions: Sequence[str]) -> list[int]:
     """
     names = {name: number for number, light in enumerate(loaded.lights) for name in light.names}
     if not names:
-        msg = f"map {loaded.entry.name!r} has no traffic lights"
-        raise InputError(msg)
+        raise InputError(f"map {loaded.entry.name!r} has no traffic lights")
     found = []
     for name in junctions:
         if name not in names:
-            what = "traffic light in junction"
-            raise NotFoundError(what, name, list(names))
+            raise NotFoundError("traffic light in junction", name, list(names))
         found.append(names[name])
     return list(dict.fromkeys(found)) if junctions else list(range(len(loaded.lights)))
 
@@ -187,8 +184,9 @@ def refuse_interval(scenario: Scenario, begin: float | None, end: float | None) 
     duration = scenario.simulation.duration
     first, last = begin or 0.0, duration if end is None else end
     if not 0.0 <= first < last <= duration:
-        msg = f"{first:g} to {last:g} s is no part of the scenario, which lasts {duration:g} s"
-        raise InputError(msg)
+        raise InputError(
+            f"{first:g} to {last:g} s is no part of the scenario, which lasts {duration:g} s"
+        )
 
 
 def _refuse_settings(
@@ -200,14 +198,14 @@ def _refuse_settings(
 ) -> None:
     refuse_interval(scenario, begin, end)
     if not 0.0 < bounds[0] <= bounds[1]:
-        msg = f"a shortest cycle of {bounds[0]:g} s and a longest of {bounds[1]:g} s: none is both"
-        raise InputError(msg)
+        raise InputError(
+            f"a shortest cycle of {bounds[0]:g} s and a longest of {bounds[1]:g} s: none is both"
+        )
     if not 1.0 <= saturation <= _MOST_SATURATION:
-        msg = (
+        raise InputError(
             f"a saturation flow of {saturation:g} vehicles an hour: it has to be 1 to "
             f"{_MOST_SATURATION:g}"
         )
-        raise InputError(msg)
 
 
 class _Timer:

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from odscen.interchange.tll_file import SignalFile
-    from odscen.interchange.tll_program import TakenPlan
-    from odscen.results.records.light_programs import LightProgram
+    from odscen.formats.tll_file import SignalFile
+    from odscen.formats.tll_program import TakenPlan
+    from odscen.maps.store import Workspace
+    from odscen.records.light_programs import LightProgram
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import Workspace
 
 _DAY = 86_400.0
 
@@ -61,7 +61,7 @@ def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:
     InputError
         If the scenario leaves all lights as they are in the map.
     """
-    from odscen.sumo.folder.layout import SIGNALS_FILE
+    from odscen.runs.layout import SIGNALS_FILE
     from odscen.sumo.realize.lights.light_realization import realized_lights
     from odscen.sumo.realize.lights.program_files import signals_xml
     from odscen.sumo.realize.realization import realize
@@ -75,8 +75,9 @@ def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:
     else:
         text = signals_xml(lights)
     if text is None:
-        msg = "the scenario changes no traffic light: all run the programs of the network"
-        raise InputError(msg)
+        raise InputError(
+            "the scenario changes no traffic light: all run the programs of the network"
+        )
     return text
 
 
@@ -131,25 +132,27 @@ def take_signals(
     file
         Name of the file, for messages.
     """
-    from odscen.interchange.tll_file import parse_signal_file
-    from odscen.interchange.tll_loops import taken_loops
-    from odscen.interchange.tll_program import taken_timing
+    from odscen.formats.tll_file import parse_signal_file
+    from odscen.formats.tll_loops import taken_loops
+    from odscen.formats.tll_program import taken_timing
 
     loaded = map_of(workspace, scenario)
     views = {light.id: view for light, view in zip(loaded.sumo.lights, loaded.lights, strict=True)}
     wanted = {light for light, view in views.items() if {light, *view.names} & set(junctions)}
     for name in junctions:
         if not any(name == light or name in view.names for light, view in views.items()):
-            what = "traffic light in junction"
-            raise NotFoundError(what, name, [n for view in views.values() for n in view.names])
+            raise NotFoundError(
+                "traffic light in junction",
+                name,
+                [n for view in views.values() for n in view.names],
+            )
     timings = {timing.junction: timing for timing in scenario.signals.junctions}
     notes: list[str] = []
     with in_file(file):
         parsed = parse_signal_file(content)
         found = {program.light for program in parsed.programs} & (wanted or views.keys())
         if missing := sorted(wanted - found) or (not found and sorted(views)):
-            msg = f"the file has no program for {', '.join(map(repr, missing))}"
-            raise InputError(msg)
+            raise InputError(f"the file has no program for {', '.join(map(repr, missing))}")
         for light in loaded.sumo.lights:
             if light.id not in found:
                 continue
@@ -167,7 +170,7 @@ def take_signals(
 
 def _plans(parsed: SignalFile, light: str, clock: float, notes: list[str]) -> list[TakenPlan]:
     """Programs of a light that are run, with the times of day at which they begin."""
-    from odscen.interchange.tll_program import TakenPlan
+    from odscen.formats.tll_program import TakenPlan
 
     programs = {one.id: one for one in parsed.programs if one.light == light}
     switches = parsed.switches.get(light)
@@ -180,8 +183,7 @@ def _plans(parsed: SignalFile, light: str, clock: float, notes: list[str]) -> li
     times: dict[str, list[str]] = {}
     for seconds, name in ((0.0, switches.start), *switches.switches):
         if name not in programs:
-            msg = f"WAUT of {light!r}: there is no program {name!r}"
-            raise InputError(msg)
+            raise InputError(f"WAUT of {light!r}: there is no program {name!r}")
         times.setdefault(name, []).append(_clock_time(clock + seconds))
     return [TakenPlan(programs[name], name, tuple(dict.fromkeys(t))) for name, t in times.items()]
 

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
     from odscen.app.maps import LoadedMap
     from odscen.convert.model.conversion_settings import ConverterName
-    from odscen.results.records.light_programs import LightProgram
+    from odscen.maps.store import Workspace
+    from odscen.records.light_programs import LightProgram
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import JunctionTiming, Signals
     from odscen.scenario.signals.light import Light
     from odscen.scenario.signals.program_design import DesignedGroup
-    from odscen.workspace.store import Workspace
 
 ProgramOrigin = Literal["scenario", "retimed", "odscen", "netconvert", "file"]
 """Whose a program is: the scenario's own; stages of the map with times, control or priority of the
@@ -61,8 +61,9 @@ def chosen_lights(
     named = {name: one for one in known for name in (one.id, *one.junctions)}
     for junction in junctions:
         if junction not in named:
-            what = "traffic light in junction"
-            raise NotFoundError(what, junction, [one.junctions[0] for one in known])
+            raise NotFoundError(
+                "traffic light in junction", junction, [one.junctions[0] for one in known]
+            )
     chosen = {named[junction].id for junction in junctions}
     return tuple(one for one in known if not chosen or one.id in chosen)
 
@@ -90,14 +91,13 @@ def signal_sheets(
     ScenarioError
         With every problem of the signals.
     """
-    from odscen.results.report.signals.signal_sheet import signal_sheet
+    from odscen.reports.signals.signal_sheet import signal_sheet
 
     scenario = given_scenario(scenario)
     drawing = map_of(workspace, scenario).drawing
     lights = chosen_lights(lights_of(workspace, scenario, whole_day=True), junctions)
     if not lights:
-        msg = f"map {scenario.map.name!r} has no traffic lights"
-        raise InputError(msg)
+        raise InputError(f"map {scenario.map.name!r} has no traffic lights")
     found: dict[str, str] = {}
     for light in lights:
         stem = re.sub(r"[^\w.-]", "_", light.junctions[0])

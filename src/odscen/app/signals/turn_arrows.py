@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet
     from pathlib import Path
 
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import JunctionTiming
     from odscen.scenario.edits.turn_treatment import CrossingTurn
     from odscen.scenario.signals.light import Light
-    from odscen.workspace.store import Workspace
 
 _Counts = list[tuple[frozenset[int], float]]
 """Movements of each turn, one for each of its lanes, and its vehicles an hour."""

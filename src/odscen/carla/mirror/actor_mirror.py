@@ -37,7 +37,7 @@ from odscen.sumo.worker.simulation.observed import VehicleSignal
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
 
 PAUSE = 10
 """Ticks between two more tries, once all lifts were refused."""

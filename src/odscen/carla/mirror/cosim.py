@@ -17,7 +17,7 @@ from odscen.carla.server.carla_server import Server
 from odscen.carla.server.interruption import interrupts
 from odscen.carla.server.server_map import ensure_map
 from odscen.convert.lane_table.light_heads import Heads
-from odscen.sumo.realize.run_settings import AS_DESIGNED
+from odscen.runs.run_settings import AS_DESIGNED
 from odscen.sumo.runner.elevation import ElevationLookup
 from odscen.sumo.runner.in_step import InStep
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
     from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.mirror.step_clock import StepClock
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
+    from odscen.runs.run_settings import RunSettings
     from odscen.sumo.worker.protocol import OnProgress
-    from odscen.workspace.store import Workspace
 
 
 def cosim(

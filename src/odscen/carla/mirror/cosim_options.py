@@ -94,8 +94,7 @@ class CosimOptions:
         """
         if self.follow and (self.tick is not None or self.sensed_speed):
             one = "a tick" if self.tick is not None else "sensed speed"
-            msg = f"{one} cannot be set where another client makes the ticks"
-            raise InputError(msg)
+            raise InputError(f"{one} cannot be set where another client makes the ticks")
         if self.pictures.any or self.on_picture:
             self.pictures.check()
 
@@ -111,6 +110,7 @@ class CosimOptions:
             return max(1, int(np.ceil(step_length / TICK - 1e-9)))
         count = round(step_length / self.tick)
         if count < 1 or abs(count * self.tick - step_length) > 1e-9:
-            msg = f"a step of {step_length:g} s is no whole number of ticks of {self.tick:g} s"
-            raise InputError(msg)
+            raise InputError(
+                f"a step of {step_length:g} s is no whole number of ticks of {self.tick:g} s"
+            )
         return count

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.runner.in_step import Step
 
 _LEFT, _RIGHT = VehicleSignal.DOOR_OPEN_LEFT, VehicleSignal.DOOR_OPEN_RIGHT

@@ -11,7 +11,7 @@ from odscen.sumo.worker.protocol import EgoPose as SumoPlace
 
 if TYPE_CHECKING:
     from odscen.carla.server.carla_server import Server
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.runner.in_step import Step
 
 LIFT = 0.3

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.server.blueprints import Shape
     from odscen.carla.server.carla_server import Server
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
 
 
 WAKE = 0.9
@@ -129,6 +129,7 @@ def _spectator(server: Server) -> tuple[float, float]:
 def _external_ego(plan: Plan, server: Server, blueprints: tuple[str, ...]) -> ExternalEgo:
     row = next((row for row, actor in enumerate(plan.actors) if actor.ego), None)
     if row is None:
-        msg = "the scenario has no ego that could be driven in CARLA; mark one of its road users"
-        raise InputError(msg)
+        raise InputError(
+            "the scenario has no ego that could be driven in CARLA; mark one of its road users"
+        )
     return ExternalEgo.take(server, plan, row, blueprints[row])

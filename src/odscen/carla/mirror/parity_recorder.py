@@ -14,9 +14,9 @@ import numpy as np
 
 from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr
 from odscen.carla.server.blueprints import Shape
-from odscen.results.measures.parity import parity_figures, with_errors
-from odscen.results.report.parity_report import render_parity
-from odscen.sumo.folder import layout
+from odscen.figures.measures.parity import parity_figures, with_errors
+from odscen.reports.parity_report import render_parity
+from odscen.runs import layout
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.drawing.map_drawing import MapDrawing
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.runner.in_step import Step
 
 _STATES = ("time", "row", "x", "y", "z", "hdg", "carla_x", "carla_y", "carla_z", "carla_hdg")
@@ -78,7 +78,7 @@ class StateRecorder:
         self._lights += [(step.time, name, *pair) for name, pair in lights.items()]
 
     def tables(self) -> tuple[pl.DataFrame, pl.DataFrame]:
-        """States and lights, as :mod:`odscen.results.measures.parity` wants them."""
+        """States and lights, as :mod:`odscen.figures.measures.parity` wants them."""
         import polars as pl
 
         table = np.concatenate([np.empty((0, len(_STATES))), *self._states])

@@ -12,7 +12,7 @@ from odscen.carla.mirror.parity_recorder import StateRecorder
 from odscen.carla.mirror.tick_hook import ShownActors, call_hook
 from odscen.carla.sensors.camera import first_view, watch_from_above
 from odscen.carla.sensors.sensor_recording import SensorRecording
-from odscen.sumo.folder import layout
+from odscen.runs import layout
 
 if TYPE_CHECKING:
     from contextlib import ExitStack
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from odscen.carla.sensors.camera import Camera
     from odscen.carla.server.batch import ActorPlace
     from odscen.carla.server.carla_server import Server
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.runner.in_step import Step
 
 

@@ -53,11 +53,10 @@ class OwnTicks:
                 continue  # a tick of another client shows in the number of our next frame
             passed = after - before
             if abs(passed - self._delta) > _OFF * self._delta:
-                msg = (
+                raise CarlaError(
                     f"a tick of {self._delta:g} s led the CARLA server at {self._server.address} "
                     f"on by {passed:g} s: another client changes its settings"
                 )
-                raise CarlaError(msg)
 
 
 class FollowedTicks:

@@ -191,11 +191,10 @@ class StepShow:
             return
         for refusal in self._mirror.refusals.values():
             if refusal.tries >= ENOUGH_TRIES:
-                msg = (
+                raise CarlaError(
                     f"the CARLA server at {self._report.address} takes no road user, "
                     f"{len(self._mirror.refusals)} were tried: {refusal.reason}"
                 )
-                raise CarlaError(msg)
 
     def _timed(self, step: Step) -> Iterator[Batch]:
         """Batches of a step; what planning each one takes is counted as ours."""

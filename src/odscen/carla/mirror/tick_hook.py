@@ -54,20 +54,17 @@ def load_hook(words: str) -> Callable[[Any, Mapping[str, Any]], object]:
     """
     module, colon, name = words.partition(":")
     if not (module and colon and name):
-        msg = f"the hook {words!r} is not package.module:function"
-        raise InputError(msg)
+        raise InputError(f"the hook {words!r} is not package.module:function")
     folder = str(Path.cwd())
     sys.path.insert(0, folder)
     try:
         found = getattr(import_module(module), name)
     except (ImportError, AttributeError) as error:
-        msg = f"the hook {words} cannot be imported: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"the hook {words} cannot be imported: {error}") from error
     finally:
         sys.path.remove(folder)
     if not callable(found):
-        msg = f"the hook {words} is no function"
-        raise InputError(msg)
+        raise InputError(f"the hook {words} is no function")
     hook: Callable[[Any, Mapping[str, Any]], object] = found
     return hook
 
@@ -85,5 +82,6 @@ def call_hook(
     try:
         hook(world, shown)
     except Exception as error:
-        msg = f"the hook {getattr(hook, '__qualname__', hook)} failed: {error!r}"
-        raise CarlaError(msg) from error
+        raise CarlaError(
+            f"the hook {getattr(hook, '__qualname__', hook)} failed: {error!r}"
+        ) from error

@@ -17,7 +17,7 @@ from odscen.carla.server.batch import WHEEL_CALLS, WheelTurn
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.runner.in_step import Step
 
 NEAR = 60.0

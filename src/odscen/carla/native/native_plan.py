@@ -25,7 +25,7 @@ from odscen.sumo.realize.road_users.free_flow import UNKNOWN_LIMIT
 if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray, Int32Array
     from odscen.lanegraph.graphs import LaneGraph, MapGraph
-    from odscen.results.records.run_plan import Plan, PlannedActor
+    from odscen.records.run_plan import Plan, PlannedActor
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.driving import DriverKind
     from odscen.sumo.realize.road_user import RoadUser

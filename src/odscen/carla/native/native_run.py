@@ -26,10 +26,10 @@ from odscen.carla.server.carla_server import Server
 from odscen.carla.server.client import Address
 from odscen.carla.server.environment import weather_parameters
 from odscen.carla.server.interruption import interrupts
-from odscen.results.measures.summary import actor_outcomes, actors_to_json
-from odscen.results.records.run_events import Event, EventKind, events_to_json
-from odscen.sumo.folder import layout
-from odscen.sumo.realize.run_settings import AS_DESIGNED
+from odscen.figures.measures.summary import actor_outcomes, actors_to_json
+from odscen.records.run_events import Event, EventKind, events_to_json
+from odscen.runs import layout
+from odscen.runs.run_settings import AS_DESIGNED
 from odscen.sumo.runner.worker_process import Ended
 from odscen.sumo.worker.protocol import Done, Failed, Progress
 
@@ -41,13 +41,13 @@ if TYPE_CHECKING:
 
     from odscen.app.running.runs import CheckedRun
     from odscen.carla.native.native_worker import Told
-    from odscen.results.records.run_plan import Plan
+    from odscen.maps.store import Workspace
+    from odscen.records.run_plan import Plan
+    from odscen.runs.finished_run import Run
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.worker.protocol import OnProgress
-    from odscen.workspace.store import Workspace
 
 LOG_FILE = "carla.log"
 USUAL_TICK = 0.05
@@ -94,11 +94,11 @@ class NativeOptions:
 
     def __post_init__(self) -> None:
         if not self.physics and self.tick not in (None, USUAL_TICK):
-            msg = (
+            raise InputError(
                 f"without physics the Traffic Manager moves vehicles by {USUAL_TICK:g} s in each "
-                f"tick, so a tick of {self.tick:g} s would change their speed: leave it out"
+                f"tick, so a tick of {self.tick:g} s would change their speed: leave it out",
+                element="tick",
             )
-            raise InputError(msg, element="tick")
 
 
 @dataclass(slots=True)

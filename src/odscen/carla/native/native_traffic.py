@@ -18,7 +18,7 @@ import numpy as np
 from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr
 from odscen.carla.native.spawn_queue import RETRY_SECONDS, SpawnQueue
 from odscen.carla.native.tick_watch import TickWatch
-from odscen.results.records.run_events import Event, EventKind
+from odscen.records.run_events import Event, EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

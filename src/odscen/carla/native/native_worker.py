@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from odscen.carla.native.native_plan import NativeActor
     from odscen.carla.sensors.camera import Camera
     from odscen.carla.server.client import Address
-    from odscen.results.records.run_events import Event
-    from odscen.results.records.run_plan import Plan
-    from odscen.workspace.asset_catalogue import Assets
+    from odscen.maps.asset_catalogue import Assets
+    from odscen.records.run_events import Event
+    from odscen.records.run_plan import Plan
 
 NO_NAVIGATION = (
     "the world has no navigation mesh: pedestrians are led along their routes and do not look "
@@ -188,11 +188,10 @@ def _steps(
         made = made or traffic.running > 0
         if not made and traffic.most_tries >= ENOUGH_TRIES:
             refused = traffic.refusals()
-            msg = (
+            raise CarlaError(
                 f"the CARLA server at {job.address} takes no road user, {len(refused)} were "
                 f"tried: {next(iter(refused.values()))}"
             )
-            raise CarlaError(msg)
         rows = traffic.rows(job.delta)
         events, notes = tuple(happened.events), tuple(happened.notes)
         tell(Tick(now, rows, events, notes, traffic.running, traffic.own))

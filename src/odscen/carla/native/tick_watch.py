@@ -100,7 +100,6 @@ def free(port: int) -> None:
         while got < len(requests):
             part = line.recv(4096)
             if not part:
-                msg = f"the Traffic Manager at port {port} closed the connection"
-                raise ConnectionError(msg)
+                raise ConnectionError(f"the Traffic Manager at port {port} closed the connection")
             answers.feed(part)
             got += sum(1 for _ in answers)

@@ -87,8 +87,7 @@ def usual_walker(server: Server) -> str:
 
 def _first(names: list[str], what: str) -> str:
     if not names:
-        msg = f"the CARLA server has no blueprint of a {what}"
-        raise CarlaError(msg)
+        raise CarlaError(f"the CARLA server has no blueprint of a {what}")
     return names[0]
 
 
@@ -122,8 +121,7 @@ class BodyChecks:
         server = self.server
         places = self._free(server.spawn_places())
         if not places:
-            msg = f"the map {server.map_name} has no free place for vehicles"
-            raise CarlaError(msg)
+            raise CarlaError(f"the map {server.map_name} has no free place for vehicles")
         off = []
         for place in places[:_PLACES]:
             ground = server.ground_below(*_above(place), _REACH)
@@ -281,8 +279,9 @@ class BodyChecks:
         spawn = Spawn(blueprint, _NAME, at, _STILL, 0.0, walks, lift, 0)
         (answer,) = self.server.apply(Batch(spawn=(spawn,)))
         if not isinstance(answer, int):
-            msg = f"the server refused {blueprint} {lift:g} m above the ground: {answer}"
-            raise CarlaError(msg)
+            raise CarlaError(
+                f"the server refused {blueprint} {lift:g} m above the ground: {answer}"
+            )
         return answer
 
     def _moved(self, actor: int) -> ActorPlace:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.markup import Markup, element, join
 from odscen.carla.selfcheck.body_checks import BODY_NAMES
 from odscen.carla.selfcheck.check_line import CheckState
-from odscen.results.report.page_templates import html_page, html_table, page_head, report_section
+from odscen.reports.page_templates import html_page, html_table, page_head, report_section
 
 if TYPE_CHECKING:
     from odscen.carla.selfcheck.check_line import CheckLine, SelfcheckReport

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from odscen.carla.selfcheck.check_line import CheckLine
     from odscen.carla.server.client import Address
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 DELTA = 0.05
 """Seconds of a tick."""

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from odscen.carla.sensors.pictures import Wish
     from odscen.carla.server.carla_server import Server
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
 
 BLUEPRINT = "sensor.camera.rgb"
 FIELD_OF_VIEW = 60.0
@@ -215,8 +215,9 @@ def _put_up(server: Server, view: View, *, width: int, height: int, rate: float)
             blueprint.set_attribute(name, value)
     (answer,) = server.spawn([server.package.command.SpawnActor(blueprint, place)])
     if not isinstance(answer, int):
-        problem = f"the CARLA server at {server.address} has no place for a camera: {answer}"
-        raise CarlaError(problem)
+        raise CarlaError(
+            f"the CARLA server at {server.address} has no place for a camera: {answer}"
+        )
     server.tick()
     return answer
 

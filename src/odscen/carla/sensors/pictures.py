@@ -83,8 +83,7 @@ class Wish:
         """
         _av()
         if self.film is not None and self.film.suffix.lower() not in _FILM_SUFFIXES:
-            problem = f"a video ends in {', '.join(_FILM_SUFFIXES)}"
-            raise InputError(problem, file=str(self.film))
+            raise InputError(f"a video ends in {', '.join(_FILM_SUFFIXES)}", file=str(self.film))
 
 
 @contextmanager
@@ -118,8 +117,9 @@ def picture_files(wish: Wish) -> Iterator[Callable[[Picture], None]]:
             if film is not None:
                 film.close()
     except OSError as error:
-        problem = f"pictures: {error.filename or ''}: {error.strerror or error}"
-        raise WorkspaceError(problem) from error
+        raise WorkspaceError(
+            f"pictures: {error.filename or ''}: {error.strerror or error}"
+        ) from error
 
 
 class _Film:
@@ -154,6 +154,7 @@ def _av() -> Any:
     try:
         import av
     except ImportError as error:
-        problem = "pictures need the package av: pip install 'odscen[carla]'"
-        raise MissingDependencyError(problem) from error
+        raise MissingDependencyError(
+            "pictures need the package av: pip install 'odscen[carla]'"
+        ) from error
     return av

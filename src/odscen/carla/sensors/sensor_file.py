@@ -63,8 +63,7 @@ class SensorList(_SensorPart):
     def _names_differ(self) -> SensorList:
         names = [one.name for one in self.sensors]
         if twice := sorted({name for name in names if names.count(name) > 1}):
-            msg = f"two sensors are named {twice[0]}"
-            raise ValueError(msg)
+            raise ValueError(f"two sensors are named {twice[0]}")
         return self
 
 

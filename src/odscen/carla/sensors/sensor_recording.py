@@ -84,8 +84,9 @@ class SensorRecording:
         answers = self._server.spawn(commands)
         for wish, answer in zip(self._wishes, answers, strict=True):
             if not isinstance(answer, int):
-                msg = f"the CARLA server refused the sensor {wish.name} ({wish.type}): {answer}"
-                raise CarlaError(msg)
+                raise CarlaError(
+                    f"the CARLA server refused the sensor {wish.name} ({wish.type}): {answer}"
+                )
         made = self._server.actors([answer for answer in answers if isinstance(answer, int)])
         self._handles = {handle.id: handle for handle in made}
         for wish, number in zip(self._wishes, answers, strict=True):
@@ -124,8 +125,7 @@ class SensorRecording:
             if blueprint.has_attribute(name):
                 blueprint.set_attribute(name, value)
             elif name != "role_name":
-                msg = f"the sensor {wish.name}: {wish.type} has no attribute {name!r}"
-                raise CarlaError(msg)
+                raise CarlaError(f"the sensor {wish.name}: {wish.type} has no attribute {name!r}")
         at = carla.Transform(
             carla.Location(place.x, place.y, place.z),
             carla.Rotation(place.pitch, place.yaw, place.roll),

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, Self
 
-from odscen.sumo.realize.run_settings import AS_DESIGNED, RunSettings
+from odscen.runs.run_settings import AS_DESIGNED, RunSettings
 from odscen.sumo.runner.worker_process import messages
 from odscen.sumo.worker.protocol import Done, Failed, Pace
 

@@ -19,6 +19,7 @@ from odscen.carla.mirror.cosim import cosim
 from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.served.served_run import ServedJob
 from odscen.carla.server.client import Address
+from odscen.maps.store import Workspace
 from odscen.sumo.worker.output_capture import captured_output
 from odscen.sumo.worker.protocol import (
     Done,
@@ -31,7 +32,6 @@ from odscen.sumo.worker.protocol import (
 )
 from odscen.sumo.worker.snapshots import frame_bytes, frame_rows
 from odscen.sumo.worker.steering import Steering
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,8 +12,8 @@ from odscen.base.errors import CarlaError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.results.records.run_plan import PlannedActor
-    from odscen.workspace.asset_catalogue import Assets, Blueprint
+    from odscen.maps.asset_catalogue import Assets, Blueprint
+    from odscen.records.run_plan import PlannedActor
 
 ALIKE = 0.25
 """Metres that bodies may differ more than the best one's and still be as good a choice."""
@@ -67,8 +67,7 @@ def _any(category: Category, library: Sequence[str]) -> str:
     prefix = _PREFIX.get(category, "vehicle.")
     found = next((name for name in library if name.startswith(prefix)), None)
     if found is None:
-        msg = f"the CARLA server has no blueprint for a {category.value} ({prefix}*)"
-        raise CarlaError(msg)
+        raise CarlaError(f"the CARLA server has no blueprint for a {category.value} ({prefix}*)")
     return found
 
 

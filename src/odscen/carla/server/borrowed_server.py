@@ -315,11 +315,10 @@ class BorrowedServer:
         self.waited += time.perf_counter() - start
         last, self._frame = self._frame, frame
         if last is not None and frame != last + 1:
-            msg = (
+            raise CarlaError(
                 f"another client ticks the CARLA server at {self.address} as well: a tick led from "
                 f"frame {last} to {frame}; only one client may tick"
             )
-            raise CarlaError(msg)
 
     def _advance(self) -> int:
         with self.around_tick():
@@ -339,11 +338,10 @@ class BorrowedServer:
         while self.clock()[0] <= after:
             time.sleep(_POLL)
             if time.perf_counter() - start > self.address.timeout:
-                msg = (
+                raise CarlaError(
                     f"no client has ticked the CARLA server at {self.address} for "
                     f"{self.address.timeout:g} s, and the one that is followed has to"
                 )
-                raise CarlaError(msg)
         self.waited += time.perf_counter() - start
 
     def _apply(self, commands: Sequence[Any]) -> list[Any]:

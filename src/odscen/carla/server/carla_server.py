@@ -136,8 +136,7 @@ class Server(BorrowedServer):
         """
         with self._answering():
             if not self._library.filter(name):
-                msg = f"the CARLA server at {self.address} has no blueprint {name}"
-                raise CarlaError(msg)
+                raise CarlaError(f"the CARLA server at {self.address} has no blueprint {name}")
             return self._library.find(name)
 
     def shapes(self, names: Sequence[str]) -> dict[str, Shape]:
@@ -208,8 +207,9 @@ class Server(BorrowedServer):
             command = self.spawn_command(blueprint, role_name, at[:3], pitch=at.pitch, yaw=at.yaw)
             answer = self._apply([command])[0]
             if answer.error:
-                msg = f"the CARLA server at {self.address} refused the {role_name}: {answer.error}"
-                raise CarlaError(msg)
+                raise CarlaError(
+                    f"the CARLA server at {self.address} refused the {role_name}: {answer.error}"
+                )
             self._own.add(int(answer.actor_id))
             self.tick()
         return int(answer.actor_id)
@@ -224,8 +224,7 @@ class Server(BorrowedServer):
         """
         found = self._world.get_snapshot().find(actor)
         if found is None:
-            msg = f"actor {actor} is gone from the CARLA server at {self.address}"
-            raise CarlaError(msg)
+            raise CarlaError(f"actor {actor} is gone from the CARLA server at {self.address}")
         return _place(found.get_transform())
 
     def speed(self, actor: int, at: ActorPlace) -> float:

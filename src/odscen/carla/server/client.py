@@ -51,8 +51,9 @@ class Address:
         if not colon:
             host, port = text, str(DEFAULT_PORT)
         if not port.isdecimal() or not 0 < int(port) < 2**16:
-            msg = f"{text!r} is no address of a CARLA server: write HOST:PORT, as in localhost:2000"
-            raise InputError(msg)
+            raise InputError(
+                f"{text!r} is no address of a CARLA server: write HOST:PORT, as in localhost:2000"
+            )
         return cls(host or cls().host, int(port), timeout)
 
     def __str__(self) -> str:
@@ -99,11 +100,10 @@ def connect(address: Address) -> CarlaConnection:
     if theirs == mine:
         return CarlaConnection(package, client)
     if release_number(theirs) not in (None, release_number(mine)):
-        problem = (
+        raise CarlaReleaseError(
             f"the CARLA server at {address} is release {theirs}, the package carla is {mine}: "
             f"start a server of release {mine}"
         )
-        raise CarlaReleaseError(problem)
     warning = (
         f"the CARLA server at {address} calls itself {theirs}, the package carla is {mine}: taken "
         "as built from the sources of that release"
@@ -118,17 +118,16 @@ def answering(address: Address) -> Iterator[None]:
         yield
     except RuntimeError as error:
         if "time-out" not in str(error):
-            problem = f"the CARLA server at {address} refused"
-            raise CarlaError(problem, output=str(error)) from error
+            raise CarlaError(f"the CARLA server at {address} refused", output=str(error)) from error
         if not address.listens():
-            problem = f"the CARLA server at {address} is gone: no server listens there any more"
-            raise CarlaError(problem) from error
-        problem = (
+            raise CarlaError(
+                f"the CARLA server at {address} is gone: no server listens there any more"
+            ) from error
+        raise CarlaError(
             f"the CARLA server at {address} has not answered for {address.timeout:g} s: it may "
             "have crashed, hang, be loading a map, or be something else; look at its window or "
             "log, then try again"
-        )
-        raise CarlaError(problem) from error
+        ) from error
 
 
 def import_carla() -> Any:
@@ -142,11 +141,10 @@ def import_carla() -> Any:
     try:
         import carla
     except ImportError as error:
-        problem = (
+        raise MissingDependencyError(
             "the package carla is not installed: pip install 'odscen[carla]' on CPython 3.11 or "
             "3.12 (there is none for newer ones)"
-        )
-        raise MissingDependencyError(problem) from error
+        ) from error
     return carla
 
 
@@ -163,16 +161,16 @@ def await_port(address: Address) -> None:
         try:
             socket.create_connection((address.host, address.port), timeout=address.timeout).close()
         except socket.gaierror as error:
-            problem = f"no machine named {address.host!r}: check the host of the CARLA server"
-            raise CarlaError(problem) from error
+            raise CarlaError(
+                f"no machine named {address.host!r}: check the host of the CARLA server"
+            ) from error
         except OSError as error:
             if time.monotonic() >= deadline:
-                problem = (
+                raise CarlaError(
                     f"no CARLA server at {address} after {address.timeout:g} s "
                     f"({error.strerror or error}): "
                     "start CARLA there, or name the host and port where it runs"
-                )
-                raise CarlaError(problem) from error
+                ) from error
             time.sleep(_RETRY_SECONDS)
         else:
             return

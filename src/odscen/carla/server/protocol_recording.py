@@ -38,8 +38,9 @@ def recorded_protocol(address: Address, file: Path) -> Iterator[Address]:
         If the file cannot be written.
     """
     if find_spec("msgpack") is None:
-        problem = "the package msgpack is not installed: pip install 'odscen[carla]'"
-        raise MissingDependencyError(problem)
+        raise MissingDependencyError(
+            "the package msgpack is not installed: pip install 'odscen[carla]'"
+        )
     await_port(address)
     process = subprocess.Popen(
         [sys.executable, "-m", "odscen.carla.server.recording_proxy"],
@@ -62,13 +63,11 @@ def recorded_protocol(address: Address, file: Path) -> Iterator[Address]:
 
 def _started(process: subprocess.Popen[str], options: dict[str, object], file: Path) -> int:
     if process.stdin is None or process.stdout is None:  # both were asked for
-        msg = f"{file}: nothing can be recorded"
-        raise WorkspaceError(msg)
+        raise WorkspaceError(f"{file}: nothing can be recorded")
     process.stdin.write(json.dumps(options) + "\n")
     process.stdin.flush()
     answer = json.loads(process.stdout.readline() or "{}")
     if "port" not in answer:
         why = answer.get("error", "the recording process has ended")
-        msg = f"{file}: the protocol cannot be recorded: {why}"
-        raise WorkspaceError(msg)
+        raise WorkspaceError(f"{file}: the protocol cannot be recorded: {why}")
     return int(answer["port"])

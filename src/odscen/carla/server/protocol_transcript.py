@@ -97,8 +97,9 @@ def parse_transcript(lines: Iterable[str], *, file: str) -> list[ProtocolFrame]:
         try:
             frames.append(_frame(json.loads(line)))
         except (ValueError, KeyError, TypeError, binascii.Error) as error:
-            msg = f"is no frame of a transcript: {error}"
-            raise InputError(msg, file=file, element=f"line {number}") from error
+            raise InputError(
+                f"is no frame of a transcript: {error}", file=file, element=f"line {number}"
+            ) from error
     return frames
 
 
@@ -108,11 +109,17 @@ def _check_header(line: str, *, file: str) -> None:
     except ValueError:
         head = None
     if not isinstance(head, dict) or head.get("format") != FORM:
-        msg = f"is no transcript of CARLA's protocol: the first line has to name {FORM}"
-        raise InputError(msg, file=file, element="line 1")
+        raise InputError(
+            f"is no transcript of CARLA's protocol: the first line has to name {FORM}",
+            file=file,
+            element="line 1",
+        )
     if head.get("version") != VERSION:
-        msg = f"version {head.get('version')!r} is not known, {VERSION} is"
-        raise InputError(msg, file=file, element="line 1")
+        raise InputError(
+            f"version {head.get('version')!r} is not known, {VERSION} is",
+            file=file,
+            element="line 1",
+        )
 
 
 def _frame(row: dict[str, Any]) -> ProtocolFrame:

@@ -73,11 +73,10 @@ class ReleaseAdapter:
             If this release makes no worlds.
         """
         if not self.generates_worlds:
-            msg = (
+            raise CarlaError(
                 f"CARLA {self.number} makes no world of an OpenDRIVE file: load a map on the "
                 "server that is the scenario's"
             )
-            raise CarlaError(msg)
         return carla.OpendriveGenerationParameters(
             wall_height=0.0, additional_width=0.0, smooth_junctions=False
         )

@@ -37,19 +37,19 @@ def ensure_map(server: Server, name: str, xodr: str, *, load: bool = True) -> st
     if same_map(server.opendrive(), xodr):
         return "there"
     if not load:
-        msg = (
+        raise CarlaError(
             f"the CARLA server at {server.address} shows {server.map_name}, and the scenario is on "
             f"{name}; allow another map with --load-map"
         )
-        raise CarlaError(msg)
     if name in server.available_maps():
         server.load_map(name)
         if same_map(server.opendrive(), xodr):
             return "loaded"
     server.load_opendrive(xodr)
     if not same_map(server.opendrive(), xodr):
-        msg = f"the CARLA server at {server.address} did not take the OpenDRIVE text of {name}"
-        raise CarlaError(msg)
+        raise CarlaError(
+            f"the CARLA server at {server.address} did not take the OpenDRIVE text of {name}"
+        )
     return "generated"
 
 

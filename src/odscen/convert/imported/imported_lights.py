@@ -82,11 +82,10 @@ def _filled(light: ImportedLight, links: Mapping[int, LightLink]) -> tuple[Light
     """Links of all letters of a light."""
     count = len(light.signals)
     if links and max(links) >= count:
-        msg = (
+        raise InputError(
             f"the SUMO network cannot be read: a connection has letter {max(links)} of light "
             f"{light.id}, whose states have {count}"
         )
-        raise InputError(msg)
     return tuple(links.get(n, _NO_LINK) for n in range(count))
 
 
@@ -168,11 +167,10 @@ class _Junction:
     def __init__(self, ways: _Ways, rights: ImportedRights) -> None:
         links = list(ways.links_into(rights))
         if rights.requests and len(links) != len(rights.requests):
-            msg = (
+            raise InputError(
                 f"the SUMO network cannot be read: junction {rights.junction} has {len(links)} "
                 f"links, but {len(rights.requests)} requests"
             )
-            raise InputError(msg)
         requests = rights.requests or (Request(frozenset(), frozenset()),) * len(links)
         net = ways.net
         self._ways = ways

@@ -76,9 +76,8 @@ def _refuse_stranger(figures: Mapping[str, float], lanes: LaneTable) -> None:
     )
     if covered < LEAST_COVERED * length or placed < LEAST_PLACED * sum(own.values()):
         x, y = lanes.net_offset
-        msg = (
+        raise InputError(
             f"the SUMO network is not one of this map: {placed:.0f} of {sum(own.values()):.0f} m "
             f"of its lanes lie on lanes of the map, on {covered:.0f} of {length:.0f} m of driving "
             f"lanes (netOffset {x:g},{y:g})"
         )
-        raise InputError(msg)

@@ -176,16 +176,17 @@ def read_network(content: bytes) -> ImportedNet:
     """
     root = read_xml(content, huge=True, bare=True)
     if root.tag != "net":
-        msg = f"the SUMO network cannot be read: its first element is <{root.tag}>, not <net>"
-        raise InputError(msg)
+        raise InputError(
+            f"the SUMO network cannot be read: its first element is <{root.tag}>, not <net>"
+        )
     if root.find("location") is None:
-        msg = "the SUMO network cannot be read: <location> is missing"
-        raise InputError(msg)
+        raise InputError("the SUMO network cannot be read: <location> is missing")
     try:
         return _imported(_with_sumolib(root), lefthand=root.get("lefthand") == "true")
     except (LookupError, ValueError, TypeError, AttributeError) as error:
-        msg = f"the SUMO network cannot be read: {type(error).__name__}: {error}"
-        raise InputError(msg) from error
+        raise InputError(
+            f"the SUMO network cannot be read: {type(error).__name__}: {error}"
+        ) from error
 
 
 def _with_sumolib(root: etree._Element) -> Any:
@@ -221,8 +222,7 @@ def _imported(net: Any, *, lefthand: bool) -> ImportedNet:
         crossed = tuple(SumoEdgeId(other.getID()) for other in edge.getCrossingEdges())
         edges[name] = ImportedEdge(name, function, *ends, tuple(lane.id for lane in own), crossed)
     if not any(edge.function == NORMAL for edge in edges.values()):
-        msg = "it has no edges"
-        raise ValueError(msg)
+        raise ValueError("it has no edges")
     links = _links(net, lanes)
     return ImportedNet(
         offset=(offset[0], offset[1]),
@@ -245,13 +245,13 @@ def _lane(
 ) -> ImportedLane:
     shape = np.array(lane.getShape3D(), dtype=np.float64).reshape(-1, 3)
     if not len(shape) or not np.isfinite(shape).all():
-        msg = f"lane {lane.getID()} has no usable shape"
-        raise ValueError(msg)
+        raise ValueError(f"lane {lane.getID()} has no usable shape")
     shape = shape - np.array([*offset, 0.0])
     length, speed, width = float(lane.getLength()), float(lane.getSpeed()), float(lane.getWidth())
     if not (0.0 < length < math.inf and 0.0 <= speed < math.inf and 0.0 <= width < math.inf):
-        msg = f"lane {lane.getID()} has no usable length, speed or width: {length, speed, width}"
-        raise ValueError(msg)
+        raise ValueError(
+            f"lane {lane.getID()} has no usable length, speed or width: {length, speed, width}"
+        )
     classes = frozenset(lane.getPermissions())
     if classes not in permissions:
         permissions[classes] = _permitted(classes)
@@ -284,8 +284,7 @@ def _links(net: Any, lanes: dict[SumoLaneId, ImportedLane]) -> tuple[ImportedLin
             for link in lane.getOutgoing():
                 via = SumoLaneId(link.getViaLaneID() or "")
                 if via and via not in lanes:
-                    msg = f"connection via {via}, which is no lane"
-                    raise ValueError(msg)
+                    raise ValueError(f"connection via {via}, which is no lane")
                 source, target = link.getFromLane().getID(), link.getToLane().getID()
                 light = link.getTLSID() or ""
                 places = link.getTLLinkIndex(), link.getTLLinkIndex2()
@@ -303,8 +302,7 @@ def _lit(net: Any, controlled: Container[SumoLaneId]) -> tuple[ImportedRights, .
         if any(lane in controlled for lane in incoming):
             rows = sorted(node._prohibits)
             if rows != list(range(len(rows))):
-                msg = f"junction {node.getID()} has requests {rows}"
-                raise ValueError(msg)
+                raise ValueError(f"junction {node.getID()} has requests {rows}")
             requests = (Request(_bits(node._prohibits[n]), _bits(node._foes[n])) for n in rows)
             found.append(ImportedRights(str(node.getID()), incoming, tuple(requests)))
     return tuple(found)

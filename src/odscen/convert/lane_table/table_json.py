@@ -111,8 +111,7 @@ def _to_data(table: LaneTable) -> dict[str, Any]:
 def _from_data(data: dict[str, Any]) -> LaneTable:
     """Inverse of :func:`_to_data`."""
     if data["version"] != VERSION:
-        msg = f"version {data['version']!r}, not {VERSION}"
-        raise ValueError(msg)
+        raise ValueError(f"version {data['version']!r}, not {VERSION}")
     edge_ids = [SumoEdgeId(edge) for edge in data["edges"]["id"]]
     lane_ids = [SumoLaneId(lane) for lane in data["lanes"]["id"]]
     lanes = _lanes(data["lanes"], lane_ids, edge_ids, data["classes"])

@@ -37,8 +37,9 @@ class ConversionSettings:
 
     def __post_init__(self) -> None:
         if not _CLOSEST <= self.spacing <= _WIDEST:
-            msg = f"spacing must lie between {_CLOSEST:g} and {_WIDEST:g} m, not {self.spacing:g}"
-            raise InputError(msg)
+            raise InputError(
+                f"spacing must lie between {_CLOSEST:g} and {_WIDEST:g} m, not {self.spacing:g}"
+            )
 
 
 USUAL = ConversionSettings()

@@ -66,8 +66,7 @@ def divided(alignment: LaneAlignment, extent: float) -> tuple[LaneAlignment, Lan
             head, tail = stretch._replace(end=middle), stretch._replace(start=middle)
             return (*alignment[:index], head), (tail, *alignment[index + 1 :])
         extent -= stretch.extent
-    msg = "nothing to divide"
-    raise ValueError(msg)
+    raise ValueError("nothing to divide")
 
 
 def trimmed(alignment: LaneAlignment, *, start: bool, end: bool) -> LaneAlignment:

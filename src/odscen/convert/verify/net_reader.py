@@ -170,15 +170,15 @@ def _reading() -> Iterator[None]:
     try:
         yield
     except (LookupError, ValueError) as error:
-        msg = f"the SUMO network cannot be read: {type(error).__name__}: {error}"
-        raise InputError(msg) from error
+        raise InputError(
+            f"the SUMO network cannot be read: {type(error).__name__}: {error}"
+        ) from error
 
 
 def _lanes(root: etree._Element) -> dict[str, NetFileLane]:
     location = root.find("location")
     if location is None:
-        msg = "<location> is missing"
-        raise ValueError(msg)
+        raise ValueError("<location> is missing")
     offset = np.array([float(part) for part in _text(location, "netOffset").split(",")])
     lanes: dict[str, NetFileLane] = {}
     for edge in root.iterfind("edge"):
@@ -200,16 +200,14 @@ def _shape(text: str, offset: FloatArray) -> FloatArray:
     shape = np.array([[float(part) for part in xyz.split(",")[:2]] for xyz in text.split()])
     shape = shape - offset
     if shape.ndim != 2 or not np.isfinite(shape).all():
-        msg = f"{text[:40]!r} is not the shape of a lane"
-        raise ValueError(msg)
+        raise ValueError(f"{text[:40]!r} is not the shape of a lane")
     return shape
 
 
 def _text(element: etree._Element, name: str) -> str:
     value = element.get(name)
     if value is None:
-        msg = f"attribute {name} of <{element.tag}> is missing"
-        raise KeyError(msg)
+        raise KeyError(f"attribute {name} of <{element.tag}> is missing")
     return value
 
 
@@ -226,8 +224,7 @@ def _links(
     for link in root.iterfind("connection"):
         via = link.get("via", "")
         if via and via not in known:
-            msg = f"connection via {via}, which is no lane"
-            raise ValueError(msg)
+            raise ValueError(f"connection via {via}, which is no lane")
         yield NetFileLink(
             edges[_text(link, "from")][_text(link, "fromLane")],
             edges[_text(link, "to")][_text(link, "toLane")],

@@ -108,17 +108,14 @@ def action_from_bytes(data: bytes, count: int) -> tuple[DrivingAction, BoolArray
     try:
         rows = np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, EOFError, OSError) as error:
-        msg = f"its answer is no .npy array: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"its answer is no .npy array: {error}") from error
     names = getattr(rows, "dtype", np.dtype("f8")).names or ()
     unknown = sorted(set(names) - {"controlled", *_ACTIONS})
     if "controlled" not in names or unknown:
         what = f"field {unknown[0]!r}" if unknown else "no field 'controlled'"
-        msg = f"its answer has {what}; it may have controlled, {', '.join(_ACTIONS)}"
-        raise InputError(msg)
+        raise InputError(f"its answer has {what}; it may have controlled, {', '.join(_ACTIONS)}")
     if rows.shape != (count,):
-        msg = f"its answer has shape {rows.shape}, not ({count},)"
-        raise InputError(msg)
+        raise InputError(f"its answer has shape {rows.shape}, not ({count},)")
     given: dict[str, Array] = {name: rows[name] for name in names if name != "controlled"}
     return DrivingAction(**given), rows["controlled"].astype(bool)
 

@@ -43,15 +43,13 @@ class CheckedAction:
     def __init__(self, action: DrivingAction, controlled: Any, count: int) -> None:
         mask = np.asarray(controlled)
         if mask.shape != (count,) or mask.dtype != np.bool_:
-            msg = f"is_controlled is {mask.dtype} {mask.shape}, not bool ({count},)"
-            raise InputError(msg)
+            raise InputError(f"is_controlled is {mask.dtype} {mask.shape}, not bool ({count},)")
         self.rows = np.flatnonzero(mask)
         kinds = np.broadcast_to(np.asarray(action.kind), (count,))
         some = kinds[mask] if np.ndim(action.kind) else kinds[self.rows[:1]]
         used = np.unique(some).tolist()
         if unknown := [kind for kind in used if kind not in {*DrivingKind}]:
-            msg = f"there is no kind of action {unknown[0]!r}"
-            raise InputError(msg)
+            raise InputError(f"there is no kind of action {unknown[0]!r}")
         self.kind = kinds
         self.real = {
             name: self._numbers(action, name, count)
@@ -66,15 +64,13 @@ class CheckedAction:
         for kind in used:
             for name in _NEEDS[DrivingKind(kind)]:
                 if name not in self.real and name not in self.whole:
-                    msg = f"an action of kind {DrivingKind(kind).name} needs {name}"
-                    raise InputError(msg)
+                    raise InputError(f"an action of kind {DrivingKind(kind).name} needs {name}")
         speed = self.real.get("speed")
         if speed is not None and len(self.rows):
             low, high = speed[self.rows].min(), speed[self.rows].max()
             if low < 0.0 or high > _FASTEST:
                 bad = low if low < 0.0 else high
-                msg = f"a speed of {bad:g} m/s is not between 0 and {_FASTEST:g}"
-                raise InputError(msg)
+                raise InputError(f"a speed of {bad:g} m/s is not between 0 and {_FASTEST:g}")
         self.speed = speed
         self.change = self.whole.get("change")
 
@@ -82,14 +78,11 @@ class CheckedAction:
         try:
             values = np.asarray(getattr(action, name), dtype=np.float64)
         except (TypeError, ValueError) as error:
-            msg = f"{name} is no array of numbers"
-            raise InputError(msg) from error
+            raise InputError(f"{name} is no array of numbers") from error
         if values.shape != (count,):
-            msg = f"{name} has shape {values.shape}, not ({count},)"
-            raise InputError(msg)
+            raise InputError(f"{name} has shape {values.shape}, not ({count},)")
         bad = ~np.isfinite(values[self.rows])
         if bad.any():
             row = int(self.rows[np.flatnonzero(bad)[0]])
-            msg = f"{name} of row {row} is {values[row]:g}"
-            raise InputError(msg)
+            raise InputError(f"{name} of row {row} is {values[row]:g}")
         return np.where(np.isfinite(values), values, 0.0)

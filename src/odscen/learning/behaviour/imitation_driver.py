@@ -142,12 +142,12 @@ def network_from_bytes(data: bytes, *, file: str) -> SmallNetwork:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             weights = tuple(arrays[f"w{k}"] for k in range(6))
     except (ValueError, KeyError, OSError, EOFError, BadZipFile) as error:
-        msg = f"no weights of a driver: {error}"
-        raise InputError(msg, file=file) from error
+        raise InputError(f"no weights of a driver: {error}", file=file) from error
     if weights[0].shape[:1] != (len(FEATURES),) or weights[5].shape != (len(BINS),):
         shapes = f"{weights[0].shape} and {weights[5].shape}"
-        msg = f"weights {shapes}, not ({len(FEATURES)}, ...) and ({len(BINS)},)"
-        raise InputError(msg, file=file)
+        raise InputError(
+            f"weights {shapes}, not ({len(FEATURES)}, ...) and ({len(BINS)},)", file=file
+        )
     return SmallNetwork(weights)
 
 

@@ -191,8 +191,7 @@ def _rows(
         nodes += int(one.of.allowed.any(axis=0).sum())
     vehicles = sum(counts.values())
     if not vehicles:
-        msg = "there is no vehicle in these snapshots to learn from"
-        raise InputError(msg)
+        raise InputError("there is no vehicle in these snapshots to learn from")
     kept = min(1.0, settings.empty * vehicles / max(nodes - vehicles, 1))
     looks = [_looked_at(one, kept, rng) for one in examples]
     weight = np.concatenate(

@@ -131,9 +131,7 @@ def model_from_bytes(data: bytes, *, file: str) -> TrafficModel:
         zipfile.BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError, TypeError,
         IndexError,
     ) as error:  # fmt: skip
-        msg = f"it is no model of traffic: {error}"
-        raise InputError(msg, file=file) from error
+        raise InputError(f"it is no model of traffic: {error}", file=file) from error
     if version != VERSION:
-        msg = f"version is {version}; this odscen reads {VERSION}"
-        raise InputError(msg, file=file)
+        raise InputError(f"version is {version}; this odscen reads {VERSION}", file=file)
     return TrafficModel(occupied, speed, categories, about)

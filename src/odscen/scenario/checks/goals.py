@@ -109,8 +109,7 @@ def with_goals(scenario: Scenario, graph: MapGraph) -> Scenario:
     """
     goals = resolve_goals(scenario, graph)
     if len(goals) != len(scenario.actors):
-        msg = "two actors have the same id"
-        raise ScenarioError(msg)
+        raise ScenarioError("two actors have the same id")
     actors = tuple(
         actor.model_copy(
             update={"goal": name_of(graph, NodePlace(on_foot(actor.category), goals[actor.id]))}

@@ -95,8 +95,7 @@ def curve(demand: Demand, profile: str | None) -> Curve:
         return Curve(clock=demand.clock)
     known = known_profiles(demand)
     if profile not in known:
-        what = "day profile"
-        raise NotFoundError(what, profile, list(known))
+        raise NotFoundError("day profile", profile, list(known))
     return Curve(known[profile], clock=demand.clock)
 
 

@@ -131,8 +131,10 @@ def read_inputs(text: str, *, clock: float = 0.0) -> tuple[InputRow, ...]:
     names = ("segment", "direction")
     wide = _wide(text, names, clock) or _wide(text, names[:1], clock)
     if wide is None:
-        msg = "the columns needed are segment [, direction] and the begins of slices of time"
-        raise InputError(msg, element="line 1")
+        raise InputError(
+            "the columns needed are segment [, direction] and the begins of slices of time",
+            element="line 1",
+        )
     begin, end = wide.slices[0][1]
     return tuple(
         InputRow(
@@ -161,11 +163,11 @@ def read_profile(text: str) -> tuple[float, ...]:
     for index, line in enumerate(lines):
         due = index * DAY / len(lines)
         if line.has("time") and abs(line.time("time", 0.0) - due) > 1.0:
-            msg = (
+            raise InputError(
                 f"time {line['time']!r} is not that of slice {index + 1} of {len(lines)} equal "
-                "slices of a day"
+                "slices of a day",
+                element=line.where,
             )
-            raise InputError(msg, element=line.where)
     return tuple(line.number("share") for line in lines)
 
 
@@ -220,8 +222,10 @@ def _wide(text: str, names: Sequence[str], clock: float) -> _WideTable | None:
         titles, begins, (begins[0] + k * length for k in range(len(begins))), strict=True
     ):
         if length <= 0 or begin != expected or begin < 0:
-            msg = f"the slice that begins at {title} is not as long as the first, or too early"
-            raise InputError(msg, element="line 1")
+            raise InputError(
+                f"the slice that begins at {title} is not as long as the first, or too early",
+                element="line 1",
+            )
     slices = [(t, (begin, begin + length)) for t, begin in zip(titles, begins, strict=True)]
     return _WideTable(lines, slices)
 
@@ -241,17 +245,16 @@ class _TableLine:
     def __getitem__(self, column: str) -> str:
         value = self._cells[column]
         if not value:
-            msg = f"column {column!r} is empty"
-            raise InputError(msg, element=self.where)
+            raise InputError(f"column {column!r} is empty", element=self.where)
         return value
 
     def name(self, column: str) -> str:
         if not _NAME.fullmatch(self[column]):
-            msg = (
+            raise InputError(
                 f"{column} must be at most 64 letters from a to z, digits, '-', '_' and '.', not "
-                f"{shown(self[column])}"
+                f"{shown(self[column])}",
+                element=self.where,
             )
-            raise InputError(msg, element=self.where)
         return self[column]
 
     def number(self, column: str) -> float:
@@ -260,8 +263,10 @@ class _TableLine:
         except ValueError:
             value = -1.0
         if not 0.0 <= value <= 1e7:
-            msg = f"{column} must be a number from 0 on, not {shown(self[column])}"
-            raise InputError(msg, element=self.where)
+            raise InputError(
+                f"{column} must be a number from 0 on, not {shown(self[column])}",
+                element=self.where,
+            )
         return value
 
     def time(self, column: str, clock: float) -> float:
@@ -274,11 +279,11 @@ class _TableLine:
     def slice(self, clock: float) -> TimeSlice:
         begin, end = self.time("begin", clock), self.time("end", clock)
         if begin < 0 or end <= begin:
-            msg = (
+            raise InputError(
                 f"the slice from {self['begin']} to {self['end']} is not after the start of the "
-                "run, or ends before it begins"
+                "run, or ends before it begins",
+                element=self.where,
             )
-            raise InputError(msg, element=self.where)
         return begin, end
 
 
@@ -287,8 +292,9 @@ def _csv_rows(reader: _csv.Reader) -> Iterator[list[str]]:
     try:
         yield from reader
     except csv.Error as error:
-        msg = f"this is no table that can be read: {error}"
-        raise InputError(msg, element=f"line {reader.line_num}") from error
+        raise InputError(
+            f"this is no table that can be read: {error}", element=f"line {reader.line_num}"
+        ) from error
 
 
 def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_TableLine]:
@@ -300,8 +306,7 @@ def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> It
     if missing or unknown or (given and len(given) != len(optional)):
         listed = ", ".join(needed) + "".join(f" [, {name}]" for name in optional)
         names = printable(", ".join(columns)) or "missing"
-        msg = f"the columns are {names:.200}; needed are {listed}"
-        raise InputError(msg, element="line 1")
+        raise InputError(f"the columns are {names:.200}; needed are {listed}", element="line 1")
     yield from rows
 
 
@@ -327,14 +332,16 @@ def _table_lines(
         if not any(cell.strip() for cell in cells):
             continue
         if reader.line_num > MOST_ROWS + 1:
-            msg = f"there are more than {MOST_ROWS} lines below the first; make the table smaller"
-            raise InputError(msg, element=f"line {reader.line_num}")
+            raise InputError(
+                f"there are more than {MOST_ROWS} lines below the first; make the table smaller",
+                element=f"line {reader.line_num}",
+            )
         if len(cells) != len(columns):
-            msg = f"{len(cells)} values for {len(columns)} columns"
-            raise InputError(msg, element=f"line {reader.line_num}")
+            raise InputError(
+                f"{len(cells)} values for {len(columns)} columns", element=f"line {reader.line_num}"
+            )
         found = True
         values = (cell.strip() for cell in cells)
         yield _TableLine(reader.line_num, dict(zip(columns, values, strict=True)))
     if not found:
-        msg = "there are no lines below the first"
-        raise InputError(msg)
+        raise InputError("there are no lines below the first")

@@ -43,8 +43,7 @@ class SpeedChange(Part):
         if self.shape != "step":
             one_of(self, names, "measure")
         elif given := [name for name in names if getattr(self, name) is not None]:
-            msg = f"a step takes no time; leave out {' and '.join(given)}"
-            raise ValueError(msg)
+            raise ValueError(f"a step takes no time; leave out {' and '.join(given)}")
         return self
 
 
@@ -79,8 +78,7 @@ class LaneChange(Part):
     def _some_lane(self) -> Self:
         one_of(self, ("by", "to"), "lane")
         if self.by == 0:
-            msg = "by must not be 0"
-            raise ValueError(msg)
+            raise ValueError("by must not be 0")
         return self
 
 
@@ -155,27 +153,28 @@ class PathFollowing(Part):
     def _metres_from_it(self) -> Self:
         for place in self.points if self.relative_to is not None else ():
             if isinstance(place, str):
-                msg = f"{place!r} is a node; relative to {self.relative_to!r} give x and y"
-                raise ValueError(msg)
+                raise ValueError(
+                    f"{place!r} is a node; relative to {self.relative_to!r} give x and y"
+                )
         return self
 
     @model_validator(mode="after")
     def _one_timing(self) -> Self:
         given = [name for name in ("speed", "speeds", "times") if getattr(self, name)]
         if len(given) > 1:
-            msg = f"give one of speed, speeds and times, not {' and '.join(given)}"
-            raise ValueError(msg)
+            raise ValueError(f"give one of speed, speeds and times, not {' and '.join(given)}")
         for name in given:
             values = getattr(self, name)
             if name != "speed" and len(values) != len(self.points):
-                msg = f"{len(values)} {name} for {len(self.points)} points; give one for each"
-                raise ValueError(msg)
+                raise ValueError(
+                    f"{len(values)} {name} for {len(self.points)} points; give one for each"
+                )
         if any(a >= b for a, b in itertools.pairwise(self.times)):
-            msg = "times must grow"
-            raise ValueError(msg)
+            raise ValueError("times must grow")
         if any(a == b == 0.0 for a, b in itertools.pairwise(self.speeds)):
-            msg = "two speeds of 0 follow one another; the second point is never reached"
-            raise ValueError(msg)
+            raise ValueError(
+                "two speeds of 0 follow one another; the second point is never reached"
+            )
         return self
 
 
@@ -192,11 +191,9 @@ class Replaying(Part):
     def _growing(self) -> Self:
         for index, (one, other) in enumerate(itertools.pairwise(self.rows)):
             if one[0] >= other[0]:
-                msg = f"rows[{index + 1}] is at {other[0]:g} s, not after {one[0]:g} s"
-                raise ValueError(msg)
+                raise ValueError(f"rows[{index + 1}] is at {other[0]:g} s, not after {one[0]:g} s")
         if self.rows[0][0] != 0.0:
-            msg = f"rows must begin at 0 s, not at {self.rows[0][0]:g} s"
-            raise ValueError(msg)
+            raise ValueError(f"rows must begin at 0 s, not at {self.rows[0][0]:g} s")
         return self
 
 
@@ -216,8 +213,7 @@ class Arriving(Part):
     @model_validator(mode="after")
     def _steady_speed(self) -> Self:
         if self.steady and not self.speed:
-            msg = f"steady for {self.steady:g} m wants a speed above 0"
-            raise ValueError(msg)
+            raise ValueError(f"steady for {self.steady:g} m wants a speed above 0")
         return self
 
 
@@ -246,8 +242,7 @@ class SignalSwitch(Part):
     @model_validator(mode="after")
     def _green_of_some(self) -> Self:
         if (self.shows == "green") != (self.movement is not None):
-            msg = "green needs a movement, and only green does"
-            raise ValueError(msg)
+            raise ValueError("green needs a movement, and only green does")
         return self
 
 
@@ -321,8 +316,7 @@ class Action(Part):
         one_of(self, tuple(type(self).model_fields), "action")
         for one in self.together or ():
             if one.together is not None:
-                msg = "what runs together cannot itself be together"
-                raise ValueError(msg)
+                raise ValueError("what runs together cannot itself be together")
         return self
 
     @property

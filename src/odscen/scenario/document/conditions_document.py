@@ -31,8 +31,7 @@ def one_of(part: Part, names: tuple[str, ...], what: str) -> None:
     given = [name for name in names if getattr(part, name) is not None]
     if len(given) != 1:
         listed = ", ".join(names)
-        msg = f"give one {what} of {listed}, not {' and '.join(given) or 'none'}"
-        raise ValueError(msg)
+        raise ValueError(f"give one {what} of {listed}, not {' and '.join(given) or 'none'}")
 
 
 class Bounded(Part):

@@ -87,8 +87,7 @@ class Choice(Part):
     def _same_length(self) -> Choice:
         if self.weights is not None:
             if len(self.weights) != len(self.values):
-                msg = f"{len(self.values)} values but {len(self.weights)} weights"
-                raise ValueError(msg)
+                raise ValueError(f"{len(self.values)} values but {len(self.weights)} weights")
             check_weights(self.weights, what="weight")
         return self
 
@@ -152,16 +151,15 @@ def draw_key(shares: Mapping[_Key, float], rng: np.random.Generator) -> _Key:
 
 def _check_order(low: float, high: float) -> None:
     if low > high:
-        msg = f"low {low:g} is above high {high:g}"
-        raise ValueError(msg)
+        raise ValueError(f"low {low:g} is above high {high:g}")
 
 
 def check_weights(weights: Iterable[float], *, what: str) -> None:
     """Raise ``ValueError`` if nothing can be drawn by these weights."""
     total = sum(weights)
     if total <= 0:
-        msg = f"at least one {what} must be above 0"
-        raise ValueError(msg)
+        raise ValueError(f"at least one {what} must be above 0")
     if total == math.inf:
-        msg = f"the sum of the {what}s is no number; they are relative, smaller ones say the same"
-        raise ValueError(msg)
+        raise ValueError(
+            f"the sum of the {what}s is no number; they are relative, smaller ones say the same"
+        )

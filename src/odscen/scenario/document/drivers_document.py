@@ -35,8 +35,7 @@ class DriverSet(Part):
     @model_validator(mode="after")
     def _known(self) -> Self:
         if self.id in DRIVING_STYLES:
-            msg = f"{self.id!r} is a driving style; give the set another id"
-            raise ValueError(msg)
+            raise ValueError(f"{self.id!r} is a driving style; give the set another id")
         for name, value in self.parameters.items():
             _check_parameter(name, *drawn_range(value))
         return self
@@ -47,13 +46,11 @@ def _check_parameter(name: str, low: float, high: float) -> None:
     if known is None:
         near = get_close_matches(name, DRIVER_PARAMETERS, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""
-        msg = f"drivers have no parameter {name!r}{hint}"
-        raise ValueError(msg)
+        raise ValueError(f"drivers have no parameter {name!r}{hint}")
     if not known.low <= low <= high <= known.high:
         unit = f" {known.unit}" if known.unit else ""
         said = f"{low:g}" if low == high else f"{low:g} to {high:g}"
-        msg = f"{name} must be {known.low:g} to {known.high:g}{unit}, not {said}"
-        raise ValueError(msg)
+        raise ValueError(f"{name} must be {known.low:g} to {known.high:g}{unit}, not {said}")
 
 
 class Drivers(Part):
@@ -78,8 +75,9 @@ class Drivers(Part):
     @model_validator(mode="after")
     def _one_headway(self) -> Self:
         if self.saturation_flow is not None and self.headway is not None:
-            msg = "give one of saturation_flow and headway, not both: each decides the other"
-            raise ValueError(msg)
+            raise ValueError(
+                "give one of saturation_flow and headway, not both: each decides the other"
+            )
         return self
 
     @model_validator(mode="after")
@@ -87,12 +85,12 @@ class Drivers(Part):
         ids = [one.id for one in self.sets]
         twice = sorted({one for one in ids if ids.count(one) > 1})
         if twice:
-            msg = f"several driver sets have the id {twice[0]!r}"
-            raise ValueError(msg)
+            raise ValueError(f"several driver sets have the id {twice[0]!r}")
         for style in self.shares:
             if style not in self.styles:
-                msg = f"shares name {style!r}, which is neither a driving style nor a driver set"
-                raise ValueError(msg)
+                raise ValueError(
+                    f"shares name {style!r}, which is neither a driving style nor a driver set"
+                )
         if self.shares:
             check_weights(self.shares.values(), what="share")
         return self

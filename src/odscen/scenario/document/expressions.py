@@ -82,23 +82,20 @@ def evaluate(text: str, values: Mapping[str, float]) -> float:
     for name in sorted(names_in(text)):
         if name not in values:
             known = ", ".join(f"${one}" for one in values) or "none"
-            msg = f"{shown!r} names ${name}, which is no parameter; there are {known}"
-            raise InputError(msg)
+            raise InputError(f"{shown!r} names ${name}, which is no parameter; there are {known}")
     if len(text) > LONGEST:
-        msg = f"the expression {shown!r} is longer than {LONGEST} characters"
-        raise InputError(msg)
+        raise InputError(f"the expression {shown!r} is longer than {LONGEST} characters")
     try:
         tree = ast.parse(_NAME.sub(r" _\1 ", text).strip(), mode="eval")
         value = float(_value(tree.body, values))
     except (SyntaxError, RecursionError, MemoryError) as error:
-        msg = f"{shown!r} is no expression: numbers, $names, + - * / % and brackets make one"
-        raise InputError(msg) from error
+        raise InputError(
+            f"{shown!r} is no expression: numbers, $names, + - * / % and brackets make one"
+        ) from error
     except (ArithmeticError, ValueError) as error:
-        msg = f"{shown!r} has no value: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"{shown!r} has no value: {error}") from error
     if not math.isfinite(value):
-        msg = f"{shown!r} is {value}, not a finite number"
-        raise InputError(msg)
+        raise InputError(f"{shown!r} is {value}, not a finite number")
     return value
 
 

@@ -53,8 +53,11 @@ def computed(data: dict[str, Any], *, file: str | None = None) -> dict[str, Any]
     if reading.problems:
         count = len(reading.problems)
         what = "a formula" if count == 1 else f"{count} formulas"
-        msg = f"the scenario document has {what} without a value"
-        raise ScenarioError(msg, problems=reading.problems, file=file)
+        raise ScenarioError(
+            f"the scenario document has {what} without a value",
+            problems=reading.problems,
+            file=file,
+        )
     if reading.found:
         result["formulas"] = reading.found
     return result
@@ -136,11 +139,11 @@ def put_formula(written: dict[str, Any], whole: Mapping[str, Any], place: str, t
     try:
         there = _looked_up(whole, keys)
     except (LookupError, TypeError) as error:
-        what = "number"
-        raise NotFoundError(what, place, []) from error
+        raise NotFoundError("number", place, []) from error
     if isinstance(there, bool) or not (there is None or isinstance(there, int | float)):
-        msg = f"{place}: only a number can be computed, and this is {json.dumps(there):.60}"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"{place}: only a number can be computed, and this is {json.dumps(there):.60}"
+        )
     _set(written, keys, text)
 
 

@@ -48,8 +48,9 @@ def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
             raise ScenarioError(foreign, file=file) from error
         problems = validation_problems(error)
         count = "a problem" if len(problems) == 1 else f"{error.error_count()} problems"
-        msg = f"the scenario document has {count}"
-        raise ScenarioError(msg, problems=problems, file=file) from error
+        raise ScenarioError(
+            f"the scenario document has {count}", problems=problems, file=file
+        ) from error
 
 
 def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
@@ -65,8 +66,7 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
     for name, value in values.items():
         if name not in scenario.parameters:
             known = ", ".join(scenario.parameters) or "none"
-            msg = f"no parameter {name!r}; there are {known}"
-            raise ScenarioError(msg)
+            raise ScenarioError(f"no parameter {name!r}; there are {known}")
         data["parameters"][name]["value"] = value
     return loads(json.dumps(data))
 

@@ -29,8 +29,7 @@ class TimedMeasure(Part):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.end is not None and self.end <= self.begin:
-            msg = f"it ends at {self.end:g} s, not after it begins ({self.begin:g} s)"
-            raise ValueError(msg)
+            raise ValueError(f"it ends at {self.end:g} s, not after it begins ({self.begin:g} s)")
         return self
 
 
@@ -57,8 +56,7 @@ class Roadworks(TimedMeasure):
     @model_validator(mode="after")
     def _does_something(self) -> Self:
         if self.speed is None and self.width is None and not self.closed_lanes:
-            msg = "give at least one of speed, closed_lanes and width"
-            raise ValueError(msg)
+            raise ValueError("give at least one of speed, closed_lanes and width")
         return self
 
 
@@ -94,11 +92,9 @@ class ChangedPermission(TimedMeasure):
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if bool(self.allowed) == bool(self.banned):
-            msg = "give either allowed or banned"
-            raise ValueError(msg)
+            raise ValueError("give either allowed or banned")
         if Category.PEDESTRIAN in (*self.allowed, *self.banned):
-            msg = "measures are about vehicles; pedestrians walk beside the lanes"
-            raise ValueError(msg)
+            raise ValueError("measures are about vehicles; pedestrians walk beside the lanes")
         return self
 
 

@@ -29,8 +29,7 @@ class Parameter(Part):
     def _within_bounds(self) -> Self:
         low, high = self.min, self.max
         if low is not None and high is not None and low > high:
-            msg = f"min {low:g} is above max {high:g}"
-            raise ValueError(msg)
+            raise ValueError(f"min {low:g} is above max {high:g}")
         if (low is not None and self.value < low) or (high is not None and self.value > high):
             bounds = f"{'' if low is None else f'{low:g}'}..{'' if high is None else f'{high:g}'}"
             msg = f"value {self.value:g} is outside {bounds} {self.unit}".rstrip()

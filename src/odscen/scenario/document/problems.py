@@ -63,5 +63,8 @@ def refuse_errors(problems: Iterable[Problem], *, file: str | None = None) -> No
         return
     if len(errors) == 1:
         raise ScenarioError(errors[0].message, element=errors[0].where, file=file)
-    msg = f"the scenario has {len(errors)} errors"
-    raise ScenarioError(msg, problems=[f"{p.where}: {p.message}" for p in errors], file=file)
+    raise ScenarioError(
+        f"the scenario has {len(errors)} errors",
+        problems=[f"{p.where}: {p.message}" for p in errors],
+        file=file,
+    )

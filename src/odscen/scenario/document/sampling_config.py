@@ -164,8 +164,7 @@ class SamplingConfig(Part):
     @classmethod
     def _vehicles_only(cls, shares: dict[Category, float]) -> dict[Category, float]:
         if Category.PEDESTRIAN in shares:
-            msg = "pedestrians are not vehicles; give pedestrian_share instead"
-            raise ValueError(msg)
+            raise ValueError("pedestrians are not vehicles; give pedestrian_share instead")
         return _with_share(shares)
 
     @field_validator("fill")
@@ -175,8 +174,7 @@ class SamplingConfig(Part):
             getattr(fill, name) for name in ("value", "low", "high") if hasattr(fill, name)
         ] or list(fill.values)
         if min(values) < 0 or max(values) > 1:
-            msg = "a fill share lies between 0 and 1"
-            raise ValueError(msg)
+            raise ValueError("a fill share lies between 0 and 1")
         return fill
 
 
@@ -195,8 +193,9 @@ def overridden(
         changes["fill"] = fill
     if roi_segments is not None:
         if roi_segments < 1:
-            msg = f"a region has at least 1 segment, not {roi_segments}"
-            raise ScenarioError(msg, element="roi.segments")
+            raise ScenarioError(
+                f"a region has at least 1 segment, not {roi_segments}", element="roi.segments"
+            )
         changes["roi"] = {"segments": roi_segments}
     fields = {name: getattr(config, name) for name in SamplingConfig.model_fields}
     return validated(SamplingConfig, fields | changes)
@@ -213,13 +212,17 @@ def loads_config(text: str, *, file: str | None = None) -> SamplingConfig:
     try:
         data = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        msg = f"the sampling configuration cannot be read: {error}"
-        raise ScenarioError(msg, file=file) from error
+        raise ScenarioError(
+            f"the sampling configuration cannot be read: {error}", file=file
+        ) from error
     try:
         return SamplingConfig.model_validate(data)
     except ValidationError as error:
-        msg = "the sampling configuration has problems"
-        raise ScenarioError(msg, problems=validation_problems(error), file=file) from error
+        raise ScenarioError(
+            "the sampling configuration has problems",
+            problems=validation_problems(error),
+            file=file,
+        ) from error
 
 
 def _with_share(shares: dict[Any, float]) -> dict[Any, float]:

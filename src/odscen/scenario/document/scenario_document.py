@@ -144,8 +144,7 @@ class Profile(Part):
     @model_validator(mode="after")
     def _not_empty(self) -> Self:
         if sum(self.shares) <= 0:
-            msg = "at least one share must be above 0"
-            raise ValueError(msg)
+            raise ValueError("at least one share must be above 0")
         return self
 
 
@@ -202,8 +201,9 @@ class Background(Window):
     def _one_amount(self) -> Self:
         given = [name for name in ("fill", "per_km", "trips") if getattr(self, name) is not None]
         if len(given) != 1:
-            msg = f"give one of fill, per_km and trips, not {' and '.join(given) or 'none'}"
-            raise ValueError(msg)
+            raise ValueError(
+                f"give one of fill, per_km and trips, not {' and '.join(given) or 'none'}"
+            )
         return self
 
 
@@ -228,11 +228,11 @@ class VehicleInput(Window):
     @model_validator(mode="after")
     def _one_volume(self) -> Self:
         if (self.per_hour is None) == (not self.volumes):
-            msg = f"give one of per_hour and volumes, not {'both' if self.volumes else 'none'}"
-            raise ValueError(msg)
+            raise ValueError(
+                f"give one of per_hour and volumes, not {'both' if self.volumes else 'none'}"
+            )
         if self.volumes and self.profile is not None:
-            msg = f"volumes say when vehicles come; leave profile {self.profile!r} out"
-            raise ValueError(msg)
+            raise ValueError(f"volumes say when vehicles come; leave profile {self.profile!r} out")
         return self
 
 

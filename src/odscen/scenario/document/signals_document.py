@@ -121,14 +121,11 @@ class JunctionTiming(Part):
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         if bool(self.groups) != bool(self.stages):
-            msg = "a program needs both groups and stages"
-            raise ValueError(msg)
+            raise ValueError("a program needs both groups and stages")
         if self.groups and self.green:
-            msg = "give the green in the stages of the program, not beside them"
-            raise ValueError(msg)
+            raise ValueError("give the green in the stages of the program, not beside them")
         if not self.groups and (self.intergreens or self.plans or self.cycle is not None):
-            msg = "intergreens, plans and a cycle need groups and stages"
-            raise ValueError(msg)
+            raise ValueError("intergreens, plans and a cycle need groups and stages")
         return self
 
 

@@ -65,15 +65,14 @@ class TransitLine(Part):
     @model_validator(mode="after")
     def _one_timetable(self) -> Self:
         if (self.headway is None) == (not self.departures):
-            msg = f"give one of headway and departures, not {'both' if self.headway else 'none'}"
-            raise ValueError(msg)
+            raise ValueError(
+                f"give one of headway and departures, not {'both' if self.headway else 'none'}"
+            )
         given = [one.after for one in self.stops if one.after is not None]
         if any(later <= earlier for earlier, later in pairwise(given)):
-            msg = "scheduled departures (after) must grow from stop to stop"
-            raise ValueError(msg)
+            raise ValueError("scheduled departures (after) must grow from stop to stop")
         if list(self.departures) != sorted(set(self.departures)):
-            msg = "departures must grow, each given once"
-            raise ValueError(msg)
+            raise ValueError("departures must grow, each given once")
         return self
 
 

@@ -37,8 +37,9 @@ def validated(model: type[_Model], fields: Mapping[str, Any]) -> _Model:
         return model.model_validate(fields)
     except ValidationError as error:
         problems = validation_problems(error)
-        msg = f"{model.__name__.lower()}: {problems[0]}"
-        raise ScenarioError(msg, problems=problems[1:]) from error
+        raise ScenarioError(
+            f"{model.__name__.lower()}: {problems[0]}", problems=problems[1:]
+        ) from error
 
 
 def _problem(details: ErrorDetails) -> str:

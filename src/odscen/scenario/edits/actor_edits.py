@@ -130,15 +130,15 @@ def change_actor(scenario: Scenario, actor: str, **fields: Annotated[Any, Actor]
     old = scenario.actors[index]
     own_edit = {"spawn": "move_actor", "goal": "set_goal", "ego": "set_ego"}
     for name in sorted(own_edit.keys() & fields.keys()):
-        msg = f"{name} of an actor is changed by {own_edit[name]}"
-        raise ScenarioError(msg)
+        raise ScenarioError(f"{name} of an actor is changed by {own_edit[name]}")
     if "category" in fields and fields["category"] != old.category:
         fields = {"model": None, **fields}
     changed = with_actor(scenario, index, **fields)
     new = changed.actors[index]
     if on_foot(new.category) != on_foot(old.category):
-        msg = f"{actor!r} is where a {old.category} can be, not a {new.category}; add a new one"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"{actor!r} is where a {old.category} can be, not a {new.category}; add a new one"
+        )
     refuse_errors(duplicate_ids(changed))
     return changed
 
@@ -216,8 +216,7 @@ def fill_roi(
     if generator is not None and place_by is not None:
         place = place_by(generator, options or {}, seed)
     elif generator is not None or options:
-        msg = "there is no generator here to be named, or to have options"
-        raise ScenarioError(msg)
+        raise ScenarioError("there is no generator here to be named, or to have options")
     crowd = sample_scenario(
         graph,
         overridden(SamplingConfig(), fill=share),
@@ -248,6 +247,5 @@ def set_ego(scenario: Scenario, actor: str | None) -> Scenario:
         return with_only_ego(scenario, None)
     chosen = scenario.actors[index_of(scenario.actors, actor)]
     if on_foot(chosen.category):
-        msg = f"{actor!r} is a pedestrian; only a vehicle can be the ego"
-        raise ScenarioError(msg)
+        raise ScenarioError(f"{actor!r} is a pedestrian; only a vehicle can be the ego")
     return with_only_ego(scenario, actor)

@@ -212,9 +212,10 @@ def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario
         left = tuple(one for one in ones if one.id != part)
         if len(left) < len(ones):
             return _checked(_changed(scenario, **{kind: left}), graph)
-    what = "part of the demand"
     raise NotFoundError(
-        what, part, [one.id for kind in kinds for one in getattr(scenario.demand, kind)]
+        "part of the demand",
+        part,
+        [one.id for kind in kinds for one in getattr(scenario.demand, kind)],
     )
 
 

@@ -148,5 +148,6 @@ def read_edit(data: Mapping[str, Any]) -> EditBase:
         problems = validation_problems(err)
         if data.get("kind") not in EDIT_ENTRIES:
             problems = (f"kind: {data.get('kind')!r} is none of {', '.join(EDIT_ENTRIES)}",)
-        msg = f"this edit cannot be read: {problems[0]}"
-        raise ScenarioError(msg, problems=problems[1:]) from err
+        raise ScenarioError(
+            f"this edit cannot be read: {problems[0]}", problems=problems[1:]
+        ) from err

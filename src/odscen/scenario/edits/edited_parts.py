@@ -109,8 +109,7 @@ def index_of(ones: tuple[PlacedOne, ...], name: str) -> int:
     """
     ids = [one.id for one in ones]
     if name not in ids:
-        what = "actor or flow"
-        raise NotFoundError(what, name, ids)
+        raise NotFoundError("actor or flow", name, ids)
     return ids.index(name)
 
 

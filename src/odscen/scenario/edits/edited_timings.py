@@ -41,11 +41,10 @@ def own_program(
     """
     light, timing = timing_of_light(scenario, lights, junction)
     if light is None or not timing.stages:
-        msg = (
+        raise InputError(
             f"the light of junction {junction!r} has no program of this scenario; take over that "
             "of the map first"
         )
-        raise InputError(msg)
     return light, timing
 
 

@@ -43,11 +43,10 @@ def with_group(
         timing = _replaced(timing, old, changed_part(old, fields))
         name = fields.get("id", name)
     elif not fields.get("movements"):
-        msg = (
+        raise InputError(
             f"the light of junction {timing.junction!r} has no group {name!r}; a new one needs "
             f"movements, an old one is one of {', '.join(ids)}"
         )
-        raise InputError(msg)
     else:
         new = validated(ProgramGroup, {**fields, "id": name})
         timing = _joined(timing, light, new)
@@ -180,11 +179,11 @@ def without_group(timing: JunctionTiming, light: Light, name: str, into: str) ->
     groups = {one.id: one for one in timing.groups}
     for one in (name, into):
         if one not in groups:
-            what = f"signal group of the light of junction {timing.junction!r}"
-            raise NotFoundError(what, one, list(groups))
+            raise NotFoundError(
+                f"signal group of the light of junction {timing.junction!r}", one, list(groups)
+            )
     if name == into:
-        msg = f"the movements of group {name!r} have to join another group"
-        raise InputError(msg)
+        raise InputError(f"the movements of group {name!r} have to join another group")
     members = {n for one in (name, into) for n in designed_group(groups[one], light).movements}
     return with_group(timing, light, into, {"movements": shortest_names(members, light.movements)})
 
@@ -199,8 +198,9 @@ def stage_of(timing: JunctionTiming, name: str) -> ProgramStage:
     """
     found = {one.id: one for one in timing.stages}
     if name not in found:
-        what = f"stage of the light of junction {timing.junction!r}"
-        raise NotFoundError(what, name, list(found))
+        raise NotFoundError(
+            f"stage of the light of junction {timing.junction!r}", name, list(found)
+        )
     return found[name]
 
 
@@ -218,8 +218,9 @@ def with_new_stage(
     """
     ids = [one.id for one in timing.stages]
     if new.id in ids:
-        msg = f"the light of junction {timing.junction!r} has a stage {new.id!r} already"
-        raise InputError(msg)
+        raise InputError(
+            f"the light of junction {timing.junction!r} has a stage {new.id!r} already"
+        )
     if after is not None:
         stage_of(timing, after)
     at = len(ids) if after is None else ids.index(after) + 1
@@ -247,8 +248,9 @@ def without_stage(timing: JunctionTiming, name: str) -> JunctionTiming:
     """
     stage_of(timing, name)
     if len(timing.stages) == 1:
-        msg = f"stage {name!r} is the only one of the light of junction {timing.junction!r}"
-        raise InputError(msg)
+        raise InputError(
+            f"stage {name!r} is the only one of the light of junction {timing.junction!r}"
+        )
     detectors = tuple(
         changed_part(one, {"stages": tuple(s for s in one.stages if s != name)})
         for one in timing.detectors

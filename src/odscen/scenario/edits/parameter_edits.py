@@ -106,8 +106,9 @@ def set_formula(scenario: Scenario, *, place: str, formula: str | None) -> Scena
         return loads(json.dumps(data))
     evaluate(formula, {name: one.value for name, one in scenario.parameters.items()})
     if not names_in(formula):
-        msg = f"{place}: the formula {formula!r} names no parameter; write $gap for one called gap"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"{place}: the formula {formula!r} names no parameter; write $gap for one called gap"
+        )
     put_formula(data, scenario.model_dump(mode="json"), place, formula)
     return loads(json.dumps(data))
 
@@ -115,8 +116,7 @@ def set_formula(scenario: Scenario, *, place: str, formula: str | None) -> Scena
 def _renamed(scenario: Scenario, old: str, new: str) -> Scenario:
     _refuse_unknown(scenario, old)
     if new in scenario.parameters:
-        msg = f"there is a parameter {new!r} already"
-        raise ScenarioError(msg)
+        raise ScenarioError(f"there is a parameter {new!r} already")
     parameters = {new if name == old else name: p for name, p in scenario.parameters.items()}
     named = re.compile(rf"\${re.escape(old)}(?![A-Za-z0-9_])")
     formulas = {

@@ -52,8 +52,7 @@ def with_green(
     stages = _stages(timing, light, plan)
     old = {one.id: one.green for one in stages}
     if stage not in old:
-        what = f"stage of the light of junction {timing.junction!r}"
-        raise NotFoundError(what, stage, list(old))
+        raise NotFoundError(f"stage of the light of junction {timing.junction!r}", stage, list(old))
     greens = {stage: green}
     if keep_cycle:
         other = _next_stage(stages, stage)
@@ -74,8 +73,9 @@ def _next_stage(stages: Sequence[PlannedStage], stage: str) -> str:
     turned = (*stages[at + 1 :], *stages[:at])
     found = next((one.id for one in turned if not one.on_call), None)
     if found is None:
-        msg = f"stage {stage!r} has no stage beside it that could give or take its seconds"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"stage {stage!r} has no stage beside it that could give or take its seconds"
+        )
     return found
 
 
@@ -115,14 +115,12 @@ def _stages(timing: JunctionTiming, light: Light, plan: str | None) -> tuple[Pla
 def _plan(timing: JunctionTiming, name: str | None) -> DayPlan:
     ids = [one.id for one in timing.plans]
     if name is None:
-        msg = (
+        raise InputError(
             f"the light of junction {timing.junction!r} has plans of the day: name one of "
             f"{', '.join(ids)}"
         )
-        raise InputError(msg)
     if name not in ids:
-        what = "plan of the day"
-        raise NotFoundError(what, name, ids)
+        raise NotFoundError("plan of the day", name, ids)
     return timing.plans[ids.index(name)]
 
 
@@ -185,7 +183,6 @@ def with_stage(timing: JunctionTiming, stage: str, fields: Mapping[str, Any]) ->
     """
     ids = [one.id for one in timing.stages]
     if stage not in ids:
-        what = f"stage of the light of junction {timing.junction!r}"
-        raise NotFoundError(what, stage, ids)
+        raise NotFoundError(f"stage of the light of junction {timing.junction!r}", stage, ids)
     stages = tuple(changed_part(one, fields) if one.id == stage else one for one in timing.stages)
     return changed_part(timing, {"stages": stages})

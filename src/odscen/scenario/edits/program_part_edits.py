@@ -307,8 +307,7 @@ def remove_plan(
     light, old = own_program(scenario, lights, junction)
     gone = next((one for one in old.plans if one.id == plan), None)
     if gone is None:
-        what = "plan of the day"
-        raise NotFoundError(what, plan, [one.id for one in old.plans])
+        raise NotFoundError("plan of the day", plan, [one.id for one in old.plans])
     left = tuple(one for one in old.plans if one is not gone)
     changes: dict[str, Any] = {"plans": left}
     if not left:

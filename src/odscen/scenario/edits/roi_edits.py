@@ -53,11 +53,11 @@ def grow_roi(scenario: Scenario, graph: MapGraph, segment: str) -> Scenario:
     """
     _known_segment(graph, segment)
     if segment in scenario.roi:
-        msg = f"segment {segment!r} is in the region of interest already"
-        raise ScenarioError(msg)
+        raise ScenarioError(f"segment {segment!r} is in the region of interest already")
     if segment not in eligible_segments(scenario, graph):
-        msg = f"segment {segment!r} does not touch the region of interest; add one between first"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"segment {segment!r} does not touch the region of interest; add one between first"
+        )
     return with_fields(scenario, roi=(*scenario.roi, segment))
 
 
@@ -81,11 +81,9 @@ def extend_roi(scenario: Scenario, graph: MapGraph, segments: Sequence[str]) -> 
         _known_segment(graph, segment)
     roi = tuple(dict.fromkeys((*scenario.roi, *segments)))
     if len(roi) == len(scenario.roi):
-        msg = "all of these segments are in the region of interest already"
-        raise ScenarioError(msg)
+        raise ScenarioError("all of these segments are in the region of interest already")
     if not is_connected(graph.segments, roi):
-        msg = "with these segments the region of interest would be in several pieces"
-        raise ScenarioError(msg)
+        raise ScenarioError("with these segments the region of interest would be in several pieces")
     return with_fields(scenario, roi=roi)
 
 
@@ -110,17 +108,18 @@ def shrink_roi(
     """
     _known_segment(graph, segment)
     if segment not in scenario.roi:
-        msg = f"segment {segment!r} is not in the region of interest"
-        raise ScenarioError(msg)
+        raise ScenarioError(f"segment {segment!r} is not in the region of interest")
     if segment not in removable_segments(scenario, graph):
-        msg = f"without segment {segment!r} the region of interest would be in several pieces"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"without segment {segment!r} the region of interest would be in several pieces"
+        )
     region = Region.of(graph, [segment])
     users = [one for one in all_placed(scenario) if _uses(region, one)]
     if users and not with_actors:
         names = ", ".join(repr(one.id) for one in users)
-        msg = f"segment {segment!r} is where {names} start or go; remove or move them first"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"segment {segment!r} is where {names} start or go; remove or move them first"
+        )
     return with_fields(
         scenario,
         roi=tuple(name for name in scenario.roi if name != segment),
@@ -131,8 +130,7 @@ def shrink_roi(
 
 def _known_segment(graph: MapGraph, segment: str) -> None:
     if segment not in graph.segments.ids:
-        what = "segment"
-        raise NotFoundError(what, segment, graph.segments.ids)
+        raise NotFoundError("segment", segment, graph.segments.ids)
 
 
 def _inside(region: Region, node: str | None) -> bool:

@@ -64,8 +64,7 @@ def clear_timing(scenario: Scenario, junction: str) -> Scenario:
     timings = scenario.signals.junctions
     names = [one.junction for one in timings]
     if junction not in names:
-        what = "timing of junction"
-        raise NotFoundError(what, junction, names)
+        raise NotFoundError("timing of junction", junction, names)
     left = tuple(one for one in timings if one.junction != junction)
     return with_fields(scenario, signals=changed_part(scenario.signals, {"junctions": left}))
 
@@ -152,8 +151,9 @@ def set_stage(
         If greens conflict, or the stage cannot be timed so.
     """
     if "id" in fields:
-        msg = f"stage {stage!r} keeps its id: detectors and plans of the day refer to it"
-        raise InputError(msg)
+        raise InputError(
+            f"stage {stage!r} keeps its id: detectors and plans of the day refer to it"
+        )
     _, old = own_program(scenario, lights, junction)
     return with_timing(scenario, lights, with_stage(old, stage, fields))
 

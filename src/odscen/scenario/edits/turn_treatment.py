@@ -80,18 +80,16 @@ def with_turn(
     asked = next((one for one in known if (one.approach, one.turn) == (approach, turn)), None)
     if asked is None:
         names = ", ".join(f"{one.approach} {one.turn}" for one in known) or "none"
-        msg = (
+        raise InputError(
             f"{approach} {turn} is no turn across oncoming traffic of the light of junction "
             f"{timing.junction!r}; there are {names}"
         )
-        raise InputError(msg)
     if treatment != "permissive" and not asked.alone:
         lanes = ", ".join(sorted({light.movements[n].lanes[0] for n in asked.movements}))
-        msg = (
+        raise InputError(
             f"the {turn} turn from {approach} shares lane {lanes} with other movements: who waits "
             "for an arrow would stop those behind; it can only be permissive"
         )
-        raise InputError(msg)
     return _Treatment(timing, light, asked, treatment).timing()
 
 
@@ -125,11 +123,10 @@ class _Treatment:
         stages = list(self._timing.stages)
         with_approach = [one.id for one in stages if self._mates & set(one.groups)]
         if not with_approach:
-            msg = (
+            raise InputError(
                 f"nothing but the {self._turn.turn} turn comes from {self._turn.approach} with "
                 "green of its own: there is no stage beside which it could be treated otherwise"
             )
-            raise InputError(msg)
         cleared = [_without(one, self._own) for one in stages]
         if self._treatment != "protected":
             cleared = [

@@ -32,8 +32,9 @@ def read_any(text: str | bytes, *, file: str | None = None) -> Scenario:
     try:
         decoded = text if isinstance(text, str) else text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        msg = f"not a scenario: byte {error.start} is not UTF-8"
-        raise ScenarioError(msg, file=file) from error
+        raise ScenarioError(
+            f"not a scenario: byte {error.start} is not UTF-8", file=file
+        ) from error
     start = decoded.removeprefix("\ufeff").lstrip()
     if start.startswith("<"):
         return from_graphml(start, file=file)

@@ -90,8 +90,9 @@ def _scenario(fields: Mapping[str, Any], tables: Mapping[str, frozenset[str]]) -
     except ValidationError as error:
         problems = [_named(one, tables) for one in validation_problems(error)]
         what = "a problem" if len(problems) == 1 else f"{len(problems)} problems"
-        msg = f"the scenario of these arrays has {what}"
-        raise ScenarioError(msg, problems=problems) from error
+        raise ScenarioError(
+            f"the scenario of these arrays has {what}", problems=problems
+        ) from error
 
 
 def _named(problem: str, tables: Mapping[str, frozenset[str]]) -> str:
@@ -121,8 +122,10 @@ class _ArrayReading:
         self._graph: MapGraph = graph_from_arrays(arrays)
         said = self._document.get("map")
         if isinstance(said, dict) and said.get("sha256") != self._graph.map_sha256:
-            msg = f"its graph is of {self._graph.map_sha256[:12]}..., the document of another map"
-            raise InputError(msg, element="array map")
+            raise InputError(
+                f"its graph is of {self._graph.map_sha256[:12]}..., the document of another map",
+                element="array map",
+            )
 
     def fields(self) -> dict[str, Any]:
         """The document, as its model takes it."""
@@ -284,23 +287,25 @@ class _ArrayReading:
         fits = values.ndim == 2 and len(values) == size and wide in (None, values.shape[1])
         if not fits or values.dtype.kind not in kinds:
             columns = "any number of" if wide is None else wide
-            msg = f"it is {values.shape} of {values.dtype}, not {size} rows of {columns} numbers"
-            raise _wrong(array, msg)
+            raise _wrong(
+                array,
+                f"it is {values.shape} of {values.dtype}, not {size} rows of {columns} numbers",
+            )
         return values
 
     def _column(self, array: str, kinds: str, called: str) -> Array:
         values = self._array(array)
         empty = values.ndim == 1 and not len(values)  # a list without values has any kind
         if values.ndim != 1 or (values.dtype.kind not in kinds and not empty):
-            msg = f"it is {values.shape} of {values.dtype}, not a column of {called}"
-            raise _wrong(array, msg)
+            raise _wrong(array, f"it is {values.shape} of {values.dtype}, not a column of {called}")
         return values
 
     def _one(self, array: str, kind: str) -> Any:
         values = self._array(array)
         if values.size != 1 or values.dtype.kind not in _ACCEPTED[kind]:
-            msg = f"it is {values.shape} of {values.dtype}, not one value: {_CALLED[kind]}"
-            raise _wrong(array, msg)
+            raise _wrong(
+                array, f"it is {values.shape} of {values.dtype}, not one value: {_CALLED[kind]}"
+            )
         return values.item()
 
     def _text(self, array: str) -> str:

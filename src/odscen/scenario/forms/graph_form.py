@@ -89,8 +89,9 @@ def from_graph(graph: nx.MultiDiGraph) -> Scenario:
     """
     about = dict(graph.graph)
     if about.get("format") != FORMAT:
-        msg = f"not a scenario graph: format is {about.get('format')!r}, expected {FORMAT!r}"
-        raise ScenarioError(msg)
+        raise ScenarioError(
+            f"not a scenario graph: format is {about.get('format')!r}, expected {FORMAT!r}"
+        )
     fields: dict[str, Any] = {
         name: about[name] for name in ("version", "name", "description", "seed") if name in about
     }
@@ -169,8 +170,10 @@ def _induced(graph: MapGraph, region: Region) -> nx.MultiDiGraph:
 def _write(graph: nx.MultiDiGraph, prefix: str, order: int, one: Actor | Flow) -> None:
     for what, node in (("spawn", one.spawn), ("goal", one.goal)):
         if node is not None and node not in graph:
-            msg = f"{one.id!r} has its {what} on {node!r}, which is not inside the region"
-            raise ScenarioError(msg, element=f"{prefix}s[{order}].{what}")
+            raise ScenarioError(
+                f"{one.id!r} has its {what} on {node!r}, which is not inside the region",
+                element=f"{prefix}s[{order}].{what}",
+            )
     data = one.model_dump(mode="json", exclude={"spawn", "goal"}, exclude_none=True)
     attributes = {
         f"{prefix}_{name}": json.dumps(value) if isinstance(value, dict | list) else value
@@ -207,8 +210,9 @@ def _goal(graph: nx.MultiDiGraph, node: str) -> str | None:
     edges = graph.out_edges(node, data="relation")
     goals = [str(target) for _, target, relation in edges if relation == GOAL]
     if len(goals) > 1:
-        msg = f"edges lead to {len(goals)} goals; there can be one"
-        raise ScenarioError(msg, element=f"node {node}")
+        raise ScenarioError(
+            f"edges lead to {len(goals)} goals; there can be one", element=f"node {node}"
+        )
     return goals[0] if goals else None
 
 
@@ -224,5 +228,4 @@ def _from_json(name: str, text: object) -> Any:
     try:
         return json.loads(str(text))
     except (ValueError, RecursionError) as error:
-        msg = f"attribute {name} is not JSON: {error}"
-        raise ScenarioError(msg) from error
+        raise ScenarioError(f"attribute {name} is not JSON: {error}") from error

@@ -88,8 +88,7 @@ def read_graphml(text: str) -> nx.MultiDiGraph:
     }
     element = root.find(_NAMESPACE + "graph")
     if element is None or element.get("edgedefault") != "directed":
-        msg = "not a GraphML file with a directed graph"
-        raise ScenarioError(msg)
+        raise ScenarioError("not a GraphML file with a directed graph")
     graph = nx.MultiDiGraph(**_values(element, keys, "graph"))
     for node in element.iterchildren(_NAMESPACE + "node"):
         name = node.get("id", "")
@@ -98,8 +97,7 @@ def read_graphml(text: str) -> nx.MultiDiGraph:
         source, target = edge.get("source", ""), edge.get("target", "")
         where = f"edge {source} -> {target}"
         if source not in graph or target not in graph:
-            msg = "one of its nodes is not in the graph"
-            raise ScenarioError(msg, element=where)
+            raise ScenarioError("one of its nodes is not in the graph", element=where)
         values = _values(edge, keys, where)
         graph.add_edge(source, target, key=values.get("relation"), **values)
     return graph
@@ -111,11 +109,9 @@ def _parse(text: str) -> etree._Element:
     except LimitError:
         raise
     except InputError as error:
-        msg = f"not GraphML: {error.problem}"
-        raise ScenarioError(msg) from error
+        raise ScenarioError(f"not GraphML: {error.problem}") from error
     if root.getroottree().docinfo.internalDTD is not None:
-        msg = "not GraphML: a document type declaration is not accepted"
-        raise ScenarioError(msg)
+        raise ScenarioError("not GraphML: a document type declaration is not accepted")
     return root
 
 
@@ -165,6 +161,7 @@ def _values(
         try:
             values[name] = _READERS[type_](text)
         except (KeyError, ValueError) as error:
-            msg = f"{name} is not a {type_ or 'value'}: {text[:60]!r}"
-            raise ScenarioError(msg, element=where) from error
+            raise ScenarioError(
+                f"{name} is not a {type_ or 'value'}: {text[:60]!r}", element=where
+            ) from error
     return values

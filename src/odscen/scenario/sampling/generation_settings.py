@@ -47,11 +47,11 @@ class GenerationSettings:
 
     def __post_init__(self) -> None:
         if self.count < 1:
-            msg = f"count must be at least 1, not {self.count}"
-            raise InputError(msg)
+            raise InputError(f"count must be at least 1, not {self.count}")
         if not 0 <= self.seed <= _LAST_SEED - self.count + 1:
-            msg = f"seeds must lie between 0 and {_LAST_SEED}, not {self.seed} and those after it"
-            raise InputError(msg)
+            raise InputError(
+                f"seeds must lie between 0 and {_LAST_SEED}, not {self.seed} and those after it"
+            )
         overridden(self.config, fill=self.fill, roi_segments=self.roi_segments)
 
     @property

@@ -69,16 +69,19 @@ def choose_map(maps: MapFilter, statistics: Mapping[str, Mapping[str, Any]], *, 
     numbers = {name: _numbers(of_map) for name, of_map in statistics.items()}
     known = {name for of_map in numbers.values() for name in of_map}
     if statistics and (unknown := sorted(used - known)):
-        msg = f"no statistic {unknown[0]!r}; there are {', '.join(sorted(known))}"
-        raise ScenarioError(msg, element="maps")
+        raise ScenarioError(
+            f"no statistic {unknown[0]!r}; there are {', '.join(sorted(known))}", element="maps"
+        )
     weights = {
         name: weight
         for name in sorted(numbers)
         if (weight := _map_weight(maps, name, numbers[name])) > 0
     }
     if not weights:
-        msg = f"none of the {len(statistics)} maps passes the filter; widen it or add maps"
-        raise ScenarioError(msg, element="maps")
+        raise ScenarioError(
+            f"none of the {len(statistics)} maps passes the filter; widen it or add maps",
+            element="maps",
+        )
     return draw_key(weights, stream(seed, "map"))
 
 
@@ -109,8 +112,7 @@ def sample_roi(
     with_lanes = np.unique(graph.lanes.segment)
     bases = [graph.segments.ids[row] for row in with_lanes if graph.segments.ids[row] not in barred]
     if not bases:
-        msg = f"map {graph.map_name!r} has no segment to start from"
-        raise ScenarioError(msg)
+        raise ScenarioError(f"map {graph.map_name!r} has no segment to start from")
     region = dict.fromkeys([bases[int(rng.integers(len(bases)))]])
     beside = _neighbour_table(graph)
     eligible: dict[SegmentId, None] = {}
@@ -166,11 +168,10 @@ def sample_scenario(
         if actors or fill == 0:
             break
     else:
-        msg = (
+        raise ScenarioError(
             f"no actor fits on map {graph.map_name!r} in {attempts} regions; allow more segments, "
             "other categories, a shorter minimum_trip or a smaller minimum_gap"
         )
-        raise ScenarioError(msg)
     fields = {
         "name": name,
         "map": MapReference(

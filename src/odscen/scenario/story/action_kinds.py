@@ -194,8 +194,7 @@ def _follow(part: GapKeeping, one: ActingActor) -> bool:
     """
     other = one.view.actor(part.to)
     if other is None:
-        msg = f"{part.to!r} is not on the road"
-        raise CannotAct(msg)
+        raise CannotAct(f"{part.to!r} is not on the road")
     me = one.actor
     c, s = math.cos(me.hdg), math.sin(me.hdg)
     ahead = (other.x - me.x) * c + (other.y - me.y) * s

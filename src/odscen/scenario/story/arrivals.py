@@ -59,12 +59,10 @@ def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
     view, channel = one.view, one.channel
     other = view.actor(part.to)
     if other is None:
-        msg = f"{part.to!r} is not on the road"
-        raise CannotAct(msg)
+        raise CannotAct(f"{part.to!r} is not on the road")
     theirs = _rest(other, part.when_at, view, one.channels.get(part.to))
     if theirs is None:
-        msg = f"{part.to!r} does not come by the place where it is to be met"
-        raise CannotAct(msg)
+        raise CannotAct(f"{part.to!r} does not come by the place where it is to be met")
     done = one.instant - view.time
     mine = _own_rest(part, one)
     if other.speed < 0.1:
@@ -75,8 +73,7 @@ def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
     needed = law.speed(one.instant) if left > 0.0 else math.inf
     fastest = FASTEST_WALKER if one.actor.person else FASTEST_VEHICLE
     if needed > fastest:
-        msg = f"it would have to go at {needed:.1f} m/s to be there in time"
-        raise CannotAct(msg)
+        raise CannotAct(f"it would have to go at {needed:.1f} m/s to be there in time")
     channel.take_speed(law, one.owner)
     settled = abs(other.acceleration) < _STEADY or left <= one.step
     return one.instant + left if settled else math.inf
@@ -108,8 +105,7 @@ def _own_rest(part: Arriving, one: ActingActor) -> float:
     """Metres from where the actor is at the instant to where it is to be."""
     rest = _rest(one.actor, part.at, one.view, one.channel)
     if rest is None:
-        msg = "its route does not lead to the place"
-        raise CannotAct(msg)
+        raise CannotAct("its route does not lead to the place")
     return rest - one.channel.metres(one.view.time, one.instant)
 
 

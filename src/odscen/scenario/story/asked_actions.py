@@ -52,8 +52,7 @@ def ask_to_appear(part: Appearing, actor: str, view: RoadView) -> Wanted:
         If it is on the road.
     """
     if view.actor(actor) is not None:
-        msg = f"{actor!r} is on the road already"
-        raise CannotAct(msg)
+        raise CannotAct(f"{actor!r} is on the road already")
     return WantedActor(actor, part.at, part.speed)
 
 

@@ -205,8 +205,7 @@ def _to_actor(
         metres = view.lane_distance(one.id, other.id)
         half = (one.length + other.length) / 2.0
         return metres if metres is None or not part.free else max(metres - half, 0.0)
-    msg = f"unknown direction {part.along!r}"
-    raise ValueError(msg)
+    raise ValueError(f"unknown direction {part.along!r}")
 
 
 def _straight(one: ActorView, other: ActorView, bound: float) -> float:

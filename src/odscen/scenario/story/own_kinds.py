@@ -107,8 +107,7 @@ def action_kind(action: Action) -> ActionKind:
 
 def _given(kind: _Kind | None, name: str) -> _Kind:
     if kind is None:
-        msg = f"no installed package gives {name!r}"
-        raise InputError(msg)
+        raise InputError(f"no installed package gives {name!r}")
     return kind
 
 
@@ -119,11 +118,13 @@ def _loaded(group: str, name: str, expected: type) -> object:
     try:
         found = points[0].load()
     except Exception as error:  # whatever an import may raise
-        msg = f"{name!r} of {group} cannot be imported from {points[0].value}: {error!r}"
-        raise InputError(msg) from error
+        raise InputError(
+            f"{name!r} of {group} cannot be imported from {points[0].value}: {error!r}"
+        ) from error
     if not isinstance(found, expected):
-        msg = f"{points[0].value} is not the {expected.__name__} that {group} {name!r} has to be"
-        raise InputError(msg)
+        raise InputError(
+            f"{points[0].value} is not the {expected.__name__} that {group} {name!r} has to be"
+        )
     return found
 
 
@@ -140,7 +141,6 @@ def _guarded(function: Callable[..., Any] | None, name: str) -> Callable[..., An
         except (OdscenError, CannotAct):
             raise
         except Exception as error:
-            msg = f"own kind {name!r} failed: {error!r}"
-            raise InputError(msg) from error
+            raise InputError(f"own kind {name!r} failed: {error!r}") from error
 
     return guarded

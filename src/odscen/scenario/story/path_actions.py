@@ -94,8 +94,7 @@ def follow_path(part: PathFollowing, one: ActingActor) -> float:
     elif one.speed > 0.0 or channel.law is not None:
         channel.take_line(line, 0.0, None, one.owner, one.instant)
     else:
-        msg = "it is stopped; the path has to say how fast it is followed"
-        raise CannotAct(msg)
+        raise CannotAct("it is stopped; the path has to say how fast it is followed")
     return math.inf
 
 
@@ -104,8 +103,7 @@ def _points(part: PathFollowing, one: ActingActor) -> list[Point]:
         return [one.view.place(place) for place in part.points]
     base = one.view.actor(part.relative_to)
     if base is None:
-        msg = f"{part.relative_to!r} is not on the road"
-        raise CannotAct(msg)
+        raise CannotAct(f"{part.relative_to!r} is not on the road")
     # The actor itself is where it is at the instant of the begin, within the step.
     x, y = one.spot() if part.relative_to == one.actor.id else (base.x, base.y)
     c, s = math.cos(base.hdg), math.sin(base.hdg)
@@ -222,8 +220,7 @@ def _at_points(
     for length, after in zip(legs, speeds, strict=True):
         if length > 0.0:
             if before + after <= 0.0:
-                msg = "it is stopped, and is to stop at the first point"
-                raise CannotAct(msg)
+                raise CannotAct("it is stopped, and is to stop at the first point")
             t += 2.0 * length / (before + after)
         knots.append((t, after))
         before = after

@@ -72,8 +72,7 @@ def move_aside(part: LateralMove, one: ActingActor) -> float:
     led = one.channel.line if one.channel.side is not None else None
     line = led or one.view.lane_line(one.actor.id, 0)
     if line is None:
-        msg = "it is on no lane"
-        raise CannotAct(msg)
+        raise CannotAct("it is on no lane")
     _beside_lane(line, part.to, part.over, one)
     return one.instant + part.over
 
@@ -89,8 +88,7 @@ def cut_in(part: CuttingIn, one: ActingActor) -> float:
     other = _other(part, one)
     line = one.view.lane_line(part.to, 0)
     if line is None:
-        msg = f"{part.to!r} is on no lane"
-        raise CannotAct(msg)
+        raise CannotAct(f"{part.to!r} is on no lane")
     _beside_lane(line, 0.0, part.over, one)
     end = one.instant + part.over
     _reach_gap(part, one, other, end)
@@ -131,8 +129,7 @@ def lane_lasts(_: object, one: ActingActor, end: float) -> float:
     channel = one.channel
     metres = channel.metres(one.instant, one.instant + one.step)
     if channel.along + metres > line_length(channel.line or ()):
-        msg = "the lane ends before it is there"
-        raise CannotAct(msg)
+        raise CannotAct("the lane ends before it is there")
     return end
 
 
@@ -163,8 +160,7 @@ def leave_line(_: object, one: ActingActor) -> None:
 def _other(part: CuttingIn, one: ActingActor) -> ActorView:
     other = one.view.actor(part.to)
     if other is None or other.person:
-        msg = f"{part.to!r} does not drive on the road"
-        raise CannotAct(msg)
+        raise CannotAct(f"{part.to!r} does not drive on the road")
     return other
 
 
@@ -198,6 +194,5 @@ def _reach_gap(part: CuttingIn, one: ActingActor, other: ActorView, end: float) 
     v, u = one.speed, other.speed
     v1 = 2.0 * ((part.gap - gap) / left + u) - v
     if not 0.0 <= v1 <= FASTEST:
-        msg = f"it would have to reach {v1:.1f} m/s for a gap of {part.gap:g} m in time"
-        raise CannotAct(msg)
+        raise CannotAct(f"it would have to reach {v1:.1f} m/s for a gap of {part.gap:g} m in time")
     one.channel.take_speed(SpeedLaw(one.instant, v, v1, left), one.owner)

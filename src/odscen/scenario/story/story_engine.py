@@ -296,8 +296,7 @@ class StoryEngine:
         acting = self._acting(view, now, rule, one)
         channel, person = acting.channel, acting.actor.person
         if (kind.persons_only and not person) or (kind.vehicles_only and person):
-            msg = f"{kind.name!r} is not for {'a person' if person else 'a vehicle'}"
-            raise CannotAct(msg)
+            raise CannotAct(f"{kind.name!r} is not for {'a person' if person else 'a vehicle'}")
         owners = channel.speed_owner, channel.line_owner
         one.end = now if kind.begin is None else kind.begin(part, acting)
         if one.end == math.inf and kind.update is not None:
@@ -330,8 +329,7 @@ class StoryEngine:
     def _acting(self, view: RoadView, now: float, rule: StoryRule, one: Running) -> ActingActor:
         actor = view.actor(rule.actor)
         if actor is None:
-            msg = f"{rule.actor!r} is not on the road"
-            raise CannotAct(msg)
+            raise CannotAct(f"{rule.actor!r} is not on the road")
         channel = self._channels.get(actor.id)
         if channel is None:
             channel = self._channels[actor.id] = Channel()

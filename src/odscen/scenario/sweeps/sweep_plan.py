@@ -50,11 +50,10 @@ class Range:
             Without steps.
         """
         if self.steps is None:
-            msg = (
+            raise InputError(
                 f"{self.name}: a grid needs the number of steps: {self.name}={self.low:g}.."
                 f"{self.high:g}:10; or give a number of samples"
             )
-            raise InputError(msg)
         return tuple((_rounded(v),) for v in np.linspace(self.low, self.high, self.steps))
 
     def at(self, share: float) -> tuple[float, ...]:
@@ -104,15 +103,14 @@ class SweepPlan:
         names = self.names
         for name in names:
             if names.count(name) > 1:
-                msg = f"parameter {name!r} is varied twice"
-                raise InputError(msg)
+                raise InputError(f"parameter {name!r} is varied twice")
         if not names:
-            msg = "nothing is varied: name a parameter and its values, for example gap=1..4:7"
-            raise InputError(msg)
+            raise InputError(
+                "nothing is varied: name a parameter and its values, for example gap=1..4:7"
+            )
         if (self.method == "grid") != (self.samples is None):
             needs = "takes no" if self.method == "grid" else "needs a"
-            msg = f"method {self.method} {needs} number of samples"
-            raise InputError(msg)
+            raise InputError(f"method {self.method} {needs} number of samples")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -178,8 +176,9 @@ def concrete(scenario: Scenario, values: Mapping[str, float], *, name: str) -> S
         found = with_values(scenario, values)
     except ScenarioError as error:
         given = ", ".join(f"{one} = {value:g}" for one, value in values.items())
-        msg = f"{name} ({given}): {error.problem}"
-        raise ScenarioError(msg, problems=error.problems) from error
+        raise ScenarioError(
+            f"{name} ({given}): {error.problem}", problems=error.problems
+        ) from error
     return found.model_copy(update={"name": name, "formulas": {}})
 
 
@@ -194,8 +193,7 @@ def axis_from_text(text: str) -> Range | Table:
     name, sign, said = text.partition("=")
     name, said = name.strip(), said.strip()
     if not sign or not name or not said:
-        msg = f"{text!r} varies nothing; write gap=1..4:7, gap=1..4 or gap=1,2,4"
-        raise InputError(msg)
+        raise InputError(f"{text!r} varies nothing; write gap=1..4:7, gap=1..4 or gap=1,2,4")
     if (match := _RANGE.fullmatch(said)) is not None:
         steps = match["steps"]
         return _range(
@@ -217,17 +215,14 @@ def plan_from_data(data: Mapping[str, Any]) -> SweepPlan:
     """
     unknown = sorted(set(data) - {"vary", "method", "samples", "seed", "scenario"})
     if unknown:
-        msg = f"a sweep has no {unknown[0]!r}; it has vary, method, samples and seed"
-        raise InputError(msg)
+        raise InputError(f"a sweep has no {unknown[0]!r}; it has vary, method, samples and seed")
     vary = data.get("vary", [])
     if not isinstance(vary, list) or not all(isinstance(one, dict) for one in vary):
-        msg = "vary must be a list of ranges, sets and tables"
-        raise InputError(msg)
+        raise InputError("vary must be a list of ranges, sets and tables")
     samples = data.get("samples")
     method = data.get("method", "grid" if samples is None else "sobol")
     if method not in METHODS:
-        msg = f"method {method!r} is not one of {', '.join(METHODS)}"
-        raise InputError(msg)
+        raise InputError(f"method {method!r} is not one of {', '.join(METHODS)}")
     count = None if samples is None else _whole(samples, "samples", least=1)
     seed = _whole(data.get("seed", 0), "seed", least=0)
     axes = tuple(_axis(one, f"vary[{index}]") for index, one in enumerate(vary))
@@ -251,31 +246,29 @@ def _axis(data: Mapping[str, Any], place: str) -> Range | Table:
     if keys == {"parameters", "table"} and isinstance(data["table"], list):
         names = tuple(map(str, data["parameters"]))
         return _table(names, tuple(_row(row, names, place) for row in data["table"]), place)
-    msg = (
+    raise InputError(
         f"{place} has {', '.join(sorted(keys)) or 'nothing'}; give parameter, from, to and steps, "
         "or parameter and values, or parameters and table"
     )
-    raise InputError(msg)
 
 
 def _row(row: object, names: tuple[str, ...], place: str) -> tuple[float, ...]:
     if not isinstance(row, list) or len(row) != len(names):
-        msg = f"{place}.table: row {row!r:.60} does not have a value of each of {', '.join(names)}"
-        raise InputError(msg)
+        raise InputError(
+            f"{place}.table: row {row!r:.60} does not have a value of each of {', '.join(names)}"
+        )
     return tuple(_real(one, f"{place}.table") for one in row)
 
 
 def _table(names: tuple[str, ...], rows: tuple[tuple[float, ...], ...], place: str) -> Table:
     if not rows or not names:
-        msg = f"{place} has no values"
-        raise InputError(msg)
+        raise InputError(f"{place} has no values")
     return Table(names, rows)
 
 
 def _range(name: str, low: float, high: float, steps: float | None) -> Range:
     if low > high:
-        msg = f"{name}: the range {low:g}..{high:g} ends before it begins"
-        raise InputError(msg)
+        raise InputError(f"{name}: the range {low:g}..{high:g} ends before it begins")
     if steps is not None:
         steps = _whole(steps, f"{name}: steps", least=2)
     return Range(name, low, high, steps)
@@ -285,29 +278,25 @@ def _number(text: str, whole: str) -> float:
     try:
         return _real(float(text), whole)
     except ValueError:
-        msg = f"{text.strip()!r} in {whole!r} is not a number"
-        raise InputError(msg) from None
+        raise InputError(f"{text.strip()!r} in {whole!r} is not a number") from None
 
 
 def _real(value: object, place: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        msg = f"{place}: {value!r:.60} is not a finite number"
-        raise InputError(msg)
+        raise InputError(f"{place}: {value!r:.60} is not a finite number")
     return float(value)
 
 
 def _whole(value: object, place: str, *, least: int) -> int:
     number = _real(value, place)
     if not number.is_integer() or number < least or number > MOST_CASES * 1e6:
-        msg = f"{place}: {number:g} is not a whole number from {least} on"
-        raise InputError(msg)
+        raise InputError(f"{place}: {number:g} is not a whole number from {least} on")
     return int(number)
 
 
 def _refuse_many(count: int) -> None:
     if count > MOST_CASES:
-        msg = f"the sweep has {count:,} cases; at most {MOST_CASES:,} are possible"
-        raise InputError(msg)
+        raise InputError(f"the sweep has {count:,} cases; at most {MOST_CASES:,} are possible")
 
 
 def _rounded(value: float) -> float:

@@ -45,8 +45,9 @@ def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     ego, speed, over = values["ego_speed"], values["speed"], values["over"]
     closing = ego - speed
     if closing < 1.0:
-        msg = f"ego_speed must be at least 1 m/s above speed ({speed:g} m/s), not {ego:g} m/s"
-        raise InputError(msg)
+        raise InputError(
+            f"ego_speed must be at least 1 m/s above speed ({speed:g} m/s), not {ego:g} m/s"
+        )
     # UN R157, 5.2.5.2: TTC at the intrusion above v_rel / (2 * 6 m/s2) + 0.35 s
     intrusion = values.get("ttc", closing / 12.0 + 0.35)
     length, width = body_length(site, Category.CAR), site.usable.bodies[Category.CAR].width
@@ -100,8 +101,7 @@ def _either(site: TemplateSite, stretch: LaneStretch, near: int) -> LaneStretch:
     try:
         return beside(site, stretch, -near)
     except Unfit:
-        msg = "have no second lane of the same direction all along"
-        raise Unfit(msg) from None
+        raise Unfit("have no second lane of the same direction all along") from None
 
 
 def _is_left(site: TemplateSite, lane: LaneStretch, of: LaneStretch) -> bool:

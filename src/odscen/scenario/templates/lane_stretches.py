@@ -147,8 +147,7 @@ def first_fit(
     number = sum(why.values())
     reasons = "; ".join(f"{count} {reason}" for reason, count in why.most_common() if count)
     looked = f"of {number} places, {reasons}" if number else "it has no such places"
-    msg = f"map {map_name!r} has no room for {what}: {looked}"
-    raise NoPlaceError(msg)
+    raise NoPlaceError(f"map {map_name!r} has no room for {what}: {looked}")
 
 
 def _straight_on(lanes: LaneGraph, drivable: BoolArray) -> tuple[IntArray, FloatArray]:

@@ -68,8 +68,9 @@ def overtaking(values: Mapping[str, float], lengths: float) -> Overtaking:
     slow, fast, rate = values["slow_speed"], values["speed"], values["acceleration"]
     more = fast - slow
     if more < 1.0:
-        msg = f"speed must be at least 1 m/s above slow_speed ({slow:g} m/s), not {fast:g} m/s"
-        raise InputError(msg)
+        raise InputError(
+            f"speed must be at least 1 m/s above slow_speed ({slow:g} m/s), not {fast:g} m/s"
+        )
     rest = 2.0 * values["gap"] + lengths
     ramp = more / rate
     gained = more * ramp / 2.0
@@ -156,8 +157,7 @@ def _opposite(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretc
     lanes, plain = site.region.graph.lanes, np.flatnonzero(site.stretches.plain)
     rows = lanes.left_lane if side > 0 else lanes.right_lane
     if (rows[stretch.nodes] >= 0).any():
-        msg = "have another lane of their own direction between them and oncoming traffic"
-        raise Unfit(msg)
+        raise Unfit("have another lane of their own direction between them and oncoming traffic")
     tree = cKDTree(np.stack([lanes.x[plain], lanes.y[plain], lanes.z[plain]], axis=1))
     hdg = lanes.hdg[stretch.nodes]
     middle = (lanes.width[stretch.nodes] * side, np.zeros(len(hdg)))
@@ -167,19 +167,16 @@ def _opposite(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretc
     found = plain[index]
     alongside = np.less(away, lanes.spacing + 0.5) & np.less(np.cos(lanes.hdg[found] - hdg), -0.9)
     if not np.all(alongside):
-        msg = "have no lane for oncoming traffic beside them all along"
-        raise Unfit(msg)
+        raise Unfit("have no lane for oncoming traffic beside them all along")
     if apart(site, int(stretch.nodes[0]), int(found[0])) > _WIDEST:
-        msg = f"have oncoming traffic more than {_WIDEST:.0f} m away"
-        raise Unfit(msg)
+        raise Unfit(f"have oncoming traffic more than {_WIDEST:.0f} m away")
     order = found[::-1]
     # Followed from its first node, so that every node is there once and in order.
     nodes, along = [int(order[0])], [0.0]
     while nodes[-1] != int(order[-1]):
         after = int(site.stretches.next[nodes[-1]])
         if after < 0 or not site.stretches.plain[after] or len(nodes) > 2 * len(order):
-            msg = "have a lane for oncoming traffic that does not go through"
-            raise Unfit(msg)
+            raise Unfit("have a lane for oncoming traffic that does not go through")
         along.append(along[-1] + float(site.stretches.step[nodes[-1]]))
         nodes.append(after)
     return LaneStretch(np.array(nodes), np.array(along), stretch.bend)

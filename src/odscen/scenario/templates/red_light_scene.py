@@ -72,19 +72,16 @@ def _at_light(
     needed = ego**2 / (2.0 * _STARTING) + ego * _STEADY
     at = min(found.stop_line - _FRONT, metres_at(found.ego, mine) - needed)
     if at < _FRONT:
-        msg = "have a lane before the light that is too short for the ego"
-        raise Unfit(msg)
+        raise Unfit("have a lane before the light that is too short for the ego")
     start = node_near(site, found.ego, at)
     ego_metres = metres_at(found.ego, mine) - metres_at(found.ego, start)
     # Both begin at rest, and the other one's speed is in the proportion of their metres.
     runner_metres = ego_metres * fast / ego
     spot = metres_at(found.runner, theirs) - runner_metres
     if spot < 0.0:
-        msg = "have a lane before the light that is too short for the other vehicle"
-        raise Unfit(msg)
+        raise Unfit("have a lane before the light that is too short for the other vehicle")
     if spot > found.runner_line - _FRONT:
-        msg = "would have the other vehicle start behind its stop line"
-        raise Unfit(msg)
+        raise Unfit("would have the other vehicle start behind its stop line")
     runner = node_near(site, found.runner, spot)
     shows = {"light": found.light.names[0], "movement": found.movement.exact_name}
     green = {"signal": shows | {"shows": "green"}, "edge": "rising"}
@@ -185,8 +182,7 @@ def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, in
     ]
     crossed = lines[0].intersection(lines[1])
     if crossed.is_empty or crossed.geom_type != "Point":
-        msg = "are two movements whose paths do not cross at one place"
-        raise Unfit(msg)
+        raise Unfit("are two movements whose paths do not cross at one place")
     nodes = []
     for one in (found.ego, found.runner):
         away = np.hypot(lanes.x[one.nodes] - crossed.x, lanes.y[one.nodes] - crossed.y)
@@ -194,8 +190,7 @@ def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, in
     if not all(metres_at(one, node) > line for one, node, line in (
         (found.ego, nodes[0], found.stop_line), (found.runner, nodes[1], found.runner_line),
     )):  # fmt: skip
-        msg = "cross before the stop line"
-        raise Unfit(msg)
+        raise Unfit("cross before the stop line")
     return nodes[0], nodes[1]
 
 

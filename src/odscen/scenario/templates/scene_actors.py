@@ -65,8 +65,7 @@ def node_near(site: TemplateSite, stretch: LaneStretch, along: float) -> int:
             break
         if site.stretches.spawnable[stretch.nodes[place]]:
             return int(stretch.nodes[place])
-    msg = "have no node for a vehicle where it is to start"
-    raise Unfit(msg)
+    raise Unfit("have no node for a vehicle where it is to start")
 
 
 def metres_at(stretch: LaneStretch, node: int) -> float:
@@ -86,8 +85,7 @@ def beside(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretch:
     rows = (lanes.left_lane if side == LEFT else lanes.right_lane)[stretch.nodes]
     name = "left" if side == LEFT else "right"
     if (rows < 0).any():
-        msg = f"have no lane to the {name} all along"
-        raise Unfit(msg)
+        raise Unfit(f"have no lane to the {name} all along")
     first = lanes.lanes.first_node
     found = np.empty(len(rows), dtype=np.int64)
     for row in np.unique(rows).tolist():
@@ -96,8 +94,7 @@ def beside(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretch:
         away = np.abs(lanes.s[stretch.nodes[mine]][:, None] - lanes.s[its][None, :])
         found[mine] = its[np.argmin(away, axis=1)]
     if not site.stretches.plain[found].all():
-        msg = f"have a lane to the {name} that is not for all vehicles"
-        raise Unfit(msg)
+        raise Unfit(f"have a lane to the {name} that is not for all vehicles")
     return LaneStretch(found, stretch.along, stretch.bend)
 
 

@@ -97,10 +97,12 @@ class SceneTemplate:
         for name, value in given.items():
             one = known.get(name)
             if one is None:
-                msg = f"template {self.name!r} has no parameter {name!r}; it has {', '.join(known)}"
-                raise InputError(msg)
+                raise InputError(
+                    f"template {self.name!r} has no parameter {name!r}; it has {', '.join(known)}"
+                )
             if not (math.isfinite(value) and one.low <= value <= one.high):
-                msg = f"{name} must be {one.low:g} to {one.high:g} {one.unit}, not {value:g}"
-                raise InputError(msg)
+                raise InputError(
+                    f"{name} must be {one.low:g} to {one.high:g} {one.unit}, not {value:g}"
+                )
         usual = {one.name: one.default for one in self.parameters if one.default is not None}
         return usual | dict(given)

@@ -44,8 +44,7 @@ def find_template(name: str) -> SceneTemplate:
         If there is none.
     """
     if name not in TEMPLATES:
-        what = "template"
-        raise NotFoundError(what, name, list(TEMPLATES))
+        raise NotFoundError("template", name, list(TEMPLATES))
     return TEMPLATES[name]
 
 

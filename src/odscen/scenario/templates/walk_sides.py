@@ -83,8 +83,7 @@ class WalkSides:
         place = int(np.argmin(np.abs(stretch.along - along)))
         node = int(stretch.nodes[place])
         if self._tree is None:
-            msg = "have no sidewalk"
-            raise Unfit(msg)
+            raise Unfit("have no sidewalk")
         c, s = math.cos(lanes.hdg[node]), math.sin(lanes.hdg[node])
         around = np.array(sorted(self._tree.query_ball_point((lanes.x[node], lanes.y[node]), 32)))
         around = around.astype(np.int64)
@@ -93,29 +92,24 @@ class WalkSides:
         ahead, left = dx * c + dy * s, dy * c - dx * s
         start = _nearest(around, ahead, left * near, beyond + float(lanes.width[node]) / 2.0)
         if start is None:
-            msg = "have no sidewalk on the near side"
-            raise Unfit(msg)
+            raise Unfit("have no sidewalk on the near side")
         met = float(ahead[around == start][0])
         end = _nearest(around, ahead - met, -left * near, float(lanes.width[node]) / 2.0)
         if end is None:
-            msg = "have no sidewalk on the far side"
-            raise Unfit(msg)
+            raise Unfit("have no sidewalk on the far side")
         across = float(abs(left[around == start][0]))
         if across + float(abs(left[around == end][0])) > WIDEST:
-            msg = f"are wider than {WIDEST:.0f} m"
-            raise Unfit(msg)
+            raise Unfit(f"are wider than {WIDEST:.0f} m")
         meets = float(lanes.x[node] + met * c), float(lanes.y[node] + met * s)
         if self._near_crosswalk(meets):
-            msg = f"have a crosswalk within {_FROM_CORNER:.0f} m"
-            raise Unfit(msg)
+            raise Unfit(f"have a crosswalk within {_FROM_CORNER:.0f} m")
         goal = self._goal(start, end)
         there: str | list[float] = walk_node_id(self._graph, end)
         if goal is None:  # nothing joins the two sides: it stays where it gets to
             goal = self._goal(start, start)
             there = [round(float(at[end]), 3) for at in (walks.x, walks.y)]
         if goal is None:
-            msg = "have a sidewalk from which no path leads on"
-            raise Unfit(msg)
+            raise Unfit("have a sidewalk from which no path leads on")
         return RoadCrossing(
             walk_node_id(self._graph, start),
             there,

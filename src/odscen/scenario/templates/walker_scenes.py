@@ -86,8 +86,7 @@ def _within(
         beyond = _HIDDEN if hidden is _HiddenBy.AT_KERB else 0.0
         crossing = site.sides.crossing(stretch, along, near=near, beyond=beyond)
         if crossing.metres > reach:
-            msg = f"are more than {reach:.0f} m from the sidewalk"
-            raise Unfit(msg)
+            raise Unfit(f"are more than {reach:.0f} m from the sidewalk")
         distance = speed * crossing.metres / walking
         start = node_near(site, stretch, crossing.along - distance - lead_in)
         ego = vehicle(site, "ego", start, int(stretch.nodes[-1]), speed=speed, ego=True)
@@ -130,8 +129,7 @@ def _parked(site: TemplateSite, lane: LaneStretch, front: float) -> dict[str, An
     centre = front - half - site.region.graph.lanes.spacing / 2.0
     node = node_near(site, lane, centre)
     if metres_at(lane, node) > front - half:
-        msg = "have no node for a vehicle where it is to stand"
-        raise Unfit(msg)
+        raise Unfit("have no node for a vehicle where it is to stand")
     last = int(lane.nodes[-1])
     return vehicle(site, "parked", node, last, speed=CHILD, moving=False)
 

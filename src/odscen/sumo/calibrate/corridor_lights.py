@@ -13,7 +13,7 @@ from odscen.sumo.calibrate.turning_volumes import DRIVEN, Turn, turns_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.results.records.light_programs import ProgramPhase
+    from odscen.records.light_programs import ProgramPhase
     from odscen.sumo.realize.sumo_map import SumoMap
 
 
@@ -143,11 +143,10 @@ class CorridorFinder:
             for number, turns in enumerate(self._turns):
                 if steps & turns.keys():
                     between, before, behind = (self._name(n) for n in (number, one, other))
-                    msg = (
+                    raise InputError(
                         f"the light of junction {between} lies between those of {before} and "
                         f"{behind}: name it too"
                     )
-                    raise InputError(msg)
 
     def _name(self, number: int) -> str:
         light = self._map.lights[number]

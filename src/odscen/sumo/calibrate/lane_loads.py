@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
-    from odscen.results.records.light_programs import ProgramPhase
+    from odscen.records.light_programs import ProgramPhase
     from odscen.scenario.signals.light import Light
     from odscen.sumo.calibrate.turning_volumes import Turn
     from odscen.sumo.realize.sumo_map import SumoMap

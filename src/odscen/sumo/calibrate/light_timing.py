@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
-    from odscen.results.records.light_programs import LightProgram, ProgramPhase, ShownPlan
+    from odscen.records.light_programs import LightProgram, ProgramPhase, ShownPlan
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import DayPlan, ProgramStage
     from odscen.scenario.signals.light import Light
@@ -238,11 +238,10 @@ def stretched(
     between = sum(phase.seconds for phase in phases if not phase.stage)
     least = between + sum(need.least for need in needs)
     if least > cycle:
-        msg = (
+        raise InputError(
             f"the light of junction {', '.join(shown.junctions)} needs a cycle of {least:g} s for "
             f"its least greens and intergreens, but it is to be {cycle:g} s"
         )
-        raise InputError(msg)
     if abs(before.cycle - cycle) < _SAME:
         return before
     weights = [green + need.more for green, need in zip(before.green, needs, strict=True)]

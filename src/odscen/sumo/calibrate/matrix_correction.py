@@ -156,8 +156,7 @@ def corrected(
     seen, cells = observations(scenario.demand), prior_cells(scenario)
     if not seen or not cells:
         what = "counts" if not seen else "matrix of vehicles"
-        msg = f"the scenario has no {what} to correct a matrix by"
-        raise InputError(msg)
+        raise InputError(f"the scenario has no {what} to correct a matrix by")
     others = _others(scenario, sumo_map, seen)
     shares = share_matrix(cells, seen, passages)
     counted = np.array([one.counted for one in seen])
@@ -199,8 +198,9 @@ def prior_cells(scenario: Scenario) -> list[MatrixCell]:
     slices = {(row[1], row[2]) for part in scenario.demand.counts for row in part.rows}
     lengths = {round(end - begin, 6) for begin, end in slices}
     if len(lengths) > 1:
-        msg = f"slices of the counts are {', '.join(f'{one:g}' for one in sorted(lengths))} s long"
-        raise InputError(msg)
+        raise InputError(
+            f"slices of the counts are {', '.join(f'{one:g}' for one in sorted(lengths))} s long"
+        )
     cells = []
     for index, matrix in enumerate(scenario.demand.matrices):
         if Category.PEDESTRIAN in matrix.mix or not lengths:

@@ -159,8 +159,7 @@ def _sampled(scenario: Scenario, sumo_map: SumoMap, mix: Mapping[Any, float]) ->
     drivable = region.router_over(sumo_map.drivable)
     routes = sorted(each_passing(users, region, drivable, passing), key=lambda route: route[0].id)
     if not routes:
-        msg = "no trips are possible on this map"
-        raise InputError(msg)
+        raise InputError("no trips are possible on this map")
     uses = sparse.csr_array(
         (
             np.ones(sum(len(passed) for _, passed in routes)),
@@ -216,8 +215,7 @@ def peak_share(day: str) -> float:
     """
     known = known_profiles(Demand())
     if day not in known:
-        msg = f"there is no day profile {day!r}; there are {', '.join(known)}"
-        raise InputError(msg)
+        raise InputError(f"there is no day profile {day!r}; there are {', '.join(known)}")
     curve = Curve(known[day])
     starts = (60.0 * minute for minute in range(1381))
     return max(curve.amount(start + 3600.0) - curve.amount(start) for start in starts) / DAY

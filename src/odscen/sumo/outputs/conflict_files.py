@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.measures.conflicts import conflict_table, walking_conflicts
-from odscen.sumo.folder.layout import CONFLICTS_FILE, SSM_FILE, TRAJECTORIES_FILE
+from odscen.figures.measures.conflicts import conflict_table, walking_conflicts
+from odscen.runs.layout import CONFLICTS_FILE, SSM_FILE, TRAJECTORIES_FILE
 from odscen.sumo.outputs.ssm_log import logged_conflicts
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
 
 _NAMES = {
     "timestep_time": "time",

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.nearest_points import nearest
-from odscen.results.by_place.corridors import junctions_of
-from odscen.results.report.report_corridor import NONE_RECORDED, CorridorTraces
-from odscen.sumo.folder.recorded import trajectory_files
+from odscen.figures.by_place.corridors import junctions_of
+from odscen.reports.report_corridor import NONE_RECORDED, CorridorTraces
+from odscen.runs.recorded import trajectory_files
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.base.arrays import FloatArray, Int32Array
-    from odscen.results.by_place.corridors import Corridor
+    from odscen.figures.by_place.corridors import Corridor
     from odscen.sumo.realize.sumo_map import SumoMap
 
 WINDOWS = (3600.0, 1800.0, 900.0, 600.0, 300.0)

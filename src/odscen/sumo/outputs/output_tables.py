@@ -9,9 +9,9 @@ import os
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import SimulationError
-from odscen.results.measures.summary import Trip, actor_outcomes, actors_text, outcome_row
-from odscen.results.records.run_events import event_line, events_text
-from odscen.sumo.folder.layout import (
+from odscen.figures.measures.summary import Trip, actor_outcomes, actors_text, outcome_row
+from odscen.records.run_events import event_line, events_text
+from odscen.runs.layout import (
     ACTORS_FILE,
     EMISSIONS_FILE,
     EVENTS_FILE,
@@ -23,7 +23,7 @@ from odscen.sumo.folder.layout import (
     TRIPS_FILE,
     VISITS_FILE,
 )
-from odscen.sumo.folder.parts import tidy_part
+from odscen.runs.parts import tidy_part
 from odscen.sumo.outputs.conflict_files import tidy_conflicts
 from odscen.sumo.outputs.lane_measures import lane_table
 from odscen.sumo.outputs.signal_log import tidy_signals
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.results.records.run_events import Event
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_events import Event
+    from odscen.records.run_plan import Plan
 
 
 _TRIP_COLUMNS = ("id", "time_loss", "waiting_time", "waiting_count")

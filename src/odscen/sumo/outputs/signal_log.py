@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import SimulationError
-from odscen.sumo.folder.layout import CALLS_FILE, LIGHT_STATES_FILE, STATES_FILE
-from odscen.sumo.folder.xml_rows import elements
+from odscen.runs.layout import CALLS_FILE, LIGHT_STATES_FILE, STATES_FILE
+from odscen.runs.xml_rows import elements
 from odscen.sumo.realize.measure_files import calls_file
 
 if TYPE_CHECKING:
@@ -69,8 +69,9 @@ def tidy_signals(folder: Path) -> None:
             for file in calls:
                 file.unlink()
     except etree.XMLSyntaxError as error:
-        msg = f"SUMO has not written its log of lights to the end; the disk may be full: {error}"
-        raise SimulationError(msg) from error
+        raise SimulationError(
+            f"SUMO has not written its log of lights to the end; the disk may be full: {error}"
+        ) from error
 
 
 def _call_logs(folder: Path) -> list[Path]:

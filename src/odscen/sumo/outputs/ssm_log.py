@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import SimulationError
-from odscen.sumo.folder.xml_rows import elements
+from odscen.runs.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,7 +26,7 @@ _MEASURES = {"minTTC": "ttc", "maxDRAC": "drac", "PET": "pet"}
 def logged_conflicts(
     file: Path, *, net_offset: tuple[float, float] = (0.0, 0.0)
 ) -> Iterator[dict[str, object]]:
-    """Rows for :func:`odscen.results.measures.conflicts.conflict_table` from the device's log.
+    """Rows for :func:`odscen.figures.measures.conflicts.conflict_table` from the device's log.
 
     Parameters
     ----------
@@ -44,8 +44,7 @@ def logged_conflicts(
         for conflict in elements(file, "conflict"):
             yield _row(conflict, net_offset)
     except etree.XMLSyntaxError as error:
-        msg = f"{file.name} is not whole: {error}"
-        raise SimulationError(msg) from error
+        raise SimulationError(f"{file.name} is not whole: {error}") from error
 
 
 def _row(conflict: etree._Element, net_offset: tuple[float, float]) -> dict[str, object]:

@@ -29,8 +29,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.records.run_plan import begin_area
-from odscen.sumo.folder.xml_rows import elements
+from odscen.records.run_plan import begin_area
+from odscen.runs.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

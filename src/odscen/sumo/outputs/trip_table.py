@@ -25,7 +25,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.sumo.folder.xml_rows import elements
+from odscen.runs.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -171,8 +171,9 @@ def kind_of(user: RoadUser, drivers: Drivers, seed: int) -> DriverKind:
     for style in STYLES:
         if style == name:
             return DriverKind(style)
-    msg = f"{user.id!r} drives as {name!r}, which is neither a driving style nor a driver set"
-    raise ScenarioError(msg)
+    raise ScenarioError(
+        f"{user.id!r} drives as {name!r}, which is neither a driving style nor a driver set"
+    )
 
 
 def draw_factor(seed: int, actor: str, style: DrivingStyle, category: Category) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from odscen.sumo.folder.layout import EMISSIONS_FILE, LANES_FILE, STATES_FILE
+from odscen.runs.layout import EMISSIONS_FILE, LANES_FILE, STATES_FILE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

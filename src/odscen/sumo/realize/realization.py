@@ -14,15 +14,8 @@ from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
-from odscen.results.records.run_plan import Plan
-from odscen.scenario.checks.signal_timing import signal_problems
-from odscen.scenario.document.parking_document import TripParking
-from odscen.scenario.document.problems import refuse_errors
-from odscen.scenario.document.rules_document import appearing_actors
-from odscen.scenario.placing.region import Region
-from odscen.scenario.sampling.redrawn_traffic import redrawn
-from odscen.scenario.signals.detectors import without_detectors
-from odscen.sumo.folder.layout import (
+from odscen.records.run_plan import Plan
+from odscen.runs.layout import (
     CLOSURES_FILE,
     CONFIG_FILE,
     MEASURES_FILE,
@@ -33,18 +26,25 @@ from odscen.sumo.folder.layout import (
     STOPS_FILE,
     STORY_FILE,
 )
+from odscen.runs.recording import region_xml
+from odscen.runs.run_settings import AS_DESIGNED
+from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.document.parking_document import TripParking
+from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.rules_document import appearing_actors
+from odscen.scenario.placing.region import Region
+from odscen.scenario.sampling.redrawn_traffic import redrawn
+from odscen.scenario.signals.detectors import without_detectors
 from odscen.sumo.realize.lights.light_realization import realized_lights
 from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
-from odscen.sumo.realize.recording import region_xml
 from odscen.sumo.realize.road_users.departures import demand_users, road_users
 from odscen.sumo.realize.road_users.free_flow import environment_effect
 from odscen.sumo.realize.road_users.planned_users import RoadUserWriter
 from odscen.sumo.realize.routes_file import RoutesFile
 from odscen.sumo.realize.rules.story_files import story_plan
 from odscen.sumo.realize.rules.walks_across import RoadsAcross
-from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.realize.sumocfg import SSM_PARAMETER, SumocfgSettings, sumo_config
 from odscen.sumo.realize.traffic_measures.breakdowns import breakdowns
 from odscen.sumo.realize.traffic_measures.measure_actions import (
@@ -67,12 +67,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.base.arrays import Int32Array
-    from odscen.results.records.light_programs import LightProgram
+    from odscen.records.light_programs import LightProgram
+    from odscen.runs.run_settings import RunSettings, SliceLength
     from odscen.scenario.document.scenario_document import Scenario, Simulation
     from odscen.sumo.realize.lights.light_realization import RealizedLight
     from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.road_users.free_flow import ModelSizes
-    from odscen.sumo.realize.run_settings import RunSettings, SliceLength
     from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.sumo.realize.transit.parking_places import ParkingPosition
 
@@ -318,5 +318,7 @@ def _refuse_twins(users: tuple[RoadUser, ...]) -> None:
     """Flow members are named ``<flow>.<k>``, which an actor's own id may equal."""
     twins = sorted(name for name, n in Counter(user.id for user in users).items() if n > 1)
     if twins:
-        msg = "two road users have the same name; flows name theirs <flow>.<number>"
-        raise ScenarioError(msg, problems=twins[:10])
+        raise ScenarioError(
+            "two road users have the same name; flows name theirs <flow>.<number>",
+            problems=twins[:10],
+        )

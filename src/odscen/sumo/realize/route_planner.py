@@ -152,8 +152,7 @@ class RoutePlanner:
             repairs += told
         edges, lane, front = self._front(edges, start, pos + ahead)
         if not lane.allows(vclass):
-            msg = f"lane {lane.id} of the SUMO network does not admit {vclass}"
-            raise NoRouteError(msg)
+            raise NoRouteError(f"lane {lane.id} of the SUMO network does not admit {vclass}")
         if len(edges) == 1:  # there and back again is not meant: stop where it has just started
             arrival_pos = min(max(arrival_pos, front + 0.1), lane.length)
         lateral = self._net.pos_lat(lateral_offset)
@@ -164,8 +163,7 @@ class RoutePlanner:
         rows = self._places.lane[path]
         rows = rows[rows >= 0]
         if not len(rows):
-            msg = "the SUMO network has no lane anywhere on the way"
-            raise NoRouteError(msg)
+            raise NoRouteError("the SUMO network has no lane anywhere on the way")
         changed = np.ones(len(rows), dtype=np.bool_)
         changed[1:] = rows[1:] != rows[:-1]
         edges: list[str] = []
@@ -203,15 +201,13 @@ class RoutePlanner:
                 return (lane.edge, *edges), lane, place[1] + behind
         place = self._places.of(spawn)
         if place is None:
-            msg = "the SUMO network has no lane at the spawn"
-            raise NoRouteError(msg)
+            raise NoRouteError("the SUMO network has no lane at the spawn")
         lane = self._net.lanes[place[0]]
         if lane.internal:
             return self._from_inside(lane, edges, vclass), lane, place[1]
         if lane.edge == edges[0]:
             return edges, lane, place[1]
-        msg = f"the SUMO network has no way from lane {lane.id} for {vclass}"
-        raise NoRouteError(msg)
+        raise NoRouteError(f"the SUMO network has no way from lane {lane.id} for {vclass}")
 
     def _from_inside(
         self, lane: RoadNetLane, edges: tuple[str, ...], vclass: str
@@ -220,15 +216,15 @@ class RoutePlanner:
         leaving = self._leaving(lane)
         between = self._net.path(leaving[-1].edge, edges[0], vclass)
         if between is None:
-            msg = f"the SUMO network has no way for {vclass} from {lane.id} to edge {edges[0]}"
-            raise NoRouteError(msg)
+            raise NoRouteError(
+                f"the SUMO network has no way for {vclass} from {lane.id} to edge {edges[0]}"
+            )
         return (lane.edge, *between, *edges[1:])
 
     def _leaving(self, lane: RoadNetLane) -> tuple[RoadNetLane, ...]:
         leaving = self._net.leaving(lane.id)
         if not leaving:
-            msg = f"lane {lane.id} of the SUMO network leads nowhere"
-            raise NoRouteError(msg)
+            raise NoRouteError(f"lane {lane.id} of the SUMO network leads nowhere")
         return leaving
 
     def _front(
@@ -351,5 +347,4 @@ def _ended(net: RoadNet, route: list[str], last: str, vclass: str) -> tuple[list
             edge=last,
         )
         return [*route[:kept], *between[1:]], repair
-    msg = f"the SUMO network has no way for {vclass} from edge {route[-1]} to {last}"
-    raise NoRouteError(msg)
+    raise NoRouteError(f"the SUMO network has no way for {vclass} from edge {route[-1]} to {last}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
 from odscen.base.xml_text import quoteattr
-from odscen.results.records.run_plan import begin_area
+from odscen.records.run_plan import begin_area
 from odscen.sumo.realize.driving import number
 from odscen.sumo.realize.road_user import appears_at
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.results.by_place.lane_places import LanePlaces
+from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.sumo.realize.road_net import PEDESTRIAN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from odscen.results.by_place.level_of_service import JunctionControl
+    from odscen.figures.by_place.level_of_service import JunctionControl
     from odscen.sumo.realize.road_net import RoadNet, RoadNetLane
     from odscen.sumo.realize.sumo_map import SumoMap
 

@@ -37,12 +37,14 @@ def run_tool(name: str, arguments: Sequence[str], *, folder: Path) -> str:
     try:
         import sumo
     except ImportError as error:
-        msg = "SUMO's tools are not installed: pip install 'eclipse-sumo>=1.28,<1.29'"
-        raise MissingDependencyError(msg) from error
+        raise MissingDependencyError(
+            "SUMO's tools are not installed: pip install 'eclipse-sumo>=1.28,<1.29'"
+        ) from error
     script = Path(sumo.SUMO_HOME) / "tools" / name
     if not script.is_file():
-        msg = f"SUMO's tool {name} is not in {script.parent}; install eclipse-sumo again"
-        raise MissingDependencyError(msg)
+        raise MissingDependencyError(
+            f"SUMO's tool {name} is not in {script.parent}; install eclipse-sumo again"
+        )
     try:
         done = subprocess.run(
             [sys.executable, str(script), *arguments],
@@ -55,9 +57,9 @@ def run_tool(name: str, arguments: Sequence[str], *, folder: Path) -> str:
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        msg = f"{name} was stopped after {PATIENCE:g} s"
-        raise ToolError(msg) from error
+        raise ToolError(f"{name} was stopped after {PATIENCE:g} s") from error
     if done.returncode:
-        msg = f"{name} failed with exit code {done.returncode}"
-        raise ToolError(msg, output=done.stderr[-2000:])
+        raise ToolError(
+            f"{name} failed with exit code {done.returncode}", output=done.stderr[-2000:]
+        )
     return done.stdout

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from odscen.base.xml_text import quoteattr
-from odscen.results.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
-from odscen.sumo.folder.layout import (
+from odscen.figures.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
+from odscen.runs.layout import (
     CLOSURES_FILE,
     MEASURES_FILE,
     NET_FILE,
@@ -23,7 +23,7 @@ from odscen.sumo.folder.layout import (
     TRAJECTORIES_FILE,
     TRIPINFO_FILE,
 )
-from odscen.sumo.realize.recording import REGION_ID, Recording
+from odscen.runs.recording import REGION_ID, Recording
 
 SQUEEZE = 120.0
 """Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.

@@ -79,12 +79,12 @@ class WalkPlanner:
     def _place(self, node: int, what: str) -> tuple[RoadNetLane, float]:
         place = self._places.of(node)
         if place is None:
-            msg = f"the SUMO network has nothing to walk on at the {what}"
-            raise NoRouteError(msg)
+            raise NoRouteError(f"the SUMO network has nothing to walk on at the {what}")
         lane = self._net.lanes[place[0]]
         if lane.internal or not lane.allows(PEDESTRIAN):
-            msg = f"lane {lane.id} of the SUMO network at the {what} is not for walking"
-            raise NoRouteError(msg)
+            raise NoRouteError(
+                f"lane {lane.id} of the SUMO network at the {what} is not for walking"
+            )
         return lane, place[1]
 
     def _edges(self, path: Int32Array) -> list[str]:

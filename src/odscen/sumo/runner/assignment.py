@@ -23,13 +23,13 @@ import numpy as np
 
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import SimulationError
-from odscen.results.records.assignment_steps import Assignment, AssignmentStep
-from odscen.results.records.run_events import EventKind, events_from_json
+from odscen.records.assignment_steps import Assignment, AssignmentStep
+from odscen.records.run_events import EventKind, events_from_json
+from odscen.runs.layout import EVENTS_FILE
+from odscen.runs.recorded import read_lanes, read_trips
+from odscen.runs.recording import Recording
 from odscen.scenario.placing.region import Region
-from odscen.sumo.folder.layout import EVENTS_FILE
-from odscen.sumo.folder.recorded import read_lanes, read_trips
 from odscen.sumo.realize.realization import all_road_users, as_run
-from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 from odscen.sumo.realize.route_choice.known_routes import KnownRoutes, chosen_route, taste
 from odscen.sumo.realize.route_choice.travel_times import (
@@ -48,9 +48,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
 
     from odscen.base.arrays import FloatArray, Int32Array
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.road_users.free_flow import ModelSizes
-    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.sumo.runner.run_folder import PreparedRun
 
@@ -163,8 +163,7 @@ def assign_routes(
             write_run_folder(prepared, folder)
             ended = run_worker(folder, time_limit=settings.time_limit, forked=True)
             if ended.done is None:
-                msg = f"iteration {iteration} of the assignment: {ended.error}"
-                raise SimulationError(msg)
+                raise SimulationError(f"iteration {iteration} of the assignment: {ended.error}")
             times = search.measured(folder)
             outcome = _outcome(folder, vehicles=sum(not one.person for one in prepared.plan.actors))
         wanting = search.compare(times)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
 
 CONGESTION = 2.0
 """Time under way, as a multiple of that without anybody else."""
@@ -115,11 +115,10 @@ def refuse_without_room(expected: Forecast, folder: Path) -> None:
     there = next(path for path in (folder, *folder.parents) if path.exists())
     free = shutil.disk_usage(there).free
     if free < expected.disk:
-        msg = (
+        raise ResourceError(
             f"{folder}: the run needs about {size(expected.disk)} of disk, {size(free)} are free; "
             f"record less (--trajectories every=10s, or none) or free some"
         )
-        raise ResourceError(msg)
 
 
 def size(count: float) -> str:

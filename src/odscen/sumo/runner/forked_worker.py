@@ -202,8 +202,7 @@ def _forked(plan: Path, descriptors: tuple[int, ...], *, raw: bool) -> tuple[int
                 _server.end()
                 _server = None
         said.close()
-    msg = "no process can be started for a simulation"
-    raise ResourceError(msg)
+    raise ResourceError("no process can be started for a simulation")
 
 
 @atexit.register

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.runner.elevation import ElevationLookup
     from odscen.sumo.worker.protocol import Message
 

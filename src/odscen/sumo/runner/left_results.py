@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.records.run_plan import Plan
-from odscen.sumo.folder.layout import PLAN_FILE
+from odscen.records.run_plan import Plan
+from odscen.runs.layout import PLAN_FILE
 from odscen.sumo.outputs.output_tables import make_results
 from odscen.sumo.worker.recorder import Recorder
 

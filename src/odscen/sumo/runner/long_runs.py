@@ -17,32 +17,32 @@ from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.to_disk import write_whole
-from odscen.results.judging.expectations import parse_expectation
-from odscen.results.measures.summary import summary_to_json
-from odscen.results.records.run_plan import Plan
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.checkpoint import (
+from odscen.figures.judging.expectations import parse_expectation
+from odscen.figures.measures.summary import summary_to_json
+from odscen.records.run_plan import Plan
+from odscen.runs import layout
+from odscen.runs.checkpoint import (
     clear_parts,
     last_number,
     read_checkpoint,
     survey,
 )
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.found_files import found_files
-from odscen.sumo.folder.run_status import (
+from odscen.runs.finished_run import Run
+from odscen.runs.found_files import found_files
+from odscen.runs.run_settings import RunSettings
+from odscen.runs.run_status import (
     going,
     read_status,
     unfinished,
     write_status,
 )
-from odscen.sumo.folder.run_sums import (
+from odscen.runs.run_sums import (
     check_run_files,
     seal_interrupted,
     seal_run,
     seal_start,
     unseal_interrupted,
 )
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.forked_worker import is_ready
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
@@ -160,11 +160,10 @@ def refuse_interrupted(out: Path) -> None:
     status = read_status(out)
     if status is not None:
         at = f"it is at {status['time']:g} s" if status else "its status.json is damaged"
-        msg = (
+        raise ConflictError(
             f"run {out.name!r} has not ended ({at}); "
             f"odscen resume {out} resumes it; delete the folder to begin anew"
         )
-        raise ConflictError(msg)
 
 
 def interrupted(runs: Path) -> list[str]:
@@ -230,10 +229,8 @@ def _refuse_absent(folder: Path) -> None:
     if unfinished(folder):
         return
     if (folder / layout.SUMMARY_FILE).is_file():
-        msg = f"run {folder.name!r} has ended; there is nothing to resume"
-        raise ConflictError(msg)
-    what = "interrupted run"
-    raise NotFoundError(what, folder.name, interrupted(folder.parent))
+        raise ConflictError(f"run {folder.name!r} has ended; there is nothing to resume")
+    raise NotFoundError("interrupted run", folder.name, interrupted(folder.parent))
 
 
 def _slices(folder: Path) -> dict[str, Any]:
@@ -280,8 +277,10 @@ def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         if (data["format"], data["version"]) != (FORMAT, VERSION):
-            msg = f"format {data['format']!r} version {data['version']!r} is not a run to resume"
-            raise InputError(msg, file=str(path))
+            raise InputError(
+                f"format {data['format']!r} version {data['version']!r} is not a run to resume",
+                file=str(path),
+            )
         expectations = tuple(parse_expectation(text) for text in data["expectations"])
         return PreparedRun(
             plan=Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8")),
@@ -293,5 +292,4 @@ def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
             about=data["about"],
         )
     except (OSError, KeyError, TypeError, ValueError) as error:
-        msg = f"cannot be resumed: {error!r}"
-        raise InputError(msg, file=str(path)) from error
+        raise InputError(f"cannot be resumed: {error!r}", file=str(path)) from error

@@ -6,10 +6,10 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from odscen.runs.layout import BEHAVIOUR_FILE
+from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.document.json_form import dumps
-from odscen.sumo.folder.layout import BEHAVIOUR_FILE
 from odscen.sumo.realize.realization import realize
-from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.realize.sumo_lane_places import lane_places
 from odscen.sumo.runner.forecast import forecast
 from odscen.sumo.runner.run_folder import PreparedRun
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import Int32Array
     from odscen.learning.behaviour.behaviour_model import BehaviourDoor
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.road_users.free_flow import ModelSizes
-    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.realize.sumo_map import SumoMap
 
 MESO_NOTE = (

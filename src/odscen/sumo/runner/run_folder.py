@@ -12,33 +12,33 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.version import __version__
-from odscen.results.by_place.analysis_times import AnalysisTimes
-from odscen.results.judging.actor_measures import RunRecords
-from odscen.results.judging.criteria import criteria_rows
-from odscen.results.judging.expectations import evaluate
-from odscen.results.measures.figure import RunData, SummaryPart
-from odscen.results.measures.gridlock import find_incidents, incident_summary
-from odscen.results.measures.registry import COUNTS, figure_values
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.measures.usability import failed_run, run_usability
-from odscen.results.records.light_programs import programs_to_json
-from odscen.results.records.outcomes import RunStatus
-from odscen.results.records.run_events import events_from_json
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.deferred_figures import compute_figures
-from odscen.sumo.folder.ended import RECORDS_ONLY
-from odscen.sumo.folder.found_files import found_files
-from odscen.sumo.folder.judged import read_judged
+from odscen.figures.by_place.analysis_times import AnalysisTimes
+from odscen.figures.judging.actor_measures import RunRecords
+from odscen.figures.judging.criteria import criteria_rows
+from odscen.figures.judging.expectations import evaluate
+from odscen.figures.measures.figure import RunData, SummaryPart
+from odscen.figures.measures.gridlock import find_incidents, incident_summary
+from odscen.figures.measures.registry import COUNTS, figure_values
+from odscen.figures.measures.summary import actors_from_json
+from odscen.figures.measures.usability import failed_run, run_usability
+from odscen.records.light_programs import programs_to_json
+from odscen.records.outcomes import RunStatus
+from odscen.records.run_events import events_from_json
+from odscen.runs import layout
+from odscen.runs.deferred_figures import compute_figures
+from odscen.runs.ended import RECORDS_ONLY
+from odscen.runs.found_files import found_files
+from odscen.runs.judged import read_judged
+from odscen.runs.run_settings import AS_DESIGNED
 from odscen.sumo.outputs.signal_log import signal_logs
-from odscen.sumo.realize.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.results.by_place.lane_places import LanePlaces
-    from odscen.results.records.light_programs import LightProgram
-    from odscen.results.records.run_plan import Plan
-    from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.figures.by_place.lane_places import LanePlaces
+    from odscen.records.light_programs import LightProgram
+    from odscen.records.run_plan import Plan
+    from odscen.runs.run_settings import RunSettings
     from odscen.sumo.runner.forecast import Forecast
     from odscen.sumo.runner.worker_process import Ended
 
@@ -136,7 +136,7 @@ def make_summary(
     """What ``summary.json`` says of a run that has ended, well or badly.
 
     Without ``figures`` those of a run that nothing is expected of are left for
-    :func:`odscen.sumo.folder.deferred_figures.measured_summary`.
+    :func:`odscen.runs.deferred_figures.measured_summary`.
     """
     plan, done = prepared.plan, ended.done
     judged = bool(plan.criteria or prepared.settings.expectations)

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.errors import InputError
 from odscen.base.system_errors import disk_errors
-from odscen.results.measures.summary import summary_to_json
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.found_files import found_files
-from odscen.sumo.folder.run_sums import seal_run
+from odscen.figures.measures.summary import summary_to_json
+from odscen.runs import layout
+from odscen.runs.finished_run import Run
+from odscen.runs.found_files import found_files
+from odscen.runs.run_sums import seal_run
 from odscen.sumo.runner.forecast import refuse_without_room
 from odscen.sumo.runner.forked_worker import expect_runs, is_one_of_many, is_ready
 from odscen.sumo.runner.interruptible import Interruptible

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from odscen.base.errors import SimulationError
 from odscen.base.system_errors import ADVICE, NO_MEMORY, system_words
-from odscen.sumo.folder.layout import LOG_FILE, PLAN_FILE
+from odscen.runs.layout import LOG_FILE, PLAN_FILE
 from odscen.sumo.runner.forked_worker import ForkedWorker, worker_environment
 from odscen.sumo.worker.protocol import (
     Command,

@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import OdscenError
-from odscen.results.measures.summary import Outcomes
-from odscen.results.records.run_events import Event, event_from_line, event_line
-from odscen.results.records.run_plan import Plan
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.checkpoint import (
+from odscen.figures.measures.summary import Outcomes
+from odscen.records.run_events import Event, event_from_line, event_line
+from odscen.records.run_plan import Plan
+from odscen.runs import layout
+from odscen.runs.checkpoint import (
     EVENTS_LINES,
     STATE_FILE,
     Checkpoint,
@@ -32,8 +32,8 @@ from odscen.sumo.folder.checkpoint import (
     recorded_part,
     slice_folder,
 )
-from odscen.sumo.folder.parts import tidy_part
-from odscen.sumo.folder.run_status import write_status
+from odscen.runs.parts import tidy_part
+from odscen.runs.run_status import write_status
 from odscen.sumo.outputs.conflict_files import tidy_conflicts
 from odscen.sumo.outputs.output_tables import tidy_outputs, trips_in, write_results
 from odscen.sumo.outputs.signal_log import tidy_signals
@@ -41,7 +41,7 @@ from odscen.sumo.outputs.signal_log import tidy_signals
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from odscen.results.measures.summary import Trip
+    from odscen.figures.measures.summary import Trip
 
 _CONTENTS = (STATE_FILE, EVENTS_LINES, *layout.RECORDED)
 

@@ -12,13 +12,13 @@ from bisect import bisect_left
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from odscen.results.records.run_events import Event, EventKind
+from odscen.records.run_events import Event, EventKind
 from odscen.sumo.worker.detours import Detours
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.worker.detours import Pairs
     from odscen.sumo.worker.simulation.session import Session
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from odscen.results.records.outcomes import StopReason, stop_reason
-from odscen.results.records.run_events import Event, EventKind
+from odscen.records.outcomes import StopReason, stop_reason
+from odscen.records.run_events import Event, EventKind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from odscen.results.records.run_events import EventKind, event_row
+from odscen.records.run_events import EventKind, event_row
 from odscen.sumo.worker.protocol import Command, EgoPose, MoreRules, Outside, State, decode
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.worker.protocol import Lockstep, Message
     from odscen.sumo.worker.recorder import Recorder
     from odscen.sumo.worker.simulation.observed import Poses

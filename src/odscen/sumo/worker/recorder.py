@@ -12,14 +12,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.frames import body_centre
-from odscen.results.records.run_events import Event, EventKind
+from odscen.records.run_events import Event, EventKind
 from odscen.sumo.worker.jams import JamWatch, LastStop
 from odscen.sumo.worker.simulation.observed import Collision, Front, StepLists
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.results.records.run_plan import Plan, PlannedActor
+    from odscen.records.run_plan import Plan, PlannedActor
     from odscen.sumo.worker.simulation.session import Session
 
 

@@ -56,8 +56,9 @@ class RouteSlices:
                 if begin is not None:
                     depart = float(begin[1])
                     if depart < last:
-                        msg = f"{self._routes.name}: not in order of departure at {depart:g} s"
-                        raise SimulationError(msg)
+                        raise SimulationError(
+                            f"{self._routes.name}: not in order of departure at {depart:g} s"
+                        )
                     last = depart
                 if line.strip() == _END or (begin is not None and last >= until):
                     break

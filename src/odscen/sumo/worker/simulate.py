@@ -28,9 +28,9 @@ from typing import TYPE_CHECKING, Protocol
 from odscen.base.atomic_folders import in_use
 from odscen.base.errors import OdscenError
 from odscen.base.system_errors import NO_MEMORY, system_words
-from odscen.results.records.light_programs import programs_from_json
-from odscen.results.records.run_plan import Plan
-from odscen.sumo.folder.layout import (
+from odscen.records.light_programs import programs_from_json
+from odscen.records.run_plan import Plan
+from odscen.runs.layout import (
     BEHAVIOUR_FILE,
     CONFIG_FILE,
     LIGHTS_FILE,

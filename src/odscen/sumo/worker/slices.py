@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import SimulationError
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.checkpoint import (
+from odscen.runs import layout
+from odscen.runs.checkpoint import (
     STATE_FILE,
     Checkpoint,
     last_number,
@@ -27,7 +27,7 @@ from odscen.sumo.folder.checkpoint import (
     read_checkpoint,
     slice_folder,
 )
-from odscen.sumo.folder.parts import check_room
+from odscen.runs.parts import check_room
 from odscen.sumo.outputs.output_tables import outputs_to
 from odscen.sumo.worker.completer import Written
 from odscen.sumo.worker.protocol import Done
@@ -37,7 +37,7 @@ from odscen.sumo.worker.simulation.session import open_session
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.worker.completion import Completion
     from odscen.sumo.worker.simulation.session import Session
     from odscen.sumo.worker.stepping import Stepper
@@ -152,8 +152,9 @@ class _RunningSlice:
         if self._before is None:
             return
         if abs(session.time - self._before.time) > 1e-6:
-            msg = f"SUMO resumes at {session.time:g} s instead of {self._before.time:g} s"
-            raise SimulationError(msg)
+            raise SimulationError(
+                f"SUMO resumes at {session.time:g} s instead of {self._before.time:g} s"
+            )
         missing = [name for name in self._before.present if not session.knows(name)]
         stepper.recorder.lose(session.time, missing)
 
@@ -168,8 +169,7 @@ def _session(arguments: list[str], number: int) -> Iterator[Session]:
         with open_session(arguments) as session:
             yield session
     except SimulationError as error:
-        msg = f"slice {number}: {error}"
-        raise SimulationError(msg) from error
+        raise SimulationError(f"slice {number}: {error}") from error
 
 
 def memory_now() -> int:

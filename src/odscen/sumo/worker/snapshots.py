@@ -24,7 +24,7 @@ from odscen.base.frames import SumoPose, sumo_to_xodr
 from odscen.sumo.worker.simulation.observed import VehicleSignal
 
 if TYPE_CHECKING:
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.worker.simulation.observed import Poses
     from odscen.sumo.worker.simulation.session import Session
 

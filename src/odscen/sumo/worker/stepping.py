@@ -13,7 +13,7 @@ from odscen.sumo.worker.recorder import Recorder
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.simulation.session import Session

@@ -6,7 +6,7 @@ import ctypes
 from contextlib import suppress
 from pathlib import Path
 
-from odscen.sumo.folder.layout import BEHAVIOUR_FILE, STORY_FILE, SUMO_FOLDER
+from odscen.runs.layout import BEHAVIOUR_FILE, STORY_FILE, SUMO_FOLDER
 
 _XERCES = "libxerces-c-3"
 _INITIALIZE = (

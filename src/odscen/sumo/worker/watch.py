@@ -9,13 +9,13 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from odscen.results.records.run_events import EventKind, event_row
+from odscen.records.run_events import EventKind, event_row
 from odscen.sumo.worker.protocol import Detectors, FrameMessage, Incidents, Lights
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.recorder import Recorder
     from odscen.sumo.worker.simulation.session import Session

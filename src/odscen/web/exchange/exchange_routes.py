@@ -20,7 +20,7 @@ from odscen.web.wire.media_types import answers
 
 if TYPE_CHECKING:
     from odscen.app.exchange.zipped_exports import ExportedFiles
-    from odscen.workspace.store import ProgressCallback
+    from odscen.maps.store import ProgressCallback
 
 router = APIRouter(prefix="/api")
 exports = APIRouter(prefix="/api/scenarios", route_class=LargeDocumentRoute)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from starlette.requests import Request
 
+from odscen.maps.store import Workspace
 from odscen.web.application import create_app
 from odscen.web.large.large_documents import ANSWER, BODY, HEAD, REQUEST
 from odscen.web.large.whole_days import day_made
 from odscen.web.messages import WholeDay
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, MutableMapping

@@ -27,15 +27,15 @@ from fastapi.routing import APIRoute
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response, StreamingResponse
 
-from odscen.workspace.allowances import for_large_document
-from odscen.workspace.child_process import work_in_child
-from odscen.workspace.folder_names import is_name
-from odscen.workspace.wastebasket import SCENARIO_SUFFIX
+from odscen.maps.allowances import for_large_document
+from odscen.maps.child_process import work_in_child
+from odscen.maps.folder_names import is_name
+from odscen.maps.wastebasket import SCENARIO_SUFFIX
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Coroutine
 
-    from odscen.workspace.store import Workspace
+    from odscen.maps.store import Workspace
 
 LARGE = 1_000_000
 """Bytes of a document, or of a request, from which on a child works on it. To read a megabyte holds

@@ -18,10 +18,10 @@ from odscen.sumo.worker.protocol import Done, Failed
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from odscen.maps.store import Workspace
+    from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.live_run import Live
-    from odscen.workspace.store import Workspace
 
 _WORKER = "odscen.web.large.run_worker"
 
@@ -165,8 +165,7 @@ class LargeRun:
             self.end()
             if said:
                 raise error_from_data(said["error"])
-            msg = "the process of the run has ended without a result"
-            raise ToolError(msg, output=words)
+            raise ToolError("the process of the run has ended without a result", output=words)
         return said
 
     def _words(self) -> str:

@@ -21,9 +21,10 @@ from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import read_scenario
 from odscen.base.error_data import error_to_data
 from odscen.base.errors import OdscenError
+from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.worker.protocol import (
     Command,
@@ -33,7 +34,6 @@ from odscen.sumo.worker.protocol import (
     encode,
 )
 from odscen.web.wire.live_messages import introduction
-from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 from odscen.app.demand import demands
 from odscen.app.demand.sized_demand import sized
 from odscen.base.text_files import write_text
+from odscen.maps.allowances import for_trial_runs
+from odscen.maps.child_process import work_in_child
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.web.jobs import JobResult
 from odscen.web.messages import DayMade
-from odscen.workspace.allowances import for_trial_runs
-from odscen.workspace.child_process import work_in_child
 
 if TYPE_CHECKING:
+    from odscen.maps.store import ProgressCallback
     from odscen.web.messages import WholeDay
     from odscen.web.services import Services
-    from odscen.workspace.store import ProgressCallback
 
 _CHILD = "odscen.web.large.child_requests:whole_day"
 _SCRATCH = "odscen-day-"

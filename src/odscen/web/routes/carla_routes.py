@@ -10,7 +10,7 @@ from fastapi import APIRouter
 from starlette.responses import Response, StreamingResponse
 
 from odscen.base.errors import NotFoundError
-from odscen.sumo.folder import layout
+from odscen.runs import layout
 from odscen.web.live_view import Active
 from odscen.web.messages import CarlaInfo
 from odscen.web.routes.run_routes import page_of_run
@@ -37,8 +37,7 @@ async def camera(run: str, shared: Shared) -> Response:
     """Pictures from above a run that CARLA shows, as they come; JPEG, one replacing the other."""
     active = shared.runs.active(run)
     if not active.carla:
-        what = "camera of run"
-        raise NotFoundError(what, run, [])
+        raise NotFoundError("camera of run", run, [])
     kind = f"multipart/x-mixed-replace; boundary={_BOUNDARY}"
     return StreamingResponse(
         _pictures(active), media_type=kind, headers={"Cache-Control": "no-store"}

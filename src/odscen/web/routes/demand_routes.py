@@ -18,7 +18,7 @@ from odscen.web.routes.scenario_routes import state_of
 from odscen.web.services import Shared
 
 if TYPE_CHECKING:
-    from odscen.workspace.store import ProgressCallback
+    from odscen.maps.store import ProgressCallback
 
 router = APIRouter(prefix="/api/scenarios/{name}/demand", route_class=LargeDocumentRoute)
 days = APIRouter(prefix="/api/scenarios/{name}/demand")
@@ -46,8 +46,9 @@ def table(
     try:
         text = file.file.read().decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        msg = "this is not a text file in UTF-8; save the table as CSV (UTF-8)"
-        raise InputError(msg, file=file.filename) from error
+        raise InputError(
+            "this is not a text file in UTF-8; save the table as CSV (UTF-8)", file=file.filename
+        ) from error
 
     def change(scenario: Scenario) -> Scenario:
         loaded = shared.map_of(scenario)

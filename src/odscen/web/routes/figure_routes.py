@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from odscen.app.figure_functions import installed_figures
-from odscen.results.judging.actor_measures import ACTOR_MEASURES
-from odscen.results.measures.figure import Better, SummaryPart
-from odscen.results.measures.registry import RUN_FIGURES
+from odscen.figures.judging.actor_measures import ACTOR_MEASURES
+from odscen.figures.measures.figure import Better, SummaryPart
+from odscen.figures.measures.registry import RUN_FIGURES
 from odscen.web.messages import Answer
 
 router = APIRouter(prefix="/api/figures")

@@ -15,6 +15,9 @@ from odscen.app.maps import load_map
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import ConflictError, DamagedError, OdscenError
 from odscen.convert.model.conversion_settings import ConversionSettings
+from odscen.maps.folder_names import check_name, name_from_file
+from odscen.maps.shipped import shipped_maps
+from odscen.maps.store import is_outdated
 from odscen.scenario.demand.day_profiles import BUILT_IN
 from odscen.web.jobs import JobResult
 from odscen.web.messages import (
@@ -42,15 +45,12 @@ from odscen.web.wire.map_messages import (
     SemanticsInfo,
 )
 from odscen.web.wire.media_types import SVG
-from odscen.workspace.folder_names import check_name, name_from_file
-from odscen.workspace.shipped import shipped_maps
-from odscen.workspace.store import is_outdated
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from odscen.workspace.map_entry import MapEntry
-    from odscen.workspace.store import ProgressCallback
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import ProgressCallback
 
 router = APIRouter(prefix="/api")
 
@@ -226,8 +226,9 @@ def _refuse_other(shared: Shared, name: str, content: IO[bytes]) -> None:
         return  # adding it builds it anew
     content.seek(0)
     if there.sha256 != hashlib.sha256(content.read()).hexdigest():
-        msg = f"there is another map named {name!r}; give this one another name, or remove that one"
-        raise ConflictError(msg)
+        raise ConflictError(
+            f"there is another map named {name!r}; give this one another name, or remove that one"
+        )
 
 
 def _catalogue(shared: Shared) -> Iterator[MapInfo | BrokenMapInfo]:

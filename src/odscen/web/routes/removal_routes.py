@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter
 
 from odscen.app.removal import removal_facts, remove
+from odscen.maps.wastebasket import RemovedKind, Wastebasket
 from odscen.web.messages import Answer
 from odscen.web.services import Services, Shared
-from odscen.workspace.wastebasket import RemovedKind, Wastebasket
 
 if TYPE_CHECKING:
-    from odscen.workspace.wastebasket import RemovedItem
+    from odscen.maps.wastebasket import RemovedItem
 
 router = APIRouter(prefix="/api")
 

@@ -14,8 +14,8 @@ from starlette.responses import FileResponse, Response
 from odscen.app.demand import demands
 from odscen.app.running.run_lanes import TrafficOnMap, traffic_on_map
 from odscen.app.scenarios import read_scenario
+from odscen.runs.layout import SCENARIO_FILE
 from odscen.scenario.demand.count_stations import place_points
-from odscen.sumo.folder.layout import SCENARIO_FILE
 from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.services import Shared
 from odscen.web.wire.media_types import ANY_FILE

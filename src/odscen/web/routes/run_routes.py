@@ -14,14 +14,14 @@ from starlette.websockets import WebSocket
 
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.stored_files import tables
-from odscen.results.measures.curves import SpeedShares, run_curves
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.replay import replay_columns
-from odscen.results.records.run_events import EventKind, event_row, events_from_json
-from odscen.results.records.run_plan import Plan
-from odscen.results.records.traces import ActorCounts, SpeedCurve
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.recorded import read_trajectories
+from odscen.figures.measures.curves import SpeedShares, run_curves
+from odscen.figures.measures.summary import actors_from_json
+from odscen.records.replay import replay_columns
+from odscen.records.run_events import EventKind, event_row, events_from_json
+from odscen.records.run_plan import Plan
+from odscen.records.traces import ActorCounts, SpeedCurve
+from odscen.runs import layout
+from odscen.runs.recorded import read_trajectories
 from odscen.web.large.large_documents import LargeForecastRoute
 from odscen.web.live_view import LiveView
 from odscen.web.packed import UNCHANGED, answer, pack
@@ -138,8 +138,7 @@ def summary(run: str, shared: Shared) -> RunSummary:
     _kept(shared, run, layout.SUMMARY_FILE)
     found = shared.runs.kept.summary(run)
     if found is None:
-        what = "summary of run"
-        raise NotFoundError(what, run, [])
+        raise NotFoundError("summary of run", run, [])
     return found
 
 

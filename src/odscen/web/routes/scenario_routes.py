@@ -17,7 +17,8 @@ from odscen.app.template_scenarios import template_scenario
 from odscen.app.variants import apply_edit
 from odscen.base.categories import Category
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.judging.criteria import criteria_problems
+from odscen.figures.judging.criteria import criteria_problems
+from odscen.maps.folder_names import check_name, name_from_file
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.problems import Problem
@@ -57,7 +58,6 @@ from odscen.web.wire.document_changes import (
 )
 from odscen.web.wire.media_types import Responses
 from odscen.web.wire.plan_messages import PlannedColumns
-from odscen.workspace.folder_names import check_name, name_from_file
 
 if TYPE_CHECKING:
     from odscen.scenario.placing.region import Region
@@ -228,8 +228,9 @@ def path(name: str, spawn: str, goal: str, shared: Shared) -> Path:
     graph = sumo.graph
     start, end = _place(shared, scenario, spawn), _place(shared, scenario, goal)
     if start.walk != end.walk:
-        msg = f"no path leads from {spawn!r} to {goal!r}: one is for vehicles, one for pedestrians"
-        raise InputError(msg)
+        raise InputError(
+            f"no path leads from {spawn!r} to {goal!r}: one is for vehicles, one for pedestrians"
+        )
     with shared.search:
         region = _region(shared, scenario)
         category = Category.PEDESTRIAN if start.walk else Category.CAR
@@ -362,6 +363,5 @@ def _region(shared: Services, scenario: Scenario) -> Region:
 def _place(shared: Services, scenario: Scenario, node: str) -> GraphPlace:
     place = place_of(shared.map_of(scenario).sumo.graph, node)
     if place is None:
-        what = "node"
-        raise NotFoundError(what, node, [])
+        raise NotFoundError("node", node, [])
     return place

@@ -23,21 +23,21 @@ from odscen.app.signals.signal_views import (
 )
 from odscen.app.signals.turn_arrows import arrow_words, with_turn_arrows
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.records.light_programs import programs_from_json, stage_spans
-from odscen.results.report.signals.signal_charts import plan_chart, plan_scale
-from odscen.results.report.signals.signal_sheet import legend_picture, legend_shapes
-from odscen.results.report.signals.stage_diagrams import (
+from odscen.records.light_programs import programs_from_json, stage_spans
+from odscen.reports.signals.signal_charts import plan_chart, plan_scale
+from odscen.reports.signals.signal_sheet import legend_picture, legend_shapes
+from odscen.reports.signals.stage_diagrams import (
     JunctionPictures,
     detector_label,
     stage_words,
 )
+from odscen.runs import layout
+from odscen.runs.recorded import read_calls, read_light_states
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.edits.turn_treatment import crossing_turns
 from odscen.scenario.signals.light import find_light
 from odscen.scenario.signals.movement_names import shortest_names
 from odscen.scenario.signals.program_design import seconds_of_day
-from odscen.sumo.folder import layout
-from odscen.sumo.folder.recorded import read_calls, read_light_states
 from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import OfVersion, ScenarioState, Version
 from odscen.web.packed import UNCHANGED, answer, pack
@@ -72,7 +72,7 @@ if TYPE_CHECKING:
 
     from odscen.app.maps import LoadedMap
     from odscen.drawing.map_drawing import MapDrawing
-    from odscen.results.records.light_programs import LightProgram, ShownPlan
+    from odscen.records.light_programs import LightProgram, ShownPlan
     from odscen.scenario.edits.turn_treatment import TurnTreatment
     from odscen.scenario.signals.light import Light
 

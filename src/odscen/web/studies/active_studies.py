@@ -9,25 +9,25 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from odscen.app.scenarios import SUFFIX
-from odscen.app.studies.executors import LocalExecutor
-from odscen.app.studies.study_folder import PAGE_FILE, STUDY_FILE, TABLE_FILE, read_study
-from odscen.app.studies.study_plan import StudyPlan
-from odscen.app.studies.study_report import SHOWN_FIGURES, write_study_page
-from odscen.app.studies.study_runs import begin_study_of, carry_out_study, study_state
 from odscen.base.atomic_folders import discard
 from odscen.base.errors import ConflictError, InputError, NotFoundError
+from odscen.experiments.studies.executors import LocalExecutor
+from odscen.experiments.studies.study_folder import PAGE_FILE, STUDY_FILE, TABLE_FILE, read_study
+from odscen.experiments.studies.study_plan import StudyPlan
+from odscen.experiments.studies.study_report import SHOWN_FIGURES, write_study_page
+from odscen.experiments.studies.study_runs import begin_study_of, carry_out_study, study_state
+from odscen.maps.folder_names import check_name, plain_name
 from odscen.scenario.document.validation import validated
 from odscen.web.studies.study_messages import MOST_PAGE_RUNS, StudyInfo, StudyProblem
 from odscen.web.studies.under_way import OneAtATime, UnderWay
-from odscen.workspace.folder_names import check_name, plain_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from odscen.app.studies.study_runs import StudyState
+    from odscen.experiments.studies.study_runs import StudyState
+    from odscen.maps.store import Workspace
     from odscen.web.studies.study_messages import ResumeStudy, StudyStatus, StudyWish
-    from odscen.workspace.store import Workspace
 
 MOST_PROBLEMS = 20
 _DOWNLOADS = (TABLE_FILE, PAGE_FILE)
@@ -59,11 +59,10 @@ class Studies:
             grid = begin_study_of(self._workspace, plan, folder, beside=self._workspace.scenarios)
             if grid.count > MOST_PAGE_RUNS:
                 shutil.rmtree(folder)
-                msg = (
+                raise InputError(
                     f"these are {grid.count:,} runs, the page takes {MOST_PAGE_RUNS:,}: "
                     "odscen study run takes more"
                 )
-                raise InputError(msg)
             self._carry_out(folder, wish.processes)
         return folder.name
 
@@ -82,11 +81,11 @@ class Studies:
             self._work.refuse_more()
             state = study_state(folder)
             if state.active:
-                msg = f"another process works on study {name!r}"
-                raise ConflictError(msg)
+                raise ConflictError(f"another process works on study {name!r}")
             if state.done and not (wish.failed and state.problems):
-                msg = f"all runs of study {name!r} have ended; there is nothing to resume"
-                raise ConflictError(msg)
+                raise ConflictError(
+                    f"all runs of study {name!r} have ended; there is nothing to resume"
+                )
             self._carry_out(folder, wish.processes, again=wish.failed)
 
     def stop(self, name: str) -> None:
@@ -112,8 +111,7 @@ class Studies:
         with self._work.lock:
             self._work.forget(name)
             if study_state(folder).active:
-                msg = f"another process works on study {name!r}"
-                raise ConflictError(msg)
+                raise ConflictError(f"another process works on study {name!r}")
             discard(folder)
 
     def info(self, name: str) -> StudyInfo:
@@ -166,8 +164,7 @@ class Studies:
         if path == PAGE_FILE:
             return write_study_page(folder, SHOWN_FIGURES, folder / PAGE_FILE)
         if path not in _DOWNLOADS or not (folder / path).is_file():
-            what = f"file of study {name!r}"
-            raise NotFoundError(what, path, list(_DOWNLOADS))
+            raise NotFoundError(f"file of study {name!r}", path, list(_DOWNLOADS))
         return folder / path
 
     def close(self) -> None:
@@ -192,8 +189,7 @@ class Studies:
         known = [one.name.removesuffix(SUFFIX) for one in self._files()]
         for name in scenarios:
             if name not in known:
-                what = "scenario"
-                raise NotFoundError(what, name, known)
+                raise NotFoundError("scenario", name, known)
 
     def _files(self) -> list[Path]:
         return sorted(self._workspace.scenarios.glob(f"*{SUFFIX}"))
@@ -201,16 +197,14 @@ class Studies:
     def _of(self, name: str) -> Path:
         folder = self._folder / check_name(name, what="study")
         if not (folder / STUDY_FILE).is_file():
-            what = "study"
-            raise NotFoundError(what, name, [one.study for one in self.rows()])
+            raise NotFoundError("study", name, [one.study for one in self.rows()])
         return folder
 
     def _free_folder(self, wish: StudyWish) -> Path:
         if wish.name is not None:
             folder = self._folder / check_name(wish.name, what="study")
             if folder.exists():
-                msg = f"there is a study {wish.name!r}; give this one another name"
-                raise ConflictError(msg)
+                raise ConflictError(f"there is a study {wish.name!r}; give this one another name")
             return folder
         stem = plain_name(wish.scenarios[0])[:56]
         names = (f"{stem}-{number}" for number in itertools.count(1))

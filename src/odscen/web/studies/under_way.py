@@ -71,8 +71,9 @@ class OneAtATime:
         """Raise :class:`ConflictError` if something is under way; ``lock`` is to be held."""
         for name, work in self._known.items():
             if not work.over:
-                msg = f"{self._what} {name!r} is under way; stop it, or wait for its end"
-                raise ConflictError(msg)
+                raise ConflictError(
+                    f"{self._what} {name!r} is under way; stop it, or wait for its end"
+                )
 
     def start(self, name: str, before: int, work: Callable[[UnderWay], None]) -> None:
         """Start work of which so many runs had ended; it calls ``check`` now and then."""
@@ -91,15 +92,13 @@ class OneAtATime:
     def stop(self, name: str) -> None:
         """Stop it; :class:`ConflictError` if it is not under way."""
         if (live := self.live(name)) is None:
-            msg = f"{self._what} {name!r} is not under way"
-            raise ConflictError(msg)
+            raise ConflictError(f"{self._what} {name!r} is not under way")
         live.stop.set()
 
     def forget(self, name: str) -> None:
         """Forget what is over; :class:`ConflictError` if it is not. ``lock`` is to be held."""
         if self.live(name) is not None:
-            msg = f"{self._what} {name!r} is under way; stop it first"
-            raise ConflictError(msg)
+            raise ConflictError(f"{self._what} {name!r} is under way; stop it first")
         self._known.pop(name, None)
 
     def close(self) -> None:

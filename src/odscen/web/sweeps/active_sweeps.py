@@ -9,9 +9,11 @@ import shutil
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from odscen.app.sweeps.sweep_cases import opened_case
-from odscen.app.sweeps.sweep_estimate import PATIENCE, estimate
-from odscen.app.sweeps.sweep_folder import (
+from odscen.base.atomic_folders import discard
+from odscen.base.errors import ConflictError, InputError, NotFoundError
+from odscen.experiments.sweeps.sweep_cases import opened_case
+from odscen.experiments.sweeps.sweep_estimate import PATIENCE, estimate
+from odscen.experiments.sweeps.sweep_folder import (
     SWEEP_FILE,
     SweepSettings,
     begin_sweep,
@@ -19,24 +21,22 @@ from odscen.app.sweeps.sweep_folder import (
     read_sweep,
     settings_from_dict,
 )
-from odscen.app.sweeps.sweep_runs import refuse_unknown, sweep
-from odscen.app.sweeps.sweep_table import PAGE_FILE, TABLE_FILE, limits_of, read_table
-from odscen.base.atomic_folders import discard
-from odscen.base.errors import ConflictError, InputError, NotFoundError
+from odscen.experiments.sweeps.sweep_runs import refuse_unknown, sweep
+from odscen.experiments.sweeps.sweep_table import PAGE_FILE, TABLE_FILE, limits_of, read_table
+from odscen.maps.folder_names import check_name
+from odscen.runs import layout
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
-from odscen.sumo.folder import layout
 from odscen.web.studies.under_way import OneAtATime, UnderWay
 from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
-from odscen.workspace.folder_names import check_name
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.app.sweeps.sweep_table import Sweep
+    from odscen.experiments.sweeps.sweep_table import Sweep
+    from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
     from odscen.web.sweeps.sweep_messages import SweepState, SweepWish
-    from odscen.workspace.store import Workspace
 
 _FILES = re.compile(
     rf"{re.escape(PAGE_FILE)}|{re.escape(TABLE_FILE)}|cases/case-\d+(\.scenario\.json|\.xosc)"
@@ -113,8 +113,9 @@ class Sweeps:
         with self._work.lock:
             self._work.refuse_more()
             if _is_whole(folder):
-                msg = f"sweep {name!r} has all of its cases; there is nothing to resume"
-                raise ConflictError(msg)
+                raise ConflictError(
+                    f"sweep {name!r} has all of its cases; there is nothing to resume"
+                )
             self._submit(name, scenario, plan, settings_from_dict(said), processes)
 
     def stop(self, name: str) -> None:
@@ -191,8 +192,7 @@ class Sweeps:
         """
         found = self._of(name) / path
         if not _FILES.fullmatch(path) or not found.is_file():
-            what = f"file of sweep {name!r}"
-            raise NotFoundError(what, path, [])
+            raise NotFoundError(f"file of sweep {name!r}", path, [])
         return found
 
     def case(self, name: str, case: str) -> Scenario:
@@ -249,8 +249,7 @@ class Sweeps:
     def _of(self, name: str) -> Path:
         folder = self._folder / check_name(name, what="sweep")
         if not (folder / SWEEP_FILE).is_file():
-            what = "sweep"
-            raise NotFoundError(what, name, [one.sweep for one in self.rows()])
+            raise NotFoundError("sweep", name, [one.sweep for one in self.rows()])
         return folder
 
     def _free_folder(self, scenario: str) -> Path:

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
 from odscen.base.errors import ConflictError, InputError
-from odscen.results.sweeps.sweep_rows import UNITS
+from odscen.experiments.cases.sweep_rows import UNITS
 from odscen.scenario.document.json_form import dumps
 from odscen.web.messages import ScenarioState
 from odscen.web.routes.scenario_routes import state_of
@@ -121,8 +121,9 @@ def file(sweep: str, name: str, shared: Shared) -> Response:
 
 def _document(shared: Services, name: str) -> Scenario:
     if shared.large is not None and shared.large.is_large(name):
-        msg = f"scenario {name!r} is too large to be swept here; use the command odscen sweep"
-        raise InputError(msg)
+        raise InputError(
+            f"scenario {name!r} is too large to be swept here; use the command odscen sweep"
+        )
     return shared.drafts.get(name).scenario
 
 

@@ -17,7 +17,7 @@ from odscen.web.messages import Answer
 from odscen.web.wire.run_messages import IncidentInfo, RunState
 
 if TYPE_CHECKING:
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
 
 
 class LiveActor(Answer):

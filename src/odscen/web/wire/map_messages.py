@@ -1,6 +1,6 @@
 """What goes over the wire about maps; see :mod:`odscen.web.messages`.
 
-The parts of ``map.json`` are sent as they are, see :mod:`odscen.workspace.map_build`. Columns are
+The parts of ``map.json`` are sent as they are, see :mod:`odscen.maps.map_build`. Columns are
 made by :mod:`odscen.web.packed` and :mod:`odscen.drawing.map_drawing`; here is only their
 shape: they are sent unchecked.
 """

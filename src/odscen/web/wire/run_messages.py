@@ -9,8 +9,8 @@ from pydantic.json_schema import SkipJsonSchema
 
 from odscen.base.categories import Category
 from odscen.learning.offered_options import OptionValue
-from odscen.results.records.outcomes import ActorStatus
-from odscen.results.records.run_events import EventKind
+from odscen.records.outcomes import ActorStatus
+from odscen.records.run_events import EventKind
 from odscen.web.messages import Answer, Name, RequestBody
 from odscen.web.wire.summary_messages import RunSummary
 
@@ -218,7 +218,7 @@ _IfKnown = Annotated[_One | SkipJsonSchema[None], Field(exclude_if=lambda value:
 
 
 class IncidentInfo(Answer):
-    """Something that happened to ``actor``; see :class:`~odscen.results.records.run_events.Event`.
+    """Something that happened to ``actor``; see :class:`~odscen.records.run_events.Event`.
 
     What there is nothing to say of is left out.
     """

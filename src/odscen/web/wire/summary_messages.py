@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field, create_model
 
+from odscen.figures.measures.gridlock import Incident
+from odscen.figures.measures.registry import COUNTS
+from odscen.figures.measures.usability import UsabilityLevel, UsabilityReason
 from odscen.learning.offered_options import OptionValue
-from odscen.results.measures.gridlock import Incident
-from odscen.results.measures.registry import COUNTS
-from odscen.results.measures.usability import UsabilityLevel, UsabilityReason
-from odscen.results.records.outcomes import RunStatus
+from odscen.records.outcomes import RunStatus
 from odscen.web.messages import Answer
 
 if TYPE_CHECKING:

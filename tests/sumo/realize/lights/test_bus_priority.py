@@ -10,10 +10,10 @@ import pytest
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
+from odscen.runs.layout import SIGNALS_FILE
+from odscen.runs.recorded import read_light_states
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.signals.program_design import ONLY_PLAN
-from odscen.sumo.folder.layout import SIGNALS_FILE
-from odscen.sumo.folder.recorded import read_light_states
 from odscen.sumo.realize.lights.light_detectors import BUS_GREEN
 from odscen.sumo.realize.realization import realize
 from tests.signal_case import carried_out, crossing, one_plan, program, scenario

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 from lxml import etree
 
-from odscen.results.records.light_programs import programs_from_json, programs_to_json
+from odscen.records.light_programs import programs_from_json, programs_to_json
 from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.scenario.signals.stage_sequence import cycle_length
 from odscen.sumo.realize.lights.light_realization import realized_lights

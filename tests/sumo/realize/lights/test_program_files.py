@@ -22,13 +22,13 @@ from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.query import node_id
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.document.signals_document import Signals
 from odscen.sumo.realize.lights.light_realization import realized_lights
 from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.realize.realization import realize
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared, write_sumo_files

@@ -6,6 +6,7 @@ import pytest
 from lxml import etree
 
 from odscen.app.maps import LoadedMap, load_map
+from odscen.maps.store import Workspace
 from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.sumo.realize.traffic_measures.breakdowns import breakdowns
 from odscen.sumo.realize.traffic_measures.measure_actions import (
@@ -14,7 +15,6 @@ from odscen.sumo.realize.traffic_measures.measure_actions import (
     narrowed,
 )
 from odscen.sumo.realize.traffic_measures.measured_lanes import periods
-from odscen.workspace.store import Workspace
 from tests.sumo.runner.test_long_runs import TOWN
 
 if TYPE_CHECKING:

@@ -9,14 +9,14 @@ import pytest
 
 from odscen.app.running.reports import interval_rows, write_report
 from odscen.base.errors import InputError
+from odscen.maps.store import Workspace
+from odscen.runs.finished_run import Run
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.study_document import Cordon, Detector, Study, TravelTimeSection
 from odscen.scenario.edits.demand_edits import set_input
 from odscen.scenario.placing.region import NodePlace, name_of
-from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.workspace.store import Workspace
 from tests.sumo.realize.test_routes_file import empty
 from tests.sumo.runner.test_on_maps import built, net_file
 

@@ -9,10 +9,10 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import ScenarioError
+from odscen.runs.recorded import read_visits
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.sumo.folder.recorded import read_visits
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.runner.test_on_maps import built, net_file

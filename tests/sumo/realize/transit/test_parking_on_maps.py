@@ -9,13 +9,13 @@ import polars as pl
 import pytest
 
 from odscen.base.frames import body_centre
-from odscen.results.measures.summary import actors_from_json
-from odscen.results.records.run_plan import Plan
-from odscen.sumo.folder.layout import PARKING_FILE
-from odscen.sumo.folder.measured import read_parking
-from odscen.sumo.folder.recorded import read_stays, read_trips
+from odscen.figures.measures.summary import actors_from_json
+from odscen.records.run_plan import Plan
+from odscen.runs.layout import PARKING_FILE
+from odscen.runs.measured import read_parking
+from odscen.runs.recorded import read_stays, read_trips
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.realize.realization import realize
-from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared

@@ -54,8 +54,7 @@ class Wrong(Nobody):
         if seen.time < 1.0:
             return super().act(seen, state)
         if self.what == "raise":
-            msg = "kaputt"
-            raise ZeroDivisionError(msg)
+            raise ZeroDivisionError("kaputt")
         count = len(seen)
         place = DrivingAction(
             DrivingKind.LANE_POSITION, lane=np.full(count, 10**6), pos=np.zeros(count)
@@ -75,8 +74,7 @@ class Keeper(Nobody):
             moved = seen.pos[seen.index == 0] - before.pos[before.index == 0]
             slow = 0.5 * (seen.speed[seen.index == 0] + before.speed[before.index == 0])
             if (seen.lane == before.lane).all() and (abs(moved) < 0.1 * slow).any():
-                msg = f"it was shown {before.time:g} s and sees {seen.time:g} s"
-                raise ValueError(msg)
+                raise ValueError(f"it was shown {before.time:g} s and sees {seen.time:g} s")
         return DrivingAction(speed=np.zeros(len(seen))), np.zeros(len(seen), dtype=bool)
 
 

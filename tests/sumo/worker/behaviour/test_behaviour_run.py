@@ -12,7 +12,7 @@ import pytest
 
 from odscen.base.errors import InputError
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor, DrivingKind
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
@@ -22,7 +22,7 @@ from tests.sumo.story_case import MIDDLE, document, entry, loaded, node_at
 from tests.sumo.worker.behaviour.models import HERE
 
 if TYPE_CHECKING:
-    from odscen.sumo.folder.finished_run import Run
+    from odscen.runs.finished_run import Run
 
 MOTORWAY = "motorway_weave"
 ROOT = str(Path(__file__).parents[4])

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from odscen.workspace.store import Workspace
+from odscen.maps.store import Workspace
 
 CROSSING = Path(__file__).parents[4] / "maps" / "signal_crossing.xodr"
 

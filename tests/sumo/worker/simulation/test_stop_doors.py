@@ -9,8 +9,8 @@ from typing import Any
 import polars as pl
 import pytest
 
-from odscen.sumo.folder.recorded import read_stays
-from odscen.sumo.realize.run_settings import RunSettings
+from odscen.runs.recorded import read_stays
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.elevation import ElevationLookup
 from odscen.sumo.runner.in_step import InStep, Step
 from odscen.sumo.runner.prepare import prepare

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from odscen.figures.measures.latent_delay import due, latent_delay
+from odscen.figures.measures.summary import actors_from_json
 from odscen.lanegraph.query import node_id, node_index, walk_node_index
-from odscen.results.measures.latent_delay import due, latent_delay
-from odscen.results.measures.summary import actors_from_json
 from tests.sumo.story_case import (
     LEFT,
     MIDDLE,

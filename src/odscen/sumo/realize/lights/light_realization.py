@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
-    from odscen.results.records.light_programs import LightProgram, ShownPlan
+    from odscen.records.light_programs import LightProgram, ShownPlan
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import Control
     from odscen.scenario.signals.light import Light

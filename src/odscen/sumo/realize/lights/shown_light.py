@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import count
 from typing import TYPE_CHECKING
 
-from odscen.results.records.light_programs import (
+from odscen.records.light_programs import (
     LightProgram,
     ProgramPhase,
     ShownGroup,

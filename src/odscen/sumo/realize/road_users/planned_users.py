@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.lanegraph.query import node_id, walk_node_id
-from odscen.results.records.run_plan import PlannedActor
+from odscen.records.run_plan import PlannedActor
 from odscen.scenario.placing.region import turns_round
 from odscen.sumo.realize.driving import KINDS
 from odscen.sumo.realize.road_users.free_flow import FreeFlow
@@ -131,8 +131,9 @@ class RoadUserWriter:
         offset = user.design.lateral_offset
         if user.person:
             if (node := turns_round(path)) is not None:
-                msg = f"its walk would turn round at {walk_node_id(self._graph, node)!r}"
-                raise NoRouteError(msg)
+                raise NoRouteError(
+                    f"its walk would turn round at {walk_node_id(self._graph, node)!r}"
+                )
             walk = self._walks.plan(path, length=body.length, lateral_offset=offset)
             self._refuse_missed(user, walk.edges)
             return walk
@@ -144,8 +145,7 @@ class RoadUserWriter:
         )
         missed = left_out((self._stops[visit.stop] for visit in user.visits), route.edges)
         if missed is not None:
-            msg = f"its route on the SUMO network does not pass stop {missed.id!r}"
-            raise NoRouteError(msg)
+            raise NoRouteError(f"its route on the SUMO network does not pass stop {missed.id!r}")
         route = parked_route(
             route,
             self._net,
@@ -167,8 +167,9 @@ class RoadUserWriter:
             if lane is None or lane.internal or lane.edge == here:
                 continue  # inside a junction, the edges before and behind it say where it passes
             if lane.edge not in rest:
-                msg = f"its route on the SUMO network does not pass {name(self._graph, node)!r}"
-                raise NoRouteError(msg)
+                raise NoRouteError(
+                    f"its route on the SUMO network does not pass {name(self._graph, node)!r}"
+                )
             here = lane.edge
 
     def _write(

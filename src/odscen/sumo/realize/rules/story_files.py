@@ -117,8 +117,7 @@ def _place(node: str, sumo_map: SumoMap, where: str) -> StoryPlace:
     graph = sumo_map.graph
     place = place_of(graph, node)
     if place is None:
-        msg = f"the map has no node {node!r}"
-        raise ScenarioError(msg, element=where)
+        raise ScenarioError(f"the map has no node {node!r}", element=where)
     nodes = graph.walks if place.walk else graph.lanes
     x, y = float(nodes.x[place.node]), float(nodes.y[place.node])
     at = (sumo_map.walk_places if place.walk else sumo_map.lane_places).of(place.node)
@@ -132,12 +131,10 @@ def _signal(light: str, movement: str, sumo_map: SumoMap, where: str) -> tuple[s
     lights = scenario_lights(sumo_map)
     found = find_light(lights, light)
     if found is None:
-        msg = f"the map has no traffic light {light!r}"
-        raise ScenarioError(msg, element=where)
+        raise ScenarioError(f"the map has no traffic light {light!r}", element=where)
     if not movement:
         return sumo_map.lights[lights.index(found)].id, -1
     links = find_movements(movement, found.movements)
     if not links:
-        msg = f"light {light!r} has no movement {movement!r}"
-        raise ScenarioError(msg, element=where)
+        raise ScenarioError(f"light {light!r} has no movement {movement!r}", element=where)
     return sumo_map.lights[lights.index(found)].id, min(links)

@@ -124,8 +124,10 @@ def _place(incident: LaneIncident, found: MeasuredLanes, sumo_map: SumoMap) -> t
             near = int(known[np.argmin(np.abs(graph.s[known] - incident.s))])
     place = None if near is None else sumo_map.lane_places.of(near)
     if near is None or place is None:
-        msg = f"the SUMO network has no lane {incident.lane!r} at s {incident.s:g} m"
-        raise ScenarioError(msg, element=incident.id)
+        raise ScenarioError(
+            f"the SUMO network has no lane {incident.lane!r} at s {incident.s:g} m",
+            element=incident.id,
+        )
     lane = sumo_map.net.lanes[place[0]]
     ahead = incident.s - float(graph.s[near])
     if not graph.lanes.forward[graph.lane[near]]:

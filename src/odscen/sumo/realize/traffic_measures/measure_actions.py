@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.xml_text import quoteattr
-from odscen.results.records.run_plan import ClosedPeriod, PlannedMeasure
+from odscen.records.run_plan import ClosedPeriod, PlannedMeasure
 from odscen.scenario.document.measures_document import (
     ChangedPermission,
     LaneIncident,

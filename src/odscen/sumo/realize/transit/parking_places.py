@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.categories import DEFAULT_BODY, Category
-from odscen.results.records.run_plan import PlannedParking, begin_area
+from odscen.records.run_plan import PlannedParking, begin_area
 from odscen.sumo.realize.route_planner import NoRouteError
 from odscen.sumo.realize.transit.stop_places import CLEAR, LEAST_LENGTH
 
@@ -198,8 +198,7 @@ def _from_area(
     normal = edges[1:] if net.edge_lanes[edges[0]][0].internal else edges
     if normal and normal[0] in net.followers(area.edge, vclass):
         return (area.edge, *normal)
-    msg = f"its route on the SUMO network does not begin at parking {area.area.id}"
-    raise NoRouteError(msg)
+    raise NoRouteError(f"its route on the SUMO network does not begin at parking {area.area.id}")
 
 
 def _to_area(
@@ -210,5 +209,4 @@ def _to_area(
             return edges[: len(edges) - cut]
     if area.edge in net.followers(edges[-1], vclass):
         return (*edges, area.edge)
-    msg = f"its route on the SUMO network does not end at parking {area.area.id}"
-    raise NoRouteError(msg)
+    raise NoRouteError(f"its route on the SUMO network does not end at parking {area.area.id}")

@@ -58,8 +58,7 @@ def stop_places(scenario: Scenario, sumo_map: SumoMap) -> dict[str, StopPlace]:
             continue
         found[stop.id] = StopPlace(stop.id, stop.name, lane.id, lane.edge, begin, end, stop.bay)
     if problems:
-        msg = "stops that cannot be there"
-        raise ScenarioError(msg, problems=problems)
+        raise ScenarioError("stops that cannot be there", problems=problems)
     return found
 
 

@@ -50,14 +50,12 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
     """
     given = [one for one in (door.name, door.command, door.socket) if one is not None]
     if len(given) != 1:
-        msg = "a behaviour model is given by its name or as a command, not both"
-        raise InputError(msg)
+        raise InputError("a behaviour model is given by its name or as a command, not both")
     if door.socket is not None:
         return SocketDriver(door.socket, seed, door.time_limit)
     if door.command is not None:
         if door.options:
-            msg = "a command takes its options in its own line"
-            raise InputError(msg, element="behaviour")
+            raise InputError("a command takes its options in its own line", element="behaviour")
         return PipedDriver(_words(door.command), seed, door.time_limit)
     name = door.name or ""
     found = _found(name)
@@ -65,12 +63,10 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
     try:
         made = found(**options) if isinstance(found, type) else found
     except Exception as error:  # whatever code from outside may raise
-        msg = f"it cannot be made: {error!r}"
-        raise InputError(msg, element=name) from error
+        raise InputError(f"it cannot be made: {error!r}", element=name) from error
     for method in ("init(rng, scene)", "act(observation, state)"):
         if not callable(getattr(made, method.partition("(")[0], None)):
-            msg = f"it has no method `{method}`"
-            raise InputError(msg, element=name)
+            raise InputError(f"it has no method `{method}`", element=name)
     model: BehaviourModel = made
     return model
 
@@ -92,8 +88,7 @@ def chosen_behaviour(name: str, options: Mapping[str, OptionValue]) -> Behaviour
     """
     known = installed_names(GROUP, _SHIPPED)
     if name not in known:
-        what = "behaviour model"
-        raise NotFoundError(what, name, known)
+        raise NotFoundError("behaviour model", name, known)
     values = values_for(_found(name), options, name=name)
     return BehaviourDoor(name=name, options={one: values[one] for one in options})
 
@@ -102,11 +97,9 @@ def _words(command: str) -> tuple[str, ...]:
     try:
         words = tuple(shlex.split(command))
     except ValueError as error:
-        msg = f"{command!r} is no command: {error}"
-        raise InputError(msg, element="behaviour") from error
+        raise InputError(f"{command!r} is no command: {error}", element="behaviour") from error
     if not words or shutil.which(words[0]) is None:
-        msg = "there is no such program"
-        raise InputError(msg, element=words[0] if words else "behaviour")
+        raise InputError("there is no such program", element=words[0] if words else "behaviour")
     return words
 
 

@@ -13,8 +13,8 @@ from odscen.base.errors import InputError, OdscenError, SimulationError
 from odscen.base.frames import angle_deg_from_hdg
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor, DrivingKind
 from odscen.learning.behaviour.checked_action import CheckedAction
+from odscen.runs.layout import BEHAVIOUR_FILE, SUMO_FOLDER
 from odscen.scenario.document.named_random import stream
-from odscen.sumo.folder.layout import BEHAVIOUR_FILE, SUMO_FOLDER
 from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour
 from odscen.sumo.worker.behaviour.road_sight import RoadSight
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import FloatArray, Int32Array, IntArray
     from odscen.learning.behaviour.behaviour_model import BehaviourModel
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.worker.behaviour.lazy_observation import LazyObservation
     from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
     from odscen.sumo.worker.simulation.session import Session
@@ -133,10 +133,9 @@ class BehaviourRun:
         try:
             self._state = self._model.init(rng, self._sight.scene)
         except OdscenError as error:
-            raise SimulationError(f"behaviour {self._name}: {error}") from error  # noqa: EM102
+            raise SimulationError(f"behaviour {self._name}: {error}") from error
         except Exception as error:
-            msg = f"behaviour {self._name}: init failed: {error!r}"
-            raise SimulationError(msg) from error
+            raise SimulationError(f"behaviour {self._name}: init failed: {error!r}") from error
 
     def _drive(
         self, index: Int32Array, names: list[str], asked: CheckedAction, taken: Collection[str]
@@ -176,8 +175,7 @@ class BehaviourRun:
                 self._road.release(name)
             self._forget(index[back])
         except self._road.errors as error:
-            msg = f"vehicle {name!r}: SUMO cannot: {error}"
-            raise InputError(msg) from error
+            raise InputError(f"vehicle {name!r}: SUMO cannot: {error}") from error
 
     def _forget(self, rows: Any) -> None:
         self._mode[rows], self._speed[rows] = 0, np.nan
@@ -224,8 +222,7 @@ class BehaviourRun:
         if kind == DrivingKind.LANE_POSITION:
             lane = int(asked.whole["lane"][row])
             if not 0 <= lane < len(self._sight.scene.lane_id):
-                msg = f"vehicle {name!r}: there is no lane {lane}"
-                raise InputError(msg)
+                raise InputError(f"vehicle {name!r}: there is no lane {lane}")
             pos = float(asked.real["pos"][row])
             self._road.put_on_lane(name, str(self._sight.scene.lane_id[lane]), pos)
         elif kind == DrivingKind.POSE:

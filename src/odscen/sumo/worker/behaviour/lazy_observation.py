@@ -42,8 +42,7 @@ class LazyObservation(RoadObservation):
     def __getattr__(self, name: str) -> Any:
         # Python asks here for slots that hold nothing yet.
         if name not in _FIELDS:
-            msg = f"an observation has no {name!r}"
-            raise AttributeError(msg)
+            raise AttributeError(f"an observation has no {name!r}")
         self._set(self._read(name, self))
         return object.__getattribute__(self, name)
 

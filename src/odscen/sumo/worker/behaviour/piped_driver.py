@@ -80,8 +80,7 @@ class _Peer:
         self._write(framed(message), end)
         size = HEAD.unpack(self._read(HEAD.size, end))[0]
         if size > MOST_BYTES:
-            msg = f"its answer has {size:,} bytes; {MOST_BYTES:,} are the most"
-            raise InputError(msg)
+            raise InputError(f"its answer has {size:,} bytes; {MOST_BYTES:,} are the most")
         return self._read(size, end)
 
     def _write(self, data: bytes, end: float) -> None:
@@ -112,8 +111,7 @@ class _Peer:
         ready = select.select(read, write, [], max(left, 0.0))
         if not any(ready):
             self._stop()
-            msg = f"it took more than {self._time_limit:g} s for a step"
-            raise InputError(msg)
+            raise InputError(f"it took more than {self._time_limit:g} s for a step")
 
     def _stop(self) -> None:
         """End it."""
@@ -135,8 +133,9 @@ class PipedDriver(_Peer):
                 self._words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said
             )
         except OSError as error:
-            msg = f"it cannot be started: {error.strerror}"
-            raise InputError(msg, element=self._words[0]) from error
+            raise InputError(
+                f"it cannot be started: {error.strerror}", element=self._words[0]
+            ) from error
         if self._process.stdin is not None and self._process.stdout is not None:
             self._to, self._back = self._process.stdin.fileno(), self._process.stdout.fileno()
 
@@ -180,8 +179,7 @@ class SocketDriver(_Peer):
         try:
             self._socket.connect(self._path)
         except OSError as error:
-            msg = f"no program listens at its socket: {error.strerror}"
-            raise InputError(msg) from error
+            raise InputError(f"no program listens at its socket: {error.strerror}") from error
         self._to = self._back = self._socket.fileno()
 
     def close(self) -> None:

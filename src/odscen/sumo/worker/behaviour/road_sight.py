@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import FloatArray, Int32Array
     from odscen.learning.behaviour.behaviour_model import RoadObservation
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles, LaneFacts
 
 _GETTERS = {

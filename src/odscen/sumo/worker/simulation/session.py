@@ -87,8 +87,7 @@ class Session:
             self._step()
             return float(self._time())
         except self._errors as error:
-            msg = f"SUMO stopped at {self.time:g} s: {error}"
-            raise SimulationError(msg) from error
+            raise SimulationError(f"SUMO stopped at {self.time:g} s: {error}") from error
 
     def expected(self) -> int:
         """How many vehicles and persons are on the road or still to come; 0 only when none is.
@@ -294,8 +293,9 @@ class Session:
         try:
             self._simulation.saveState(str(path))
         except self._errors as error:
-            msg = f"SUMO could not save its state at {self.time:g} s: {error}"
-            raise SimulationError(msg) from error
+            raise SimulationError(
+                f"SUMO could not save its state at {self.time:g} s: {error}"
+            ) from error
 
     def _poses(self, domain: Any, signals: Callable[[str], int] | None) -> Poses:
         import numpy as np
@@ -338,15 +338,15 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
     """
     global _open  # noqa: PLW0603 - libsumo itself is one global simulation
     if _open:
-        msg = "a simulation is running in this process already; libsumo holds only one"
-        raise SimulationError(msg)
+        raise SimulationError(
+            "a simulation is running in this process already; libsumo holds only one"
+        )
     sumo = import_libsumo()
     errors = sumo_errors(sumo)
     try:
         sumo.start(["sumo", *arguments])
     except errors as error:  # libsumo has closed by itself; closing again would crash
-        msg = f"SUMO refused to start: {error}"
-        raise SimulationError(msg) from error
+        raise SimulationError(f"SUMO refused to start: {error}") from error
     _open = True
     try:
         yield Session(sumo)
@@ -358,8 +358,7 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
         try:
             sumo.close()  # writes what is left of the outputs
         except errors as error:
-            msg = f"SUMO could not finish its outputs: {error}"
-            raise SimulationError(msg) from error
+            raise SimulationError(f"SUMO could not finish its outputs: {error}") from error
     finally:
         _open = False
 

@@ -6,14 +6,14 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from odscen.results.records.run_events import Event, EventKind
+from odscen.records.run_events import Event, EventKind
 from odscen.scenario.story.body_distance import overlap
 from odscen.sumo.worker.story.story_view import stranger
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from odscen.results.records.run_plan import PlannedActor
+    from odscen.records.run_plan import PlannedActor
     from odscen.scenario.story.channels import WantedMove
     from odscen.scenario.story.road_view import ActorView
     from odscen.sumo.worker.simulation.moved_actors import MovedActors

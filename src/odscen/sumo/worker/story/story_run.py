@@ -7,11 +7,11 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import angle_deg_from_hdg
-from odscen.results.records.run_events import Event, EventKind
+from odscen.records.run_events import Event, EventKind
+from odscen.runs.layout import STORY_FILE, SUMO_FOLDER
 from odscen.scenario.document.rules_document import actors_of, rule_parts
 from odscen.scenario.story.channels import Pose, WantedMove
 from odscen.scenario.story.story_engine import StoryEngine
-from odscen.sumo.folder.layout import STORY_FILE, SUMO_FOLDER
 from odscen.sumo.realize.rules.story_files import StoryPlan
 from odscen.sumo.worker.simulation.moved_actors import SavedWalk
 from odscen.sumo.worker.story.body_contacts import BodyContacts
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from odscen.results.records.run_plan import Plan
+    from odscen.records.run_plan import Plan
     from odscen.scenario.story.story_engine import StoryEvent
     from odscen.sumo.worker.recorder import Recorder
     from odscen.sumo.worker.simulation.moved_actors import MovedActors

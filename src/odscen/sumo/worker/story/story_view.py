@@ -12,7 +12,7 @@ from odscen.scenario.story.side_motion import beside, line_length
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from odscen.results.records.run_plan import PlannedActor
+    from odscen.records.run_plan import PlannedActor
     from odscen.scenario.story.road_view import Point
     from odscen.sumo.realize.rules.story_files import StoryPlan
     from odscen.sumo.worker.simulation.moved_actors import MovedActors

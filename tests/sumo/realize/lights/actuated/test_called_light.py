@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 
 from odscen.convert.model.net import Phase
+from odscen.runs.recorded import read_light_states
 from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.sumo.folder.recorded import read_light_states
 from odscen.sumo.realize.lights.actuated.stage_variants import LEAST_CALLED
 from odscen.sumo.realize.lights.stage_phases import plan_phases
 from tests.signal_case import JUNCTION, carried_out, crossing, entries, light, scenario, timing
@@ -19,8 +19,8 @@ from tests.signal_case import JUNCTION, carried_out, crossing, entries, light, s
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.sumo_map import SumoMap
 
 WALKS = [n for n, one in enumerate(light().movements) if one.walk]

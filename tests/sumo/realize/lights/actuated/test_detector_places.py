@@ -6,7 +6,7 @@ from math import dist
 
 import pytest
 
-from odscen.results.records.light_programs import programs_from_json, programs_to_json
+from odscen.records.light_programs import programs_from_json, programs_to_json
 from odscen.sumo.realize.lights.light_realization import RealizedLight, realized_lights
 from tests.signal_case import crossing, one_plan, scenario
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.convert.model.net import CROSSED, UNUSED
-from odscen.results.records.light_programs import ShownDetector
+from odscen.records.light_programs import ShownDetector
 from odscen.sumo.realize.lights.light_detectors import lane_before
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
-    from odscen.results.records.light_programs import ShownPlan
+    from odscen.records.light_programs import ShownPlan
     from odscen.sumo.realize.lights.light_detectors import BusArea, PlacedLoop
     from odscen.sumo.realize.sumo_map import SumoMap
 

@@ -1,0 +1,87 @@
+"""What was driven, spent and lost on each lane in each interval, as columns for a map in colours.
+
+Speed, density, flow and delay per km are quotients of these sums, of one interval or of several:
+Edie's definitions of :mod:`odscen.figures.by_place.traffic`, with the lane as the place.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from odscen.figures.by_place.analysis_times import WHOLE_RUN, on_clock
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from odscen.figures.by_place.lane_places import LanePlaces
+
+MOST_SUMS = 30_000
+"""Rows at most: with more, intervals are summed up by twos, fours and so on, down to one."""
+
+
+class LaneTraffic(NamedTuple):
+    """Sums of the lanes that vehicles were on.
+
+    Attributes
+    ----------
+    times
+        Seconds at which intervals begin, and the end of the last.
+    names
+        SUMO lanes.
+    lengths
+        Of each of them, metres.
+    sums
+        A row for each lane and interval with traffic, by interval: ``interval`` and ``lane`` (rows
+        of ``times`` and ``names``), ``distance`` (m), ``seconds`` and ``time_loss``
+        (vehicle-seconds).
+    """
+
+    times: list[float]
+    names: list[str]
+    lengths: list[float]
+    sums: pl.DataFrame
+
+
+def lane_traffic(
+    lanes: pl.DataFrame, places: LanePlaces, *, end: float, most: int = MOST_SUMS
+) -> LaneTraffic:
+    """Sum up what was measured on lanes over the intervals of a run.
+
+    Parameters
+    ----------
+    lanes
+        From :func:`odscen.runs.recorded.read_lanes`.
+    end
+        When the run ended, s.
+    most
+        Rows from which on longer intervals are used.
+    """
+    import polars as pl
+
+    known = places.lanes.unique("lane").select("lane", "length").sort("lane")
+    used = lanes.filter(pl.col("seconds") > 0).join(known, on="lane", how="semi")
+    clock = WHOLE_RUN.clock(lanes, end=end)
+    found = used
+    while found.height > most and clock.height > 1:
+        clock = _by_twos(clock)
+        found = on_clock(used, clock)
+    named = known.join(found, on="lane", how="semi").with_row_index("row")
+    sums = (
+        found.join(clock.select("begin").with_row_index("interval"), on="begin")
+        .join(named.select("lane", "row"), on="lane")
+        .sort("interval", "row")
+        .select("interval", pl.col("row").alias("lane"), "distance", "seconds", "time_loss")
+    )
+    times = [*clock["begin"].to_list(), float(clock["end"][-1])]
+    return LaneTraffic(times, named["lane"].to_list(), named["length"].to_list(), sums)
+
+
+def _by_twos(clock: pl.DataFrame) -> pl.DataFrame:
+    import polars as pl
+
+    pairs = clock.with_row_index("pair").with_columns(pl.col("pair") // 2)
+    return (
+        pairs.group_by("pair", maintain_order=True)
+        .agg(pl.col("begin").min(), pl.col("end").max())
+        .drop("pair")
+    )

@@ -1,0 +1,92 @@
+"""Criteria of a scenario: expectations that it carries itself, judged after each run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.errors import InputError
+from odscen.figures.judging.expectations import EGO, Expectation, evaluate, parse_expectation
+from odscen.scenario.document.problems import Problem, error, warning
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from odscen.figures.judging.actor_measures import RunRecords
+    from odscen.scenario.document.scenario_document import Scenario
+
+
+def criteria_of(texts: Sequence[str]) -> tuple[Expectation, ...]:
+    """Read criteria that :func:`criteria_problems` has passed, in their order."""
+    return tuple(map(parse_expectation, texts))
+
+
+def criteria_problems(scenario: Scenario) -> tuple[Problem, ...]:
+    """Find criteria that cannot be judged: other words than those of figures, unknown actors."""
+    return tuple(_problems(scenario))
+
+
+def _problems(scenario: Scenario) -> Iterator[Problem]:
+    known = {actor.id for actor in scenario.actors}
+    flows = tuple(f"{flow.id}." for flow in scenario.flows)
+    egos = any(actor.ego for actor in scenario.actors)
+    for index, text in enumerate(scenario.criteria):
+        where = f"criteria[{index}]"
+        try:
+            wanted = parse_expectation(text)
+        except InputError as problem:
+            yield error("criterion_unknown", where, problem.problem)
+            continue
+        if wanted.figure is None:
+            msg = f"{text!r} is for suites and --expect; a criterion names a figure"
+            yield error("criterion_unknown", where, msg)
+        if text in scenario.criteria[:index]:
+            yield warning("criterion_twice", where, f"{text!r} is there already")
+        actor = wanted.actor
+        if actor is None or actor in known or actor.startswith(flows):
+            continue
+        if actor != EGO:
+            msg = f"no actor has the id {actor!r}; a criterion is about an actor, or {EGO}"
+            yield error("criterion_without_actor", where, msg)
+        elif not egos:
+            msg = "the scenario has no ego; mark an actor as ego, or name one by its id"
+            yield error("criterion_without_actor", where, msg)
+
+
+def missed_rows(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Rows of criteria that a run has not met."""
+    return [row for row in summary.get("criteria") or () if not row["passed"]]
+
+
+def missed_words(row: Mapping[str, Any]) -> str:
+    """``"Collisions of ego: exactly 0, but it is 1 at 12.4 s"``."""
+    at = "" if row["time"] is None else f" at {row['time']:g} s"
+    unit = f" {row['unit']}" if row["unit"] else ""
+    value = "not measured" if row["value"] is None else f"{row['value']:g}{unit}{at}"
+    return f"{row['words']}, but it is {value}"
+
+
+def criteria_rows(
+    texts: Sequence[str], summary: Mapping[str, Any], records: RunRecords
+) -> list[dict[str, Any]]:
+    """Judge a run by criteria, as rows of ``summary.json``.
+
+    Returns
+    -------
+    One row for each, with ``criterion``, ``words``, ``value`` in ``unit`` (``None`` if the run does
+    not have it), ``passed``, and the instant ``time``, s (``None`` where there is none).
+    """
+    wanted = criteria_of(texts)
+    rows = []
+    for one, verdict in zip(wanted, evaluate(wanted, summary, records), strict=True):
+        value = verdict.value
+        rows.append(
+            {
+                "criterion": one.text,
+                "words": one.words,
+                "value": None if value is None else round(one.in_its_unit(value), 6),
+                "unit": one.unit,
+                "passed": verdict.passed,
+                "time": verdict.time,
+            }
+        )
+    return rows

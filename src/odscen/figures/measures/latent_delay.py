@@ -1,0 +1,80 @@
+"""Latent delay: what road users wait for outside of the network, and the delay of all with it.
+
+The mean over those who have arrived is the shorter the worse traffic is: who is stopped in a jam
+or never got onto the road is not in it. So the mean delay is of all who were due to depart, with
+what they have waited for and lost until the run ended (FHWA, Traffic Analysis Toolbox Volume III,
+FHWA-HOP-18-036: latent or vertical-queue delay is part of the delay of a network).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.figures.measures.figure import CLOCK, Better, ReportSection, RunFigure, mean
+from odscen.records.outcomes import ActorStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.figures.measures.figure import RunData
+    from odscen.figures.measures.summary import ActorOutcome
+
+
+def due(outcomes: Sequence[ActorOutcome], end: float | None) -> list[ActorOutcome]:
+    """Those who were to depart before the run ended at ``end`` s; all if that is not known."""
+    return [one for one in outcomes if end is None or one.depart < end]
+
+
+def served(outcomes: Sequence[ActorOutcome]) -> list[ActorOutcome]:
+    """Those for whom the network has a route: who has none waits for no room, and is no delay."""
+    return [one for one in outcomes if one.problem is None]
+
+
+def latent_delay(one: ActorOutcome, end: float | None) -> float | None:
+    """Seconds from the planned departure to the insertion, or to the end of the run.
+
+    ``None`` for one that was not inserted in a run whose end is not known.
+    """
+    if one.status is not ActorStatus.WAITING:
+        return max(one.depart_delay or 0.0, 0.0)
+    return None if end is None else max(end - one.depart, 0.0)
+
+
+def total_delay(one: ActorOutcome, end: float | None) -> float | None:
+    """Seconds of latent delay and time loss; ``None`` if either is not known."""
+    latent = latent_delay(one, end)
+    if latent is None or one.status is ActorStatus.WAITING:
+        return latent
+    return None if one.time_loss is None else latent + one.time_loss
+
+
+def mean_delay(outcomes: Sequence[ActorOutcome], end: float | None) -> float | None:
+    """Mean over all who were due; ``None`` where time loss was not measured of any who departed."""
+    expected = served(due(outcomes, end))
+    departed = [one for one in expected if one.status is not ActorStatus.WAITING]
+    if departed and all(one.time_loss is None for one in departed):
+        return None
+    return mean([total_delay(one, end) for one in expected])
+
+
+def _mean_latent(run: RunData) -> float | None:
+    return mean([latent_delay(one, run.end) for one in served(due(run.vehicles, run.end))])
+
+
+FIGURES = (
+    RunFigure(
+        name="mean_latent_delay",
+        unit="s",
+        label="mean latent delay",
+        definition="Mean time from planned departure to insertion, or to the end of the run, per "
+        "vehicle that was due to depart.",
+        source="SUMO, departDelay; FHWA-HOP-18-036",
+        better=Better.LOWER,
+        tolerance="5 % or 0.5 s",
+        display=CLOCK,
+        section=ReportSection.KEY_FIGURES,
+        note="waited for room to depart",
+        on_page=True,
+        compute=_mean_latent,
+    ),
+)

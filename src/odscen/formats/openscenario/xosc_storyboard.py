@@ -1,0 +1,275 @@
+"""Rules as the storyboard: what is at first, an event for each item of a rule, and the end."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from odscen.formats.openscenario.dialect import xml
+from odscen.formats.openscenario.xosc_actions import (
+    IGNORES,
+    UNSAID_GOAL,
+    Actions,
+    acquire,
+)
+from odscen.formats.openscenario.xosc_presence import (
+    BELOW,
+    add_entity,
+    private,
+    speed_action,
+)
+from odscen.formats.openscenario.xosc_triggers import CannotSayError, Triggers
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from lxml.etree import _Element
+
+    from odscen.formats.openscenario.dialect import Dialect, ExportNotes
+    from odscen.formats.openscenario.xosc_places import Places
+    from odscen.scenario.document.rules_document import StoryRule
+    from odscen.scenario.document.scenario_document import Actor, Scenario
+
+_LONGEST: Final = 300.0
+"""Seconds after which ScenarioRunner stops a scenario: the default in its class OpenScenario."""
+_END: Final = "end of the run"
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """Makes the storyboard of a scenario."""
+
+    scenario: Scenario
+    places: Places
+    dialect: Dialect
+    notes: ExportNotes
+    environment: _Element | None
+
+    def storyboard(self) -> _Element:
+        """``Storyboard``."""
+        actors = {actor.id: actor for actor in self.scenario.actors}
+        self._note_goals()
+        groups = [
+            group for actor in self.scenario.actors if (group := self._later(actor)) is not None
+        ]
+        rules, events = self._rules(actors)
+        groups, ends = groups + rules, self._ends(events)
+        duration = self.scenario.simulation.duration
+        triggers = Triggers(self.places, self.dialect, self.notes, {})
+        return xml(
+            "Storyboard",
+            xml("Init", xml("Actions", *self._init(self.scenario.actors))),
+            xml(
+                "Story",
+                xml("ParameterDeclarations"),
+                act("rules", groups, triggers, until=duration, ends=ends, sky=self.environment),
+                name=self.scenario.name,
+            ),
+            xml("StopTrigger", triggers.at_time(duration, _END), *ends),
+        )
+
+    def _init(self, actors: Sequence[Actor]) -> Iterable[_Element]:
+        if self.environment is not None:
+            yield xml("GlobalAction", xml("EnvironmentAction", self.environment))
+        for actor in actors:
+            start = self.places.start(actor)
+            if actor.depart > 0 or self._appears(actor.id):
+                if self.dialect.for_scenario_runner:
+                    below = private(xml("TeleportAction", start.below().element()))
+                    yield xml("Private", below, entityRef=actor.id)
+                    self.notes.approximated.append((f"actors[{actors.index(actor)}]", BELOW))
+                continue
+            actions = [
+                private(xml("TeleportAction", start.element())),
+                speed_action(actor.initial_speed or 0.0, "step", "time", 0.0),
+            ]
+            if actor.goal is not None and not self.dialect.for_scenario_runner:
+                actions.append(acquire(self.places, actor.goal))
+            yield xml("Private", *actions, entityRef=actor.id)
+
+    def _appears(self, actor: str) -> bool:
+        return any(
+            rule.actor == actor and part.kind == "appear"
+            for rule in self.scenario.rules
+            for item in rule.then
+            for part in item.parts
+        )
+
+    def _note_goals(self) -> None:
+        if self.dialect.for_scenario_runner:
+            self.notes.left_out += [
+                (f"actors[{index}].goal", UNSAID_GOAL)
+                for index, actor in enumerate(self.scenario.actors)
+                if actor.goal is not None
+            ]
+
+    def _later(self, actor: Actor) -> _Element | None:
+        """Maneuver group of an actor that departs later."""
+        if actor.depart <= 0 or self._appears(actor.id):
+            return None
+        triggers = Triggers(self.places, self.dialect, self.notes, {})
+        actions = [
+            add_entity(actor.id, self.places.start(actor), self.dialect),
+            speed_action(actor.initial_speed or 0.0, "step", "time", 0.0),
+        ]
+        if actor.goal is not None and not self.dialect.for_scenario_runner:
+            actions.append(acquire(self.places, actor.goal))
+        trigger = xml("StartTrigger", triggers.at_time(actor.depart, f"{actor.id} departs"))
+        name = f"{actor.id} departs"
+        return maneuver_group(name, actor.id, [event(name, actions, trigger, 1)])
+
+    def _rules(self, actors: dict[str, Actor]) -> tuple[list[_Element], dict[str, tuple[str, str]]]:
+        """Maneuver groups of rules, and the first and last event of each.
+
+        Those that cannot be said are left out, and whom they free.
+        """
+        left = {rule.id: rule for rule in self.scenario.rules if _end(rule) != 0}
+        while True:
+            events = {name: _names(rule) for name, rule in left.items()}
+            found, refused = [], {}
+            for index, rule in enumerate(self.scenario.rules):
+                if rule.id not in left:
+                    continue
+                try:
+                    found.append(self._rule(rule, f"rules[{index}]", events, actors))
+                except CannotSayError as error:
+                    refused[rule.id] = (f"rules[{index}]", str(error))
+            if not refused:
+                return found, events
+            for name, words in refused.items():
+                self.notes.left_out.append(words)
+                del left[name]
+
+    def _ends(self, events: dict[str, tuple[str, str]]) -> list[_Element]:
+        """Groups of conditions on which rules end the run."""
+        triggers = Triggers(self.places, self.dialect, self.notes, events)
+        found: list[_Element] = []
+        for index, rule in enumerate(self.scenario.rules):
+            where, last = f"rules[{index}]", _end(rule)
+            if last is None or (last and rule.id not in events):
+                continue
+            try:
+                if last:
+                    found += triggers.after(events[rule.id][1])
+                else:
+                    found += triggers.trigger(rule.when, rule.actor, where)
+            except CannotSayError as error:
+                self.notes.left_out.append((where, str(error)))
+                continue
+            words = "the end of the run is a stop trigger, which has no name and no actor"
+            self.notes.approximated.append((where, words))
+        return found
+
+    def _rule(
+        self,
+        rule: StoryRule,
+        where: str,
+        events: dict[str, tuple[str, str]],
+        actors: dict[str, Actor],
+    ) -> _Element:
+        if rule.actor not in actors:
+            raise CannotSayError(f"rule {rule.id!r} is of {rule.actor!r}, a vehicle of a flow")
+        if rule.times > 1 and self.dialect.for_scenario_runner:
+            self.notes.approximated.append((where, "ScenarioRunner lets it happen once"))
+        triggers = Triggers(self.places, self.dialect, self.notes, events)
+        makes = Actions(self.places, self.dialect, self.notes, actors, self.scenario.rules)
+        made: list[_Element] = []
+        said = _said(rule)
+        for index in {*range(len(rule.then))} - {*said}:
+            self.notes.approximated.append((f"{where}.then", f"item {index}: {IGNORES}"))
+        for index in said:
+            item = rule.then[index]
+            actions = [
+                action
+                for part in item.parts
+                for action in makes.actions(
+                    part.kind, getattr(part, part.kind), rule.actor, f"{where}.then[{index}]"
+                )
+            ]
+            if not actions:
+                raise CannotSayError("a rule that does nothing there")
+            name = _event_name(rule, index)
+            trigger = (
+                triggers.trigger(rule.when, rule.actor, where)
+                if index == said[0]
+                else triggers.after(_event_name(rule, said[len(made) - 1]))
+            )
+            made.append(event(name, actions, trigger, rule.times))
+        return maneuver_group(rule.id, rule.actor, made)
+
+
+def act(
+    name: str,
+    groups: Sequence[_Element],
+    triggers: Triggers,
+    *,
+    until: float,
+    sky: _Element | None,
+    ends: Sequence[_Element] = (),
+) -> _Element:
+    """``Act`` with all maneuver groups, from the start of the run on.
+
+    ScenarioRunner does not ask when the storyboard stops: it ends when all acts are over, or after
+    300 s. So there the act has a stop trigger, and an event at the end that sets the weather again.
+    """
+    start, stop = xml("StartTrigger", triggers.at_time(0.0, "begin")), None
+    if triggers.dialect.for_scenario_runner:
+        if until > _LONGEST:
+            words = f"ScenarioRunner stops after {_LONGEST:g} s"
+            triggers.notes.approximated.append(("simulation.duration", words))
+        end = xml("StartTrigger", triggers.at_time(until, _END))
+        weather = xml("GlobalAction", xml("EnvironmentAction", deepcopy(sky)))
+        last = event(f"weather at the {_END}", [weather], end, 1)
+        groups = [*groups, maneuver_group(_END, None, [last])]
+        early = deepcopy(list(ends))
+        stop = xml("StopTrigger", triggers.at_time(until, f"{_END}, of the act"), *early)
+    if not groups:  # a story needs one
+        nobody = xml("Actors", selectTriggeringEntities=False)
+        groups = [xml("ManeuverGroup", nobody, name="none", maximumExecutionCount=1)]
+    return xml("Act", *groups, start, stop, name=name)
+
+
+def event(name: str, actions: Sequence[_Element], trigger: _Element, times: int) -> _Element:
+    """``Event`` with each action under a name of its own."""
+    named = [
+        xml("Action", action, name=f"{name}.{number}")
+        for number, action in enumerate(actions, start=1)
+    ]
+    return xml(
+        "Event", *named, trigger, name=name, priority="parallel", maximumExecutionCount=times
+    )
+
+
+def maneuver_group(name: str, actor: str | None, events: Sequence[_Element]) -> _Element:
+    """``ManeuverGroup`` of one actor, or of none for what is global."""
+    refs = [] if actor is None else [xml("EntityRef", entityRef=actor)]
+    return xml(
+        "ManeuverGroup",
+        xml("Actors", *refs, selectTriggeringEntities=False),
+        xml("Maneuver", *events, name=name),
+        name=name,
+        maximumExecutionCount=1,
+    )
+
+
+def _names(rule: StoryRule) -> tuple[str, str]:
+    """Names of the first and the last event of a rule."""
+    said = _said(rule)
+    return _event_name(rule, said[0]), _event_name(rule, said[-1])
+
+
+def _said(rule: StoryRule) -> list[int]:
+    """Items of a rule that do something there; all of them if none does."""
+    items = range(len(rule.then) if _end(rule) is None else _end(rule) or 0)
+    found = [n for n in items if {part.kind for part in rule.then[n].parts} != {"ignore"}]
+    return found or list(items)
+
+
+def _end(rule: StoryRule) -> int | None:
+    """Item of a rule that ends the run: the stop trigger, and no event."""
+    return next((n for n, one in enumerate(rule.then) if one.kind == "end"), None)
+
+
+def _event_name(rule: StoryRule, index: int) -> str:
+    return f"{rule.id}.then[{index}]"

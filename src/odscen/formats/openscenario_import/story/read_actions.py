@@ -1,0 +1,359 @@
+"""Private actions as actions of rules."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.base.categories import Category
+from odscen.formats.openscenario_import.import_report import RefusedError
+from odscen.formats.openscenario_import.story.read_arrivals import arriving
+from odscen.formats.openscenario_import.story.read_motions import (
+    JUMP,
+    followed,
+    lines_up,
+    stays,
+    teleported,
+)
+from odscen.formats.openscenario_import.story.start_lanes import (
+    start_lane,
+    start_of,
+    to_opposite,
+)
+from odscen.lanegraph.query import node_id
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from lxml.etree import _Element
+
+    from odscen.formats.openscenario_import.story.read_conditions import ConditionReader
+    from odscen.formats.openscenario_import.world.read_entities import ReadEntity
+
+Made = dict[str, Any]
+_SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}
+_MEASURES: Final = {"time": "over", "rate": "rate", "distance": "within"}
+FOLLOWING: Final = "following"
+"""Key of actions that follow one another, of one action of the file."""
+_CAR_WIDTH: Final = 1.8
+_USUAL: Final = 3.0
+"""Seconds of a lateral action that gives no measure that can be turned into some."""
+IGNORED: Final = frozenset(
+    {"ControllerAction", "ActivateControllerAction", "VisibilityAction", "AppearanceAction"}
+)
+
+
+@dataclass(slots=True)
+class ActionReader:
+    """Reads actions of one entity after another.
+
+    ``speeds`` (m/s), ``lanes`` (ids) and ``offsets`` (m) are the last ones that each actor was
+    asked for. ``own``
+    says whether odscen wrote the file: its controllers are what drives without rules.
+    """
+
+    conditions: ConditionReader
+    speeds: dict[str, float] = field(default_factory=dict)
+    lanes: dict[str, int] = field(default_factory=dict)
+    offsets: dict[str, float] = field(default_factory=dict)
+    own: bool = False
+
+    def actions(self, element: _Element, entity: ReadEntity) -> list[Made]:
+        """Actions of a rule that a ``PrivateAction`` is; none if it is ignored.
+
+        Raises
+        ------
+        RefusedError
+            If it has no counterpart.
+        """
+        report = self.conditions.report
+        kind = report.only(element)
+        if self.own and (made := _given_back(element)):
+            report.take(element)
+            return [made]
+        if kind.tag in IGNORED:
+            report.ignore(kind, "odscen has no controllers and looks of OpenSCENARIO; see --ego")
+            return []
+        if kind.tag not in _MAKERS:
+            kind = report.only(kind)
+        make = _MAKERS.get(str(kind.tag))
+        if make is None:
+            raise RefusedError(kind, f"odscen has no {kind.tag}")
+        names = [name for name, one in self.conditions.entities.items() if one is entity]
+        if kind.tag == "TeleportAction" and stays(report, kind, names):
+            return []
+        if kind.tag == "TeleportAction" and lines_up(report, kind, names):
+            self.offsets[entity.id] = 0.0
+            return [{"offset": {"to": 0.0, "over": JUMP}}]
+        return [make(self, kind, entity)]
+
+    def absolute_speed(self, target: _Element) -> float:
+        """Speed that a target asks for, m/s; a relative one counts from the last one known."""
+        report = self.conditions.report
+        kind = report.only(target)
+        value = report.number(kind, "value")
+        if kind.tag == "RelativeTargetSpeed":
+            base = self.speeds.get(self.conditions.actor(kind), 0.0)
+            words = f"relative to {base:g} m/s, the last speed that the file gives"
+            report.mark(kind, "approximated", words)
+            value = base * value if kind.get("speedTargetValueType") == "factor" else base + value
+        if value < 0:
+            report.mark(kind, "approximated", f"{value:g} m/s is 0: actors do not reverse")
+        return min(max(value, 0.0), 100.0)
+
+
+def _given_back(element: _Element) -> Made | None:
+    """What gives speed, or all, back to SUMO."""
+    kind = next(element.iter("ActivateControllerAction"), None)
+    if kind is None or kind.get("longitudinal") != "true":
+        return None
+    return {"release": {}} if kind.get("lateral") == "true" else {"go": {}}
+
+
+def _speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    dynamics = report.child(kind, "SpeedActionDynamics")
+    target = report.child(kind, "SpeedActionTarget")
+    if dynamics is None or target is None:
+        raise RefusedError(kind, "a speed without dynamics or target")
+    to = read.absolute_speed(target)
+    read.speeds[entity.id] = to
+    shape, value = dynamics.get("dynamicsShape", "step"), report.number(dynamics, "value", 0.0)
+    if entity.category is Category.PEDESTRIAN and to == 0.0:
+        return {"stop": {}}
+    if shape == "step" or value == 0:
+        return {"speed": {"to": to, "shape": "step"}}
+    if shape == "cubic":
+        report.mark(dynamics, "approximated", "a cubic is a half-cosine")
+    measure = _MEASURES.get(dynamics.get("dynamicsDimension", "time"), "over")
+    value = abs(value) if measure != "rate" else min(abs(value), 100.0)
+    return {"speed": {"to": to, "shape": _SHAPES.get(shape, "linear"), measure: value}}
+
+
+def _duration(read: ActionReader, dynamics: _Element | None, entity: ReadEntity) -> float:
+    """Seconds of a change of lane."""
+    report = read.conditions.report
+    if dynamics is None:
+        return _USUAL
+    value = abs(report.number(dynamics, "value", 0.0))
+    measure = dynamics.get("dynamicsDimension", "time")
+    if dynamics.get("dynamicsShape") == "step" or value == 0:
+        report.mark(dynamics, "approximated", "at once is within 0.1 s")
+        return 0.1
+    if dynamics.get("dynamicsShape") != "sinusoidal":
+        report.mark(dynamics, "approximated", "the line is a half-cosine")
+    if measure == "rate":
+        seconds = 3.5 / value
+        report.mark(dynamics, "approximated", f"{seconds:.2f} s, for a lane of 3.5 m")
+    elif measure == "distance":
+        seconds = value / max(read.speeds.get(entity.id, 0.0), 1.0)
+        report.mark(dynamics, "approximated", f"{seconds:.2f} s, at the last speed of the file")
+    else:
+        seconds = value
+    return seconds
+
+
+def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    over = _duration(read, report.child(kind, "LaneChangeActionDynamics"), entity)
+    target = report.child(kind, "LaneChangeTarget")
+    lane = None if target is None else report.only(target)
+    if lane is None:
+        raise RefusedError(kind, "a change of lane without a target")
+    value = int(report.number(lane, "value"))
+    if report.number(kind, "targetLaneOffset", 0.0):
+        report.mark(kind, "approximated", "to the middle of another lane, not beside it")
+    if lane.tag == "RelativeTargetLane":
+        other = read.conditions.actor(lane)
+        if other == entity.id and value:
+            return {"lane": {"by": value, "over": over}}
+        if other != entity.id and value == 0:
+            return {"cut_in": {"to": other, "over": over}}
+        if other == entity.id:
+            return _within_lane(read, kind, entity, over)
+        road, own, side = start_lane(read.conditions, lane, entity.id)
+        beside, its, _ = start_lane(read.conditions, lane, other)
+        if road != beside:
+            raise RefusedError(lane, f"the lane {value:+d} beside {other!r}, of another road")
+        by = value + side * (its - own)
+        words = f"{by:+d} lanes from that in which it starts; {other!r} is taken to stay in its own"
+        aim = own + side * by
+        aim += 0 if aim * own > 0 else side * by  # there is no lane 0
+    else:
+        road, own, side = start_lane(read.conditions, lane, entity.id)
+        own, aim = read.lanes.get(entity.id, own), value
+        read.lanes[entity.id] = value
+        by = side * (value - own - ((value > 0) - (own > 0)))  # there is no lane 0
+        words = f"{by:+d} lanes from the last one that the file names for it"
+    if by == 0:
+        report.mark(lane, "approximated", "by none, in the lane in which it is")
+        return _within_lane(read, kind, entity, over)
+    if (
+        abs(by) == 1
+        and (metres := to_opposite(read.conditions, entity.id, road, own, aim)) is not None
+    ):
+        words = f"{metres:.2f} m beside its own lane, in the opposite one"
+        report.mark(lane, "approximated", words)
+        read.offsets[entity.id] = by * metres
+        return {"offset": {"to": by * metres, "over": over}}
+    report.mark(lane, "approximated", words)
+    return {"lane": {"by": by, "over": over}}
+
+
+def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: float) -> Made:
+    """Change of no lanes: to the middle of its own, or beside it."""
+    metres = read.conditions.report.number(kind, "targetLaneOffset", 0.0)
+    metres += _beside_at_first(read, entity)[0]
+    read.offsets[entity.id] = metres
+    return {"offset": {"to": metres, "over": max(over, 0.1)}}
+
+
+def _offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    dynamics = report.child(kind, "LaneOffsetActionDynamics")
+    target = report.child(kind, "LaneOffsetTarget")
+    to = None if target is None else report.child(target)
+    if to is None:
+        raise RefusedError(kind, "an offset without a target")
+    metres = report.number(to, "value")
+    if to.tag == "RelativeTargetLaneOffset":
+        base = _start_offset(read, to)
+        metres += base
+        words = f"counted from {base:.2f} m, the offset at which {to.get('entityRef')!r} starts"
+        report.mark(to, "approximated", words)
+    named, start = _beside_at_first(read, entity)
+    metres += named
+    moves = metres - read.offsets.get(entity.id, start)
+    read.offsets[entity.id] = metres
+    most = 0.0 if dynamics is None else report.number(dynamics, "maxLateralAcc", 0.0)
+    over = math.pi * math.sqrt(abs(moves) / (2.0 * most)) if most > 0 and moves else _USUAL
+    report.mark(kind, "approximated", f"a half-cosine of {over:.2f} s")
+    return {"offset": {"to": metres, "over": max(over, 0.1)}}
+
+
+def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    """Keep beside another: an offset from the own lane, where both start."""
+    report, positions = read.conditions.report, read.conditions.positions
+    other = positions.of_entity(kind)
+    own = start_of(read.conditions, entity.id)
+    if own is None:
+        raise RefusedError(kind, "it has no place yet")
+    left = (own.y - other.y) * math.cos(own.hdg) - (own.x - other.x) * math.sin(own.hdg)
+    sides = {"leftToReferencedEntity": 1.0, "rightToReferencedEntity": -1.0}
+    side = sides.get(kind.get("displacement", "any"), math.copysign(1.0, left))
+    wanted = report.number(kind, "distance", abs(left))
+    if kind.get("freespace") == "true":
+        wanted += _CAR_WIDTH
+    to = min(max(positions.beside_lane(own) - left + side * wanted, -10.0), 10.0)
+    words = f"{to:.2f} m from its own lane, if the other one stays in the lane in which it starts"
+    report.mark(kind, "approximated", words)
+    return {"offset": {"to": round(to, 3), "over": _USUAL}}
+
+
+def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, float]:
+    """Metres to the left of its lane at which the lane is that the file names, and itself."""
+    positions = read.conditions.positions
+    if entity.own is not None:  # of which the lane is that of its node, wherever it appears
+        return 0.0, float(entity.own.get("lateral_offset", 0.0))
+    start = start_of(read.conditions, entity.id)
+    if start is None:
+        return 0.0, 0.0
+    own, lanes = start.moved(entity.ahead), positions.graph.lanes
+    placed, named = positions.node_near(own), start.node
+    left = float(positions.left_of(placed, own))
+    if named is None or int(lanes.lane[placed]) == int(lanes.lane[named]):
+        return 0.0, left
+    return round(left - float(positions.left_of(named, own)), 3), left
+
+
+def _start_offset(read: ActionReader, element: _Element) -> float:
+    """Metres to the left of the centre of its lane at which another entity starts."""
+    positions = read.conditions.positions
+    name = read.conditions.report.word(element, "entityRef")
+    if name not in positions.starts:
+        raise RefusedError(element, f"an offset from {name!r}, which has no place")
+    return positions.beside_lane(positions.starts[name])
+
+
+def _gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    part: Made = {"to": read.conditions.actor(kind)}
+    if kind.get("displacement") == "leadingReferencedEntity":
+        part["ahead"] = True
+    if kind.get("distance") is not None:
+        part["metres"] = max(report.number(kind, "distance"), 0.01)
+    else:
+        part["seconds"] = max(report.number(kind, "timeGap"), 0.01)
+    limits = report.child(kind, "DynamicConstraints")
+    if limits is not None:
+        rate = report.number(limits, "maxAcceleration", 3.0)
+        part["rate"] = min(max(rate, 0.1), 100.0)
+        report.mark(limits, "approximated", "maxAcceleration holds for braking too")
+    if kind.get("continuous") == "false":
+        part["once"] = True
+        if limits is None:
+            words = "reached by driving with 3 m/s², not at once"
+            report.mark(kind, "approximated", words)
+    if kind.get("freespace") == "false":
+        report.mark(kind, "approximated", "between bodies, not reference points")
+    return {"keep_gap": part}
+
+
+def _trajectory(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    return followed(read.conditions, kind, entity)
+
+
+def _teleport(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    return teleported(read.conditions, kind, entity, read.speeds.get(entity.id, 0.0))
+
+
+def _profile(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    """Speeds one after the other, each reached evenly; the first one at once if it takes none."""
+    report = read.conditions.report
+    steps: list[Made] = []
+    for entry in report.children(kind, "SpeedProfileEntry"):
+        to = min(max(report.number(entry, "speed"), 0.0), 100.0)
+        over = report.number(entry, "time", 0.0)
+        shape = {"over": over} if over > 0 else {"shape": "step"}
+        steps.append({"speed": {"to": to, **shape}})
+        read.speeds[entity.id] = to
+    if not steps:
+        raise RefusedError(kind, "a speed profile without entries")
+    words = "the speed changes evenly between entries, whatever the limits are"
+    report.mark(kind, "approximated", words)
+    for limits in kind.iterchildren("DynamicConstraints"):
+        report.ignore(limits, words)
+    return steps[0] if len(steps) == 1 else {FOLLOWING: steps}
+
+
+def _goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+    positions, report = read.conditions.positions, read.conditions.report
+    places = list(kind.iterfind(".//Waypoint/Position")) or list(kind.iterchildren("Position"))
+    if not places:
+        raise RefusedError(kind, "a route without places")
+    for one in kind.iter("Route", "Waypoint"):
+        report.mark(one, "approximated", "only the last place of a route is a goal")
+    report.mark(places[-1], "taken")
+    point = positions.point(places[-1])
+    node = positions.node_near(point) if point.node is None else point.node
+    return {"goal": {"to": str(node_id(positions.graph, node))}}
+
+
+def _arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    return arriving(read.conditions, kind, entity, read.speeds)
+
+
+_MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]]] = {
+    "SpeedAction": _speed,
+    "LaneChangeAction": _lane,
+    "LaneOffsetAction": _offset,
+    "LongitudinalDistanceAction": _gap,
+    "FollowTrajectoryAction": _trajectory,
+    "AssignRouteAction": _goal,
+    "AcquirePositionAction": _goal,
+    "SpeedProfileAction": _profile,
+    "TeleportAction": _teleport,
+    "SynchronizeAction": _arrive,
+    "LateralDistanceAction": _abreast,
+}

@@ -1,0 +1,393 @@
+"""Triggers as conditions of rules."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.formats.openscenario.xosc_triggers import EQUAL
+from odscen.formats.openscenario_import.import_report import RefusedError
+from odscen.formats.openscenario_import.source.own_files import without_repeats
+from odscen.formats.openscenario_import.world.read_environment import clock_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from lxml.etree import _Element
+
+    from odscen.formats.openscenario_import.import_report import ImportReport
+    from odscen.formats.openscenario_import.places.read_positions import PositionReader
+    from odscen.formats.openscenario_import.story.read_signals import SignalReader
+    from odscen.formats.openscenario_import.world.read_entities import ReadEntity
+    from odscen.formats.openscenario_import.world.read_environment import ReadEnvironment
+
+Made = dict[str, Any]
+ALWAYS: Final[Made] = {"time": {"after": 0.0}}
+NEVER: Final[Made] = {"not": ALWAYS}
+_TRUTH: Final = {"true": "1", "false": "0"}
+_ROAD_END: Final = 10.0
+_FAR: Final = 100_000.0
+"""Metres."""
+_ALONG: Final = {
+    "longitudinal": "longitudinal",
+    "lateral": "lateral",
+    "cartesianDistance": "straight",
+    "euclidianDistance": "straight",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionReader:
+    """Reads triggers.
+
+    Attributes
+    ----------
+    values
+        Parameters and variables of the file, as declared.
+    state
+        Condition that an element of the storyboard has reached a state.
+    signals
+        Reads what is about signals.
+    changes
+        What sets a parameter or variable in the story: its value then, and the condition that this
+        has happened.
+    environment
+        Time of day at the start.
+    own
+        Whether odscen wrote the file.
+    """
+
+    report: ImportReport
+    positions: PositionReader
+    entities: Mapping[str, ReadEntity]
+    values: Mapping[str, str]
+    state: Callable[[_Element], Made]
+    signals: SignalReader
+    changes: Callable[[_Element, str], list[tuple[str, Made]]]
+    environment: ReadEnvironment
+    own: bool = False
+
+    def trigger(self, trigger: _Element | None) -> Made:
+        """Condition of a trigger; one without conditions holds at once.
+
+        Raises
+        ------
+        RefusedError
+            If a condition has no counterpart.
+        """
+        if trigger is None:
+            return ALWAYS
+        groups = [self.group(group) for group in self.report.children(trigger, "ConditionGroup")]
+        if self.own:
+            groups = without_repeats(groups)
+        return joined("any", groups) if groups else ALWAYS
+
+    def group(self, group: _Element) -> Made:
+        """Condition that holds while all of a ``ConditionGroup`` do."""
+        return joined("all", [self._condition(one) for one in self.report.children(group)])
+
+    def _condition(self, element: _Element) -> Made:
+        content = self.report.child(element, "ByValueCondition", "ByEntityCondition")
+        if content is None:
+            raise RefusedError(element, "a condition without content")
+        if content.tag == "ByValueCondition":
+            made = self._by_value(self.report.only(content))
+        else:
+            made = self._by_entity(content)
+        return self._when(element, made)
+
+    def _when(self, element: _Element, made: Made) -> Made:
+        edge, delay = element.get("conditionEdge", "none"), self.report.number(element, "delay", 0)
+        made = _at_edge(made, edge)
+        return {**made, "delay": delay} if delay > 0 else made
+
+    def _by_value(self, kind: _Element) -> Made:
+        if kind.tag == "SimulationTimeCondition":
+            after: Made = {"time": {"after": max(0.0, self.report.number(kind, "value"))}}
+            return {"not": after} if kind.get("rule", "").startswith("less") else after
+        if kind.tag == "StoryboardElementStateCondition":
+            return self.state(kind)
+        if kind.tag in ("TrafficSignalCondition", "TrafficSignalControllerCondition"):
+            return self.signals.condition(kind)
+        if kind.tag in ("ParameterCondition", "VariableCondition"):
+            return self._value(kind)
+        if kind.tag == "TimeOfDayCondition":
+            return self._time_of_day(kind)
+        raise RefusedError(kind, f"odscen has no {kind.tag}")
+
+    def _time_of_day(self, kind: _Element) -> Made:
+        start = self.environment
+        if start.clock is None:
+            raise RefusedError(kind, "a time of day, of which the file has none at first")
+        clock, day = clock_of(self.report, kind)
+        seconds = (day - start.day) * 86_400.0 + clock - start.clock
+        if not start.runs:
+            seconds = 0.0 if seconds <= 0 else 1e6
+        before = kind.get("rule", "").startswith("less")
+        if seconds <= 0 or seconds > 1e5:
+            return NEVER if before == (seconds <= 0) else ALWAYS
+        after: Made = {"time": {"after": seconds}}
+        return {"not": after} if before else after
+
+    def _value(self, kind: _Element) -> Made:
+        """Whether a value is as it should be: at first, and after what sets it in the story."""
+        name = (kind.get("parameterRef") or kind.get("variableRef") or "").lstrip("$")
+        have = self.values.get(name)
+        if have is None:
+            raise RefusedError(kind, f"{name!r} is not declared")
+        first, changes = _holds(kind, have), self.changes(kind, name)
+        if not changes:
+            self.report.mark(kind, "approximated", "held against the declared value, once")
+            return ALWAYS if first else NEVER
+        words = f"from when an event sets {name!r}, as far as its trigger still holds"
+        self.report.mark(kind, "approximated", words)
+        sets = [when for value, when in changes if _holds(kind, value)]
+        if not first:
+            return joined("any", sets) if sets else NEVER
+        unsets = [when for value, when in changes if not _holds(kind, value)]
+        if not unsets:
+            return ALWAYS
+        return joined("any", [{"not": joined("any", unsets)}, *sets])
+
+    def _by_entity(self, element: _Element) -> Made:
+        who = self.report.child(element, "TriggeringEntities")
+        body = self.report.child(element, "EntityCondition")
+        if who is None or body is None:
+            raise RefusedError(element, "a condition without entities")
+        names = [self.actor(one) for one in self.report.children(who, "EntityRef")]
+        kind = self.report.only(body)
+        read = _KINDS.get(str(kind.tag))
+        if read is None or not names:
+            raise RefusedError(kind, f"odscen has no {kind.tag}")
+        rule = who.get("triggeringEntitiesRule", "any")
+        return joined("any" if rule == "any" else "all", [read(self, kind, one) for one in names])
+
+    def actor(self, element: _Element) -> str:
+        """Id of the actor that an element refers to.
+
+        Raises
+        ------
+        RefusedError
+            If it is not among the actors.
+        """
+        name = self.report.word(element, "entityRef")
+        if name not in self.entities:
+            raise RefusedError(element, f"entity {name!r} is not among the actors")
+        return self.entities[name].id
+
+    def bounded(self, kind: _Element, name: str, part: Made) -> Made:
+        """Hold a value against the bound of an element."""
+        value, rule = self.report.number(kind, "value"), kind.get("rule", "")
+        if rule.startswith("less"):
+            return {name: {**part, "below": value}}
+        if rule.startswith("greater"):
+            return {name: {**part, "above": value}}
+        self.report.mark(kind, "approximated", f"equal is within {EQUAL} of {value:g}")
+        near = [
+            {name: {**part, "above": value - EQUAL}},
+            {name: {**part, "below": value + EQUAL}},
+        ]
+        return {"not": {"all": near}} if rule == "notEqualTo" else {"all": near}
+
+    def place(self, kind: _Element, of: str = "") -> list[float] | str:
+        """X and y of the position in an element, metres; of a file of odscen's perhaps a node.
+
+        With ``of`` it is where the centre of that actor is when its reference point is there.
+
+        Raises
+        ------
+        RefusedError
+            If there is none.
+        """
+        position = self.report.child(kind, "Position")
+        if position is None:
+            raise RefusedError(kind, f"{kind.tag} without a position")
+        ahead = next((one.ahead for one in self.entities.values() if one.id == of), 0.0)
+        return self.point_or_node(position, ahead=ahead)
+
+    def point_or_node(self, position: _Element, *, ahead: float = 0.0) -> list[float] | str:
+        """X and y of a position, metres; of a file of odscen's perhaps a node.
+
+        ``ahead`` is from the reference point of who is to be there to its centre, metres; odscen
+        writes places of centres.
+
+        Raises
+        ------
+        RefusedError
+            If it cannot be found on the map.
+        """
+        point = self.positions.point(position)
+        if not self.own:
+            point = point.moved(ahead)
+        node = self.positions.name_at(point) if self.own and _headed(position) else None
+        return node or [round(point.x, 4), round(point.y, 4)]
+
+
+def _at_edge(made: Made, edge: str) -> Made:
+    """Condition that holds at an edge of another one.
+
+    What stays so once it has come true, times and ends of rules, has a rising edge when it comes
+    true and no falling one: it holds from then on, so that what it is combined with can be later.
+    """
+    if edge == "none":
+        return made
+    if _stays(made):
+        return NEVER if edge == "falling" else made
+    if "not" in made and _stays(made["not"]) and edge != "rising":
+        return dict(made["not"])
+    if edge == "rising":
+        return {**made, "edge": "rising"}
+    falls = {"not": made, "edge": "rising"}
+    return falls if edge == "falling" else {"any": [{**made, "edge": "rising"}, falls]}
+
+
+def _stays(made: Made) -> bool:
+    """Whether a condition holds for good once it does."""
+    (kind,) = (key for key in made if key not in ("edge", "delay"))
+    if kind in ("all", "any"):
+        return "edge" not in made and all(_stays(one) for one in made[kind])
+    return kind in ("time", "rule")
+
+
+def _holds(kind: _Element, have: str) -> bool:
+    """Whether a value is to the one of a condition as its rule says."""
+    want, rule = kind.get("value", ""), kind.get("rule")
+    try:
+        one, other = float(_TRUTH.get(have, have)), float(_TRUTH.get(want, want))
+    except ValueError:
+        return (have == want) == (rule != "notEqualTo")
+    return {
+        "greaterThan": one > other,
+        "greaterOrEqual": one >= other,
+        "lessThan": one < other,
+        "lessOrEqual": one <= other,
+        "notEqualTo": one != other,
+    }.get(str(rule), one == other)
+
+
+def _headed(position: _Element) -> bool:
+    """Whether a position says a heading: points of odscen's have none, nodes have."""
+    return position.find("WorldPosition[@h]") is not None
+
+
+def joined(kind: str, parts: list[Made]) -> Made:
+    """Combine conditions, each once; one alone stays as it is."""
+    rest = [
+        one
+        for row, one in enumerate(parts)
+        if (kind != "all" or one != ALWAYS) and one not in parts[:row]
+    ]
+    if not rest:
+        return ALWAYS
+    return rest[0] if len(rest) == 1 else {kind: rest}
+
+
+def _speed(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return read.bounded(kind, "speed", {"of": of})
+
+
+def _acceleration(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return read.bounded(kind, "acceleration", {"of": of})
+
+
+def _relative_speed(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return read.bounded(kind, "relative_speed", {"of": of, "to": read.actor(kind)})
+
+
+def _travelled(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return {"travelled": {"of": of, "above": read.report.number(kind, "value")}}
+
+
+def _stopped(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return {"stopped": {"of": of, "seconds": read.report.number(kind, "duration", 0.0)}}
+
+
+def _reaches(read: ConditionReader, kind: _Element, of: str) -> Made:
+    within = min(max(read.report.number(kind, "tolerance"), 0.01), 1000.0)
+    return {"reaches": {"of": of, "place": read.place(kind, of), "within": within}}
+
+
+def _headway(read: ConditionReader, kind: _Element, of: str) -> Made:
+    if kind.get("freespace") == "false":
+        read.report.mark(kind, "approximated", "between bodies, not reference points")
+    return read.bounded(kind, "headway", {"of": of, "to": read.actor(kind)})
+
+
+def _ttc(read: ConditionReader, kind: _Element, of: str) -> Made:
+    target = read.report.only(kind)
+    other = read.report.child(target, "EntityRef")
+    if other is None:
+        raise RefusedError(target, "time to collision with a place")
+    if kind.get("freespace") == "false":
+        read.report.mark(kind, "approximated", "between bodies, not reference points")
+    return read.bounded(kind, "ttc", {"of": of, "to": read.actor(other)})
+
+
+def _measure(read: ConditionReader, kind: _Element, usual: str) -> Made:
+    along = _ALONG.get(kind.get("relativeDistanceType", usual), "straight")
+    if along == "longitudinal" and kind.get("coordinateSystem") in ("lane", "road"):
+        along = "lane"
+    free = kind.get("freespace") == "true"
+    if not free:
+        read.report.mark(kind, "approximated", "between centres, not reference points")
+    return {"along": along, "free": free}
+
+
+def _relative_distance(read: ConditionReader, kind: _Element, of: str) -> Made:
+    part = {"of": of, "to": read.actor(kind), **_measure(read, kind, "longitudinal")}
+    return read.bounded(kind, "distance", part)
+
+
+def _distance(read: ConditionReader, kind: _Element, of: str) -> Made:
+    centre = "" if kind.get("freespace") == "true" else of
+    place = read.place(kind, centre)
+    part = {"of": of, "place": place, **_measure(read, kind, "euclidianDistance")}
+    if kind.get("alongRoute") == "true":
+        part["along"] = "lane"
+    return read.bounded(kind, "distance", part)
+
+
+def _touched(read: ConditionReader, kind: _Element, of: str) -> Made:
+    other = read.report.only(kind)
+    if other.tag == "EntityRef":
+        return {"touched": {"of": of, "to": read.actor(other)}}
+    read.report.mark(other, "approximated", "any road user that a rule names")
+    return {"touched": {"of": of}}
+
+
+def _off_road(read: ConditionReader, kind: _Element, of: str) -> Made:
+    delay = read.report.number(kind, "duration", 0.0)
+    return {"off_road": {"of": of}, **({"delay": delay} if delay > 0 else {})}
+
+
+def _road_end(read: ConditionReader, kind: _Element, of: str) -> Made:
+    """Near to where the lanes end that lead straight on from where the actor starts."""
+    positions, delay = read.positions, read.report.number(kind, "duration", 0.0)
+    entity = next(name for name, one in read.entities.items() if one.id == of)
+    if entity not in positions.starts:
+        raise RefusedError(kind, f"the end of the road of {entity!r}, which has no place")
+    start = positions.starts[entity]
+    node = positions.along(positions.node_near(start), _FAR)
+    lanes = positions.graph.lanes
+    words = f"within {_ROAD_END:g} m of the end of the lanes straight on from where it starts"
+    read.report.mark(kind, "approximated", f"{words}; SUMO takes it off the road there")
+    place = [round(float(lanes.x[node]), 4), round(float(lanes.y[node]), 4)]
+    made: Made = {"reaches": {"of": of, "place": place, "within": _ROAD_END}}
+    return made | ({"delay": delay} if delay > 0 else {})
+
+
+_KINDS: Final[Mapping[str, Callable[[ConditionReader, _Element, str], Made]]] = {
+    "SpeedCondition": _speed,
+    "AccelerationCondition": _acceleration,
+    "RelativeSpeedCondition": _relative_speed,
+    "TraveledDistanceCondition": _travelled,
+    "StandStillCondition": _stopped,
+    "ReachPositionCondition": _reaches,
+    "TimeHeadwayCondition": _headway,
+    "TimeToCollisionCondition": _ttc,
+    "RelativeDistanceCondition": _relative_distance,
+    "DistanceCondition": _distance,
+    "CollisionCondition": _touched,
+    "OffroadCondition": _off_road,
+    "EndOfRoadCondition": _road_end,
+}

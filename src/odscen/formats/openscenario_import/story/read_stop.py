@@ -1,0 +1,71 @@
+"""The storyboard's stop trigger: a duration, and rules that end the run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.base.errors import InputError
+from odscen.formats.openscenario_import.import_report import RefusedError
+from odscen.formats.openscenario_import.story.read_conditions import ALWAYS, NEVER
+
+if TYPE_CHECKING:
+    from lxml.etree import _Element
+
+    from odscen.formats.openscenario_import.import_report import ImportReport
+    from odscen.formats.openscenario_import.story.read_conditions import ConditionReader
+    from odscen.formats.openscenario_import.story.read_storyboard import StoryReader
+
+Made = dict[str, Any]
+_USUAL_DURATION: Final = 60.0
+_CRITERION: Final = "criteria_"
+"""How ScenarioRunner's names of conditions begin that are no triggers but judge a run."""
+
+
+def read_stop(report: ImportReport, board: _Element, story: StoryReader) -> float:
+    """Seconds after which the storyboard ends; other triggers of its end become rules."""
+    stop = report.child(board, "StopTrigger")
+    found, latest, ends = [], 0.0, False
+    for group in () if stop is None else report.children(stop, "ConditionGroup"):
+        times = group.findall(".//SimulationTimeCondition")
+        seconds = [report.number(one, "value") for one in times]
+        if times and len(times) == len(group.findall("Condition")):
+            _take(report, times, board)
+            found.append(min(seconds))
+        elif story.actions is not None and (when := _when(report, group, story.actions.conditions)):
+            story.end(when)
+            latest, ends = max([latest, *seconds]), True
+        elif times:
+            _take(report, times, board)
+            found.append(min(seconds))
+            report.mark(group, "approximated", "the run ends by time alone")
+    if found := [one for one in found if one > 0]:
+        return min(found)
+    duration = _USUAL_DURATION + latest
+    if stop is not None:
+        words = f"the run ends after {duration:g} s{' at the latest' if ends else ''}"
+        report.mark(stop, "approximated", words)
+    return duration
+
+
+def _when(report: ImportReport, group: _Element, conditions: ConditionReader) -> Made | None:
+    """Condition on which the run ends, if that can happen and is known."""
+    if any(one.get("name", "").startswith(_CRITERION) for one in group):
+        return None
+    try:
+        when = conditions.group(group)
+    except RefusedError as error:
+        report.mark(error.element, "approximated", f"the run does not end with it: {error.reason}")
+        return None
+    except InputError as error:
+        words = f"the run does not end with it: {error.element}: {error.problem}"
+        report.mark(group, "approximated", words)
+        return None
+    return None if when in ({}, ALWAYS, NEVER) else when
+
+
+def _take(report: ImportReport, times: list[_Element], board: _Element) -> None:
+    for condition in times:
+        above: _Element | None = condition
+        while above is not None and above is not board:
+            report.mark(above, "taken")
+            above = above.getparent()

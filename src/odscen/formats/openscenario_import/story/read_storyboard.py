@@ -1,0 +1,357 @@
+"""The storyboard as rules: one for each event and actor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.errors import InputError
+from odscen.formats.openscenario_import.import_report import RefusedError
+from odscen.formats.openscenario_import.source.own_files import said_in_properties
+from odscen.formats.openscenario_import.story.global_actions import READ, tell_unread
+from odscen.formats.openscenario_import.story.own_entity_actions import (
+    own_entity_action,
+    with_speed,
+)
+from odscen.formats.openscenario_import.story.read_actions import FOLLOWING
+from odscen.formats.openscenario_import.story.read_conditions import ALWAYS, joined
+from odscen.formats.openscenario_import.story.read_motions import JUMP
+from odscen.formats.openscenario_import.story.value_changes import new_value, sets_in_story
+from odscen.formats.openscenario_import.world.read_entities import plain_id
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from lxml.etree import _Element
+
+    from odscen.formats.openscenario_import.import_report import ImportReport
+    from odscen.formats.openscenario_import.story.read_actions import ActionReader
+    from odscen.formats.openscenario_import.world.read_entities import ReadEntity
+
+Made = dict[str, Any]
+_HOLDERS = frozenset({"Story", "Act", "ManeuverGroup", "Maneuver"})
+
+
+class LaterError(RefusedError):
+    """An element that waits for one that may still be read."""
+
+
+@dataclass(slots=True)
+class StoryReader:
+    """Reads the stories of a storyboard; ``rules`` grow in the order of the file.
+
+    Attributes
+    ----------
+    driven
+        Ids of actors that something else drives: their events are ignored.
+    later
+        What actors do first that the story puts on the road, by their ids.
+    own
+        Whether odscen wrote the file: a maneuver group is one rule.
+    """
+
+    report: ImportReport
+    entities: dict[str, ReadEntity]
+    driven: frozenset[str] = frozenset()
+    rules: list[Made] = field(default_factory=list)
+    actions: ActionReader | None = None
+    later: dict[str, list[Made]] = field(default_factory=dict)
+    own: bool = False
+    _ids: set[str] = field(default_factory=set)
+    _made: dict[_Element, list[Made]] = field(default_factory=dict)
+    _whens: dict[_Element, Made] = field(default_factory=dict)
+    _asked: set[_Element] = field(default_factory=set)
+    _waiting: list[tuple[_Element, _Element | None, list[str]]] = field(default_factory=list)
+    _last: list[bool] = field(default_factory=list)
+    _placed: set[str] = field(default_factory=set)
+
+    def read(self, board: _Element) -> None:
+        """Read all events; an event that cannot be taken over is left out."""
+        for story in self.report.children(board, "Story"):
+            for act in self.report.children(story, "Act"):
+                self._act(act)
+        while self._waiting:  # for elements that come later in the file
+            again, self._waiting = self._waiting, []
+            for one in again:
+                self._event(*one)
+            if len(self._waiting) == len(again):
+                self._last.append(True)
+
+    def changes(self, kind: _Element, name: str) -> list[tuple[str, Made]]:
+        """Values that events set a parameter or variable to, and when they have.
+
+        Raises
+        ------
+        RefusedError
+            If the trigger of such an event has no counterpart, or waits for this.
+        """
+        found = []
+        for action in sets_in_story(kind.getroottree().getroot(), name):
+            event = next(action.iterancestors("Event"), None)
+            if event is None or self.actions is None:
+                continue
+            if event in self._asked or any(one is kind for one in event.iter("*")):
+                raise RefusedError(kind, f"{name!r}, which is set by what waits for it")
+            rules = self._made.get(event, [])
+            self._asked.add(event)
+            act = next(event.iterancestors("Act"), None)
+            trigger = self.actions.conditions.trigger
+            starts = () if act is None else (act.find("StartTrigger"), event.find("StartTrigger"))
+            when = joined("all", [trigger(one) for one in starts])
+            self._asked.discard(event)
+            if rules:
+                when = {"rule": {"id": rules[0]["id"], "has": "started"}}
+            for one in action.iter("*"):
+                self.report.mark(one, "taken")
+            value = new_value(action, self.actions.conditions.values.get(name, "0"))
+            found.append((value, when))
+        return found
+
+    def state(self, kind: _Element) -> Made:
+        """Condition of a ``StoryboardElementStateCondition``.
+
+        Raises
+        ------
+        RefusedError
+            If it is of a state or an element that rules do not have.
+        LaterError
+            If that element is none that has been read so far.
+        """
+        state, name = kind.get("state", ""), kind.get("storyboardElementRef", "")
+        has = {
+            "completeState": "ended",
+            "endTransition": "ended",
+            "runningState": "started",
+            "startTransition": "started",
+        }.get(state)
+        if has is None:
+            raise RefusedError(kind, f"the state {state!r}")
+        bare = name.replace("::", "/").rpartition("/")[2]
+        parts = [*self._begun(kind, bare)] if has == "started" else []
+        for event in () if parts else self._events(kind, bare):
+            rules = self._made.get(event, [])
+            if not rules and event in self._whens:
+                self.report.mark(kind, "approximated", "what it waits for does nothing")
+                parts.append(self._whens[event])
+            parts += [{"rule": {"id": rule["id"], "has": has}} for rule in rules]
+        if not parts:
+            raise LaterError(kind, f"{name!r}, which is left out or is not there")
+        return joined("all" if has == "ended" else "any", parts)
+
+    def _begun(self, kind: _Element, name: str) -> Iterator[Made]:
+        """Triggers of what holds events, which starts with the act that it is in."""
+        for element in kind.getroottree().getroot().iterfind("Storyboard//*[@name]"):
+            if element.get("name") != name or element.tag not in _HOLDERS or self.actions is None:
+                continue
+            act = next(element.iterancestors("Act"), element)
+            trigger = act.find("StartTrigger")
+            if element.tag == "Story" or trigger is None:
+                yield ALWAYS
+            elif trigger in self._asked or any(one is kind for one in trigger.iter()):
+                raise RefusedError(kind, f"{name!r}, which waits for this")
+            else:
+                self._asked.add(trigger)
+                yield self.actions.conditions.trigger(trigger)
+                self._asked.discard(trigger)
+
+    def _events(self, kind: _Element, name: str) -> Iterator[_Element]:
+        root = kind.getroottree().getroot()
+        for element in root.iterfind("Storyboard/Story//*[@name]"):
+            if element.get("name") == name:
+                inside = element if element.tag != "Action" else element.getparent()
+                if inside is not None:
+                    yield from inside.iter("Event")
+
+    def _act(self, act: _Element) -> None:
+        trigger = self.report.child(act, "StartTrigger")
+        for stop in act.iterchildren("StopTrigger"):
+            if self.own:  # the end of the run, as that of the storyboard
+                self.report.take(stop)
+            else:
+                self.report.ignore(stop, "rules end with what they do")
+        for group in self.report.children(act, "ManeuverGroup"):
+            if group.get("maximumExecutionCount", "1") not in {"0", "1"}:
+                self.report.mark(group, "approximated", "its maneuvers take place once")
+            who = self.report.child(group, "Actors")
+            refs = () if who is None else self.report.children(who, "EntityRef")
+            names = [one.get("entityRef", "") for one in refs]
+            if self.own and (not names or group.get("name") in said_in_properties(names)):
+                self.report.take(group)
+                continue
+            if self.own:
+                self._rule(group, names[0])
+                continue
+            for maneuver in self.report.children(group, "Maneuver"):
+                for event in self.report.children(maneuver, "Event"):
+                    self._event(event, trigger, names)
+
+    def _rule(self, group: _Element, name: str) -> None:
+        """Rule of a group that odscen wrote: its events follow one another."""
+        events = [
+            event
+            for maneuver in self.report.children(group, "Maneuver")
+            for event in self.report.children(maneuver, "Event")
+        ]
+        before = len(self.rules)
+        self._event(events[0], None, [name])
+        if len(self.rules) == before:
+            return
+        rule = self.rules[-1]
+        rule["id"] = group.get("name", "")
+        for event in events[1:]:
+            for trigger in self.report.children(event, "StartTrigger"):
+                self.report.take(trigger)
+            try:
+                then = self._then(event, self.entities[name])
+            except RefusedError as error:
+                self.report.mark(error.element, "refused", error.reason)
+                continue
+            if then:
+                rule["then"] += then if len(then) == 1 else [{"together": then}]
+            self._made[event] = [rule]
+
+    def _event(self, event: _Element, trigger: _Element | None, names: list[str]) -> None:
+        before = len(self.rules)
+        try:
+            self._take(event, trigger, names)
+        except RefusedError as error:
+            if isinstance(error, LaterError) and not self._last and len(self.rules) == before:
+                self._waiting.append((event, trigger, names))
+                return
+            self.report.mark(error.element, "refused", error.reason)
+            self.report.mark(event, "refused", f"left out: {error.reason}")
+        except InputError as error:
+            self.report.mark(event, "refused", f"left out: {error.element}: {error.problem}")
+
+    def _take(self, event: _Element, trigger: _Element | None, names: Iterable[str]) -> None:
+        if self.actions is None:
+            return
+        conditions = self.actions.conditions
+        own = self.report.child(event, "StartTrigger")
+        if event.get("priority", "parallel") != "parallel":
+            self.report.mark(event, "approximated", "runs beside other events of its maneuver")
+        when = joined("all", [conditions.trigger(trigger), conditions.trigger(own)])
+        self._whens[event] = when
+        times = int(self.report.number(event, "maximumExecutionCount", 1.0))
+        if not self.own:
+            self._globals(event, when, times)
+        if event.find("Action/PrivateAction") is None and not self.own:
+            for content in event.iterfind("Action/*"):
+                tell_unread(self.report, content, story=True)
+            return
+        for name in names:
+            if name not in self.entities:
+                raise RefusedError(event, f"entity {name!r} is not among the actors")
+            entity = self.entities[name]
+            then = self._then(event, entity)
+            if not then:
+                self.report.mark(event, "ignored", "nothing that it does has a counterpart")
+            elif entity.id in self.driven:
+                self.report.ignore(event, "something else drives this actor; see --ego")
+            else:
+                self._add(event, entity.id, when, then, times)
+
+    def _globals(self, event: _Element, when: Made, times: int) -> None:
+        """Read what global actions of an event make rules of."""
+        for about in event.iterfind("Action/GlobalAction/EntityAction"):
+            self._entity(event, about, when, times)
+        for about in event.iterfind("Action/GlobalAction/InfrastructureAction"):
+            self._signal(event, about, when, times)
+
+    def _signal(self, event: _Element, about: _Element, when: Made, times: int) -> None:
+        """Let a rule switch a light; which actor it is of does not matter."""
+        if self.actions is None or not self.entities:
+            return
+        made = self.actions.conditions.signals.action(about)
+        above = about.getparent()
+        for one in () if above is None else (above, above.getparent()):
+            if one is not None:
+                self.report.mark(one, "taken")
+        self._add(event, next(iter(self.entities.values())).id, when, [made], times)
+
+    def _then(self, event: _Element, entity: ReadEntity) -> list[Made]:
+        found: list[Made] = []
+        for action in self.report.children(event, "Action"):
+            content = self.report.only(action)
+            kind = content.find("*") if content.tag == "GlobalAction" else None
+            if kind is not None and kind.tag in READ and not self.own:
+                continue
+            if content.tag != "PrivateAction":
+                found += self._global(content, entity)
+            elif self.actions is not None:
+                found += self.actions.actions(content, entity)
+        if len(found) > 1 and any(FOLLOWING in one for one in found):
+            raise RefusedError(event, "a speed profile beside other actions of its event")
+        if len(found) == 1 and "replay" in found[0] and entity.id in self.later:
+            return [{FOLLOWING: self._appearing(entity, found[0]["replay"]["rows"][0][1:])}]
+        return with_speed(found, entity) if self.own else found
+
+    def _global(self, content: _Element, entity: ReadEntity) -> list[Made]:
+        if self.own and self.actions is not None:
+            made = own_entity_action(content, entity, self.actions.conditions.positions)
+            about = content.find("InfrastructureAction")
+            if made is None and about is not None:
+                made = self.actions.conditions.signals.action(about)
+            if made is not None:
+                self.report.take(content)
+                return [made]
+        tell_unread(self.report, content, story=True)
+        return []
+
+    def _appearing(self, entity: ReadEntity, at: list[float]) -> list[Made]:
+        """What an actor does that the story puts on the road: it appears, and does as at first."""
+        first = self.later[entity.id]
+        rest = first if len(first) < 2 else [{"together": first}]
+        return [{"appear": {"at": at}}, *rest]
+
+    def _entity(self, event: _Element, about: _Element, when: Made, times: int) -> None:
+        """Let an actor appear or vanish."""
+        if self.actions is None:
+            return
+        entity = self.entities.get(about.get("entityRef", ""))
+        if entity is None:
+            raise RefusedError(about, f"entity {about.get('entityRef')!r} is not among the actors")
+        for one in (about.getparent(), about, *about):
+            if one is not None:
+                self.report.mark(one, "taken")
+        position = about.find("AddEntityAction/Position")
+        if position is None:
+            self._add(event, entity.id, when, [{"vanish": {}}], times)
+            return
+        if entity.id not in self.later:
+            raise RefusedError(about, f"{entity.id!r}, which is there already")
+        self.report.mark(position, "taken")
+        centre = self.actions.conditions.positions.point(position).moved(entity.ahead)
+        at = [round(centre.x, 4), round(centre.y, 4), round(centre.hdg, 6)]
+        self._add(event, entity.id, when, [{FOLLOWING: self._appearing(entity, at)}], times)
+
+    def _add(self, event: _Element, actor: str, when: Made, then: list[Made], times: int) -> None:
+        rule: Made = {"id": plain_id(event.get("name", "event"), self._ids), "actor": actor}
+        # What happens from the start on does so where the actor starts.
+        begin: Made = {"time": {"after": JUMP}} if actor in self._placed else ALWAYS
+        rule["when"] = begin if when in ({}, ALWAYS) else when
+        rule["then"] = then[0].get(FOLLOWING, then) if len(then) == 1 else [{"together": then}]
+        if times > 1:
+            rule["times"] = min(times, 100_000)
+        self.rules.append(rule)
+        self._made.setdefault(event, []).append(rule)
+
+    def end(self, when: Made) -> None:
+        """Let the run end on a condition; which actor that is a rule of does not matter."""
+        if self.entities:
+            actor = next(iter(self.entities.values())).id
+            name = plain_id("end", self._ids)
+            self.rules.append({"id": name, "actor": actor, "when": when, "then": [{"end": {}}]})
+
+    def at_once(self, actor: str, then: list[Made]) -> None:
+        """Add what an actor does from the start, or as soon as it has appeared."""
+        first, rest = then[:1], then[1:]
+        if first and {"appear", "replay", "offset"} & first[0].keys():
+            self._placed.add(actor)
+        if rest and ("appear" in first[0] or "replay" in first[0]):
+            groups = [[*first, *(rest if len(rest) == 1 else [{"together": rest}])]]
+        else:
+            groups = [[one] for one in then]
+        for group in groups:
+            name = plain_id(f"init-{actor}", self._ids)
+            self.rules.append({"id": name, "actor": actor, "when": ALWAYS, "then": group})

@@ -1,0 +1,111 @@
+"""Entities: categories, bodies and the reference point."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.formats.openscenario_import.source.own_files import is_own, own_fields
+
+if TYPE_CHECKING:
+    from lxml.etree import _Element
+
+    from odscen.formats.openscenario_import.import_report import ImportReport
+
+_CATEGORIES: Final = {
+    "car": Category.CAR,
+    "van": Category.VAN,
+    "truck": Category.TRUCK,
+    "bus": Category.BUS,
+    "motorbike": Category.MOTORCYCLE,
+    "bicycle": Category.BICYCLE,
+}
+_NEAREST: Final = {"semitrailer": Category.TRUCK, "trailer": Category.TRUCK}
+EGO: Final = re.compile(r"ego|hero|ego_vehicle|host|vut", re.IGNORECASE)
+
+
+@dataclass(slots=True)
+class ReadEntity:
+    """An entity of the file; ``ahead`` is from its reference point to its centre, metres.
+
+    ``own`` are fields of an actor, in a file that odscen wrote.
+    """
+
+    element: _Element
+    id: str
+    category: Category
+    length: float
+    ahead: float
+    ego: bool = False
+    obstacle: bool = False
+    own: dict[str, Any] | None = None
+
+
+def plain_id(text: str, taken: set[str]) -> str:
+    """Identifier made of a name, unlike those that are taken."""
+    bare = re.sub(r"[^A-Za-z0-9_.-]+", "-", text).strip("-_.")[:56] or "one"
+    found, number = bare, 1
+    while found in taken:
+        number += 1
+        found = f"{bare}-{number}"
+    taken.add(found)
+    return found
+
+
+def read_entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]:
+    """Entities by their name in the file; the ego is the one that is called so, or none."""
+    found: dict[str, ReadEntity] = {}
+    taken: set[str] = set()
+    group = report.child(root, "Entities")
+    for element in () if group is None else report.children(group, "ScenarioObject"):
+        name = report.word(element, "name")
+        thing = report.child(element, "Vehicle", "Pedestrian", "MiscObject")
+        if thing is None:
+            report.mark(element, "refused", "an entity without a body that odscen knows")
+            continue
+        for controller in element.iterchildren("ObjectController"):
+            report.ignore(controller, "a controller is a program beside the file; see --ego")
+        one = _entity(report, thing, plain_id(name, taken))
+        if one is None:
+            report.mark(element, "refused", "its category has no counterpart")
+        else:
+            found[name] = one
+    if is_own(root):
+        for one in found.values():
+            one.own = own_fields(report, one.element)
+            one.ego = bool(one.own and one.own.get("ego"))
+        return found
+    drivers = [one for name, one in found.items() if EGO.fullmatch(name)]
+    for one in drivers[:1]:
+        one.ego = one.category is not Category.PEDESTRIAN
+    return found
+
+
+def _entity(report: ImportReport, thing: _Element, own: str) -> ReadEntity | None:
+    kind = thing.get("vehicleCategory", "car")
+    if thing.tag == "Pedestrian":
+        category: Category | None = Category.PEDESTRIAN
+    elif thing.tag == "MiscObject":
+        category = Category.CAR
+        report.mark(thing, "approximated", "an object is a stationary car")
+    else:
+        category = _CATEGORIES.get(kind) or _NEAREST.get(kind)
+        if kind in _NEAREST:
+            report.mark(thing, "approximated", f"a {kind} is a {_NEAREST[kind]}")
+    if category is None:
+        report.mark(thing, "refused", f"vehicles of category {kind!r}")
+        return None
+    length, ahead = DEFAULT_BODY[category].length, 0.0
+    box = report.child(thing, "BoundingBox")
+    if box is not None:
+        centre, size = report.child(box, "Center"), report.child(box, "Dimensions")
+        if centre is not None:
+            ahead = report.number(centre, "x", 0.0)
+        if size is not None:
+            given = report.number(size, "length", length)
+            if abs(given - length) > 0.05:
+                words = f"{given:.2f} m long; the usual {category} has {length:.2f} m"
+                report.mark(size, "approximated", words)
+    return ReadEntity(thing, own, category, length, ahead, obstacle=thing.tag == "MiscObject")

@@ -1,0 +1,169 @@
+"""Arrays for graph learning in an .npz without pickles, which PyTorch Geometric's data is made of.
+
+Names, units and types are in ``docs/learning-formats.md``;
+:func:`odscen.learning.hetero_data.hetero_data` makes a ``HeteroData`` of them.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from odscen.formats.arrays_export import scenario_array_files
+from odscen.formats.exporter import Exporter
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+
+    from odscen.base.arrays import FloatArray
+    from odscen.formats.exporter import ExportFiles, ExportSource
+    from odscen.formats.recordings.run_recording import MapElements, RunRecording
+    from odscen.lanegraph.graphs import MapGraph
+
+    Arrays = dict[str, np.ndarray[Any, np.dtype[Any]]]
+
+FORMAT = "odscen-arrays"
+VERSION = 1
+
+
+def run_arrays(source: ExportSource) -> ExportFiles:
+    """One .npz file: the graphs of the map, its elements, tracks and signal states.
+
+    Raises
+    ------
+    InputError
+        If there are no road users, or too much, in the run.
+    """
+    from odscen.base.given_arrays import npz_bytes
+    from odscen.formats.recordings.record import recording_of
+
+    recording = recording_of(source)
+    arrays = {
+        **_head(recording),
+        **_graph(source.sumo_map.graph),
+        **_elements(recording.elements),
+        **_tracks(recording),
+        "agent_node": _first_nodes(recording, source.sumo_map.graph),
+    }
+    return {f"{recording.name}.npz": npz_bytes(arrays)}
+
+
+def _head(recording: RunRecording) -> Arrays:
+    import numpy as np
+
+    about = {
+        "format": FORMAT,
+        "version": VERSION,
+        "run": recording.name,
+        "scenario": recording.scenario,
+        "map": recording.map_name,
+        "map_sha256": recording.map_sha256,
+        "seed": recording.seed,
+        "recorded_step": recording.recorded_step,
+        "interpolated": recording.interpolated,
+    }
+    return {"about": np.array(json.dumps(about, ensure_ascii=False)), "time": recording.times}
+
+
+def _graph(graph: MapGraph) -> Arrays:
+    import numpy as np
+
+    lanes, walks = graph.lanes, graph.walks
+    nodes = np.stack(
+        [getattr(lanes, name) for name in ("x", "y", "z", "hdg", "curvature", "width")], axis=1
+    )
+    return {
+        "node": nodes,
+        "node_speed_limit": lanes.speed_limit,
+        "node_lane": lanes.lane.astype(np.int64),
+        "node_edge": np.stack([lanes.source, lanes.target]).astype(np.int64),
+        "node_edge_relation": lanes.relation,
+        "node_edge_length": lanes.length,
+        "walk": np.stack(
+            [getattr(walks, name) for name in ("x", "y", "z", "hdg", "width")], axis=1
+        ),
+        "walk_edge": np.stack([walks.source, walks.target]).astype(np.int64),
+        "walk_edge_kind": walks.kind,
+        "walk_edge_length": walks.length,
+    }
+
+
+def _elements(elements: MapElements) -> Arrays:
+    import numpy as np
+
+    lanes = elements.lanes
+    pairs = [(row, after) for row, lane in enumerate(lanes) for after in lane.exits]
+    return {
+        "lane_key": np.array([lane.key for lane in lanes], dtype=np.str_),
+        "lane_type": np.array([lane.kind for lane in lanes], dtype=np.str_),
+        "lane_speed_limit": np.array([lane.speed_limit for lane in lanes]),
+        "lane_in_junction": np.array([bool(lane.junction) for lane in lanes], dtype=np.bool_),
+        "lane_left": np.array([lane.left_lane for lane in lanes], dtype=np.int64),
+        "lane_right": np.array([lane.right_lane for lane in lanes], dtype=np.int64),
+        "lane_opposite": np.array([lane.opposite for lane in lanes], dtype=np.int64),
+        "lane_edge": np.array(pairs, dtype=np.int64).reshape(-1, 2).T,
+        **_ragged("lane_point", [np.hstack([x.centre, x.left, x.right]) for x in lanes], 9),
+        "line_type": np.array([line.kind for line in elements.lines], dtype=np.str_),
+        "line_color": np.array([line.color for line in elements.lines], dtype=np.str_),
+        **_ragged("line_point", [line.points for line in elements.lines], 3),
+        **_ragged("road_edge_point", elements.edges, 3),
+        **_ragged("crosswalk_point", [one.corners for one in elements.crosswalks], 3),
+    }
+
+
+def _ragged(name: str, parts: Sequence[FloatArray], columns: int) -> Arrays:
+    """All points one after the other, and where those of each element begin."""
+    import numpy as np
+
+    from odscen.base.arrays import offsets
+
+    points = np.concatenate(parts) if parts else np.empty((0, columns))
+    return {name: points, f"{name}_start": offsets(len(part) for part in parts)}
+
+
+def _tracks(recording: RunRecording) -> Arrays:
+    import numpy as np
+
+    tracks, signals = recording.tracks, recording.signals
+    state = [tracks.x, tracks.y, tracks.z, tracks.hdg, tracks.speed]
+    return {
+        "agent_id": np.array(tracks.ids, dtype=np.str_),
+        "agent_category": np.array(tracks.categories, dtype=np.str_),
+        "agent_size": np.stack([tracks.length, tracks.width, tracks.height], axis=1),
+        "agent_is_ego": np.arange(len(tracks.ids)) == tracks.ego,
+        "agent_state": np.stack(state, axis=-1),
+        "agent_valid": tracks.valid,
+        "light_lane": signals.lane,
+        "light_approach": signals.approach,
+        "light_stop": signals.stop,
+        "light_turn": np.array(signals.turn, dtype=np.str_),
+        "light_color": signals.color,
+    }
+
+
+def _first_nodes(recording: RunRecording, graph: MapGraph) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Node of the lane graph that each vehicle is nearest to at first; -1 for pedestrians."""
+    import numpy as np
+    from scipy.spatial import cKDTree
+
+    tracks = recording.tracks
+    first = np.argmax(tracks.valid, axis=1)
+    rows = np.arange(len(first))
+    places = np.stack([tracks.x[rows, first], tracks.y[rows, first]], axis=1)
+    nodes = np.stack([graph.lanes.x, graph.lanes.y], axis=1)
+    nearest = cKDTree(nodes).query(places)[1].astype(np.int64)
+    walks = np.array([one == "pedestrian" for one in tracks.categories], dtype=np.bool_)
+    return np.where(walks, np.int64(-1), nearest)
+
+
+EXPORTER = Exporter(
+    name="pyg",
+    label="arrays of a run, or of a scenario, for PyTorch Geometric (.npz)",
+    files=scenario_array_files,
+    checked=False,
+    runs=run_arrays,
+    options=("begin", "end"),
+    needs_roads=True,
+)

@@ -1,0 +1,190 @@
+"""Elements of a map as polylines with equal steps: lanes with borders, markings, crosswalks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.base.arrays import offsets, ranges
+from odscen.base.ids import LaneKey
+from odscen.formats.recordings.road_edges import road_edges
+from odscen.formats.recordings.run_recording import (
+    CrosswalkElement,
+    LaneElement,
+    LineElement,
+    MapElements,
+)
+from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, Relation
+from odscen.opendrive.lanes import RoadTable
+from odscen.opendrive.objects import crosswalks
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from odscen.base.arrays import FloatArray, IntArray
+    from odscen.base.ids import RoadId
+    from odscen.lanegraph.graphs import LaneGraph
+    from odscen.opendrive.road_model import LaneSection, OpenDrive, RoadMark
+
+POINT_STEP = 1.0
+"""Most metres of s between two points; a chord of 1 m at a radius of 5 m is 2.5 cm off."""
+
+_UNPAINTED = frozenset({"none", "grass", "curb", "edge", ""})
+_SHORTEST = 0.05
+"""Metres below which a stretch of a marking is an editor's leftover."""
+
+
+def map_elements(odr: OpenDrive, graph: LaneGraph) -> MapElements:
+    """Elements of a map; lanes in the order of the lane graph's."""
+    table = RoadTable.of(odr)
+    lanes = _lanes(odr, table, graph)
+    walks = tuple(
+        CrosswalkElement(_at(one.polygon, one.z), _at(one.axis, one.z), one.width)
+        for one in crosswalks(odr, table)
+    )
+    return MapElements(lanes, tuple(_lines(odr, table)), tuple(road_edges(lanes)), walks)
+
+
+def _at(xy: FloatArray, z: float) -> FloatArray:
+    return np.column_stack([xy, np.full(len(xy), z)])
+
+
+class _Polylines(NamedTuple):
+    """Lines on lanes; line ``k`` is ``points[start[k]:start[k + 1]]`` of each."""
+
+    start: IntArray
+    centre: FloatArray
+    inner: FloatArray
+    outer: FloatArray
+
+
+def _polylines(table: RoadTable, rows: IntArray, s0: FloatArray, s1: FloatArray) -> _Polylines:
+    """Points along lanes (rows of the table) between two road coordinates each."""
+    n = np.maximum(np.ceil((s1 - s0) / POINT_STEP), 1.0).astype(np.int64) + 1
+    of = np.repeat(np.arange(len(rows)), n)
+    share = ranges(np.zeros(len(n), dtype=np.int64), n) / (n - 1)[of]
+    s = s0[of] * (1.0 - share) + s1[of] * share
+    found = [table.lane_points(rows[of], s, at=at) for at in (0.5, 0.0, 1.0)]
+    lines = [np.stack([one.x, one.y, one.z], axis=1) for one in found]
+    return _Polylines(offsets(n), *lines)
+
+
+def _lanes(odr: OpenDrive, table: RoadTable, graph: LaneGraph) -> tuple[LaneElement, ...]:
+    own = graph.lanes
+    rows = np.array([table.lane_index[key] for key in own.keys], dtype=np.int64)
+    lines = _polylines(table, rows, table.lane_s0[rows], table.lane_s1[rows])
+    entries, exits = _links(graph)
+    row_of = {key: row for row, key in enumerate(own.keys)}
+    found = []
+    for row, key in enumerate(own.keys):
+        part = slice(int(lines.start[row]), int(lines.start[row + 1]))
+        turned = 1 if own.forward[row] else -1
+        centre, inner, outer = (
+            line[part][::turned] for line in (lines.centre, lines.inner, lines.outer)
+        )
+        # The inner border is on the left of a lane with negative id that runs with s.
+        keeps_right = (key.lane < 0) == (turned > 0)
+        left, right = (inner, outer) if keeps_right else (outer, inner)
+        nodes = slice(int(own.first_node[row]), int(own.first_node[row + 1]))
+        middle = (nodes.start + nodes.stop) // 2
+        change = int(graph.lane_change[middle])
+        found.append(
+            LaneElement(
+                key=str(key),
+                kind=own.types[row],
+                road_type=next((kind.type for kind in odr.roads[key.road].types), ""),
+                junction=own.junctions[row] or "",
+                centre=centre,
+                left=left,
+                right=right,
+                speed_limit=float(graph.speed_limit[middle]),
+                entries=entries[row],
+                exits=exits[row],
+                left_lane=_usual(graph.left_lane[nodes]),
+                right_lane=_usual(graph.right_lane[nodes]),
+                opposite=_opposite(key, row, row_of, graph),
+                keeps_right=keeps_right,
+                change_left=bool(change & CHANGE_LEFT),
+                change_right=bool(change & CHANGE_RIGHT),
+            )
+        )
+    return tuple(found)
+
+
+def _links(graph: LaneGraph) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
+    """Rows of the lanes before and behind each lane, sorted."""
+    on = graph.relation == Relation.SUCCESSOR
+    source, target = graph.lane[graph.source[on]], graph.lane[graph.target[on]]
+    # An edge within a lane leads to its next node; one from its last to its first is a closed loop.
+    passed = (source != target) | (graph.target[on] <= graph.source[on])
+    pairs = sorted(set(zip(source[passed].tolist(), target[passed].tolist(), strict=True)))
+    entries: list[list[int]] = [[] for _ in graph.lanes.keys]
+    exits: list[list[int]] = [[] for _ in graph.lanes.keys]
+    for before, after in pairs:
+        exits[before].append(after)
+        entries[after].append(before)
+    return [tuple(sorted(one)) for one in entries], [tuple(one) for one in exits]
+
+
+def _usual(lanes: IntArray | np.ndarray[tuple[int], np.dtype[np.int32]]) -> int:
+    """Neighbour beside most nodes of a lane, or -1."""
+    there, count = np.unique(lanes[lanes >= 0], return_counts=True)
+    return int(there[np.argmax(count)]) if len(there) else -1
+
+
+def _opposite(key: LaneKey, row: int, row_of: dict[LaneKey, int], graph: LaneGraph) -> int:
+    if abs(key.lane) != 1:
+        return -1
+    other = row_of.get(LaneKey(key.road, key.section, -key.lane), -1)
+    against = other >= 0 and graph.lanes.forward[other] != graph.lanes.forward[row]
+    return other if against else -1
+
+
+class _MarkedStretch(NamedTuple):
+    """A marking along a lane's outer border, or along the inner one of a lane at the centre."""
+
+    row: int
+    inner: bool
+    s0: float
+    s1: float
+    kind: str
+    color: str
+
+
+def _lines(odr: OpenDrive, table: RoadTable) -> Iterator[LineElement]:
+    stretches = [
+        one
+        for road in odr.roads.values()
+        for index, section in enumerate(road.sections)
+        for one in _stretches(table, road.id, index, section)
+    ]
+    rows = np.array([one.row for one in stretches], dtype=np.int64)
+    s0 = np.array([one.s0 for one in stretches])
+    s1 = np.array([one.s1 for one in stretches])
+    lines = _polylines(table, rows, s0, s1)
+    for k, one in enumerate(stretches):
+        points = (lines.inner if one.inner else lines.outer)[lines.start[k] : lines.start[k + 1]]
+        yield LineElement(one.kind, one.color, points)
+
+
+def _stretches(
+    table: RoadTable, road: RoadId, index: int, section: LaneSection
+) -> Iterator[_MarkedStretch]:
+    for number, lane in section.lanes.items():
+        beside = number or next((one for one in (-1, 1) if one in section.lanes), 0)
+        if not beside:
+            continue
+        row = table.lane_index[LaneKey(road, index, beside)]
+        for mark, s0, s1 in _intervals(lane.road_marks, section):
+            if mark.type not in _UNPAINTED and s1 - s0 >= _SHORTEST:
+                color = "white" if mark.color in {"standard", ""} else mark.color
+                yield _MarkedStretch(row, not number, s0, s1, mark.type, color)
+
+
+def _intervals(
+    marks: Sequence[RoadMark], section: LaneSection
+) -> Iterator[tuple[RoadMark, float, float]]:
+    ends = [*(mark.s for mark in marks[1:]), section.s_end]
+    for mark, end in zip(marks, ends, strict=False):
+        yield mark, max(mark.s, section.s), min(end, section.s_end)

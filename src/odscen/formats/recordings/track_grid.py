@@ -1,0 +1,148 @@
+"""Trajectories on a clock of equal steps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.base.errors import InputError
+from odscen.formats.recordings.ground_heights import ground_heights
+from odscen.formats.recordings.run_recording import STEP, Tracks
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from odscen.base.arrays import BoolArray, FloatArray
+    from odscen.formats.exporter import ExportSource, WhatHappened
+    from odscen.records.run_plan import PlannedActor
+
+MOST_STATES = 20_000_000
+"""Road users times instants; a state takes about 50 bytes of memory."""
+_SAME = 1e-6
+"""Seconds by which a record may miss an instant and still be of it."""
+_LEAP = 2.0
+"""A road user that gets this many times farther than at its speed was moved, and not driven."""
+_LEEWAY = 2.0
+"""Metres that are no leap at any speed."""
+
+
+class ExportWindow(NamedTuple):
+    """Part of a run, s; ``None`` is its first, or last, record."""
+
+    begin: float | None = None
+    end: float | None = None
+
+
+def instants(happened: WhatHappened, window: ExportWindow) -> FloatArray:
+    """Seconds of a recording, whole multiples of its step.
+
+    Raises
+    ------
+    InputError
+        If no road user was there in the window.
+    """
+    times = happened.rows["time"]
+    if not len(times):
+        raise InputError("no road users were in the simulation, so there is nothing to export")
+    first, last = float(times.min()), float(times.max())  # type: ignore[arg-type]
+    begin = first if window.begin is None else max(first, window.begin)
+    end = last if window.end is None else min(last, window.end)
+    low, high = int(np.ceil(begin / STEP - _SAME)), int(np.floor(end / STEP + _SAME))
+    if high < low:
+        raise InputError(
+            f"the window has no instant: the run was recorded from {first:g} to {last:g} s"
+        )
+    return np.round(np.arange(low, high + 1) * STEP, 6)
+
+
+def tracks_of(source: ExportSource, happened: WhatHappened, times: FloatArray) -> Tracks:
+    """Road users at each instant.
+
+    Raises
+    ------
+    InputError
+        If there are no road users at any of them, or there are too many.
+    """
+    import polars as pl
+
+    margin = happened.step + _SAME
+    rows = happened.rows.filter(pl.col("time").is_between(times[0] - margin, times[-1] + margin))
+    lengths = {user.id: user.length for user in happened.users}
+    if "z" not in rows.columns:
+        rows = rows.with_columns(z=ground_heights(source.sumo_map, rows, lengths))
+    own = {str(name): part for (name,), part in rows.group_by("id", maintain_order=True)}
+    users = [user for user in happened.users if user.id in own]
+    if len(users) * len(times) > MOST_STATES:
+        raise InputError(
+            f"{len(users)} road users at {len(times)} instants are more than {MOST_STATES:,} "
+            "states; choose a part of the run with --begin and --end"
+        )
+    found = [_on_grid(own[user.id], times, happened.step) for user in users]
+    there = [k for k, one in enumerate(found) if one.valid.any()]
+    if not there:
+        raise InputError(
+            f"no road users were in the simulation from {times[0]:g} to {times[-1]:g} s"
+        )
+    users, found = [users[k] for k in there], [found[k] for k in there]
+    return Tracks(
+        ids=tuple(user.id for user in users),
+        categories=tuple(str(user.category) for user in users),
+        ego=next((row for row, user in enumerate(users) if user.ego), -1),
+        length=np.array([user.length for user in users]),
+        width=np.array([user.width for user in users]),
+        height=np.array([_height(source, user) for user in users]),
+        valid=np.stack([one.valid for one in found]),
+        x=np.stack([one.x for one in found]),
+        y=np.stack([one.y for one in found]),
+        z=np.stack([one.z for one in found]),
+        hdg=np.stack([one.hdg for one in found]),
+        speed=np.stack([one.speed for one in found]),
+    )
+
+
+def _height(source: ExportSource, user: PlannedActor) -> float:
+    known = None if user.model is None else source.assets.dimensions(user.model)
+    return (known or DEFAULT_BODY[Category(user.category)]).height
+
+
+class _Track(NamedTuple):
+    valid: BoolArray
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    hdg: FloatArray
+    speed: FloatArray
+
+
+def _on_grid(rows: pl.DataFrame, times: FloatArray, step: float) -> _Track:
+    """States of one road user; what lies between two records that belong together is linear."""
+    at = rows["time"].to_numpy()
+    x, y, z, hdg, speed = (
+        rows[name].cast(float).to_numpy() for name in ("x", "y", "z", "hdg", "speed")
+    )
+    after = np.clip(np.searchsorted(at, times - _SAME), 0, len(at) - 1)
+    before = np.maximum(after - 1, 0)
+    exact = np.abs(at[after] - times) <= _SAME
+    before = np.where(exact, after, before)
+    gap = at[after] - at[before]
+    moved = np.hypot(x[after] - x[before], y[after] - y[before])
+    usual = np.maximum(speed[after], speed[before]) * gap
+    driven = (gap > 0) & (gap <= 1.5 * step) & (moved <= _LEAP * usual + _LEEWAY)
+    valid = exact | (driven & (at[before] < times) & (times < at[after]))
+    share = np.where(exact | (gap <= 0), 0.0, (times - at[before]) / np.where(gap > 0, gap, 1.0))
+    turn = np.remainder(hdg[after] - hdg[before] + np.pi, 2.0 * np.pi) - np.pi
+
+    def between(values: FloatArray) -> FloatArray:
+        return np.where(valid, values[before] + share * (values[after] - values[before]), 0.0)
+
+    turned = np.remainder(hdg[before] + share * turn + np.pi, 2.0 * np.pi) - np.pi
+    return _Track(
+        valid,
+        between(x),
+        between(y),
+        between(np.nan_to_num(z)),
+        np.where(valid, turned, 0.0),
+        between(speed),
+    )

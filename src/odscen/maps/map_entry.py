@@ -1,0 +1,236 @@
+"""One map of the catalogue: what its folder holds, and lazy access to it."""
+
+from __future__ import annotations
+
+import json
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.checksums import (
+    damaged_files,
+    read_checked,
+    read_sums,
+    refuse_damaged,
+    say_unchecked,
+)
+from odscen.base.errors import DamagedError, DamagedFile, in_file
+from odscen.convert.model.conversion_settings import ConversionSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    import networkx as nx
+
+    from odscen.convert.lane_table.table import LaneTable
+    from odscen.convert.model.conversion_settings import ConverterName
+    from odscen.convert.verify.fidelity_result import Fidelity
+    from odscen.drawing.map_drawing import MapDrawing
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.lanegraph.map_statistics import MapStatistics
+    from odscen.maps.converters import GivenNetwork
+
+INFO_FILE = "map.json"
+XODR_FILE = "map.xodr"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapEntry:
+    """One map of the catalogue: its folder, and lazy access to what was built.
+
+    Attributes
+    ----------
+    name
+        In the catalogue.
+    folder
+        With all files.
+    info
+        As in ``map.json``: hash, settings, statistics, names of the files, import report.
+    """
+
+    name: str
+    folder: Path
+    info: dict[str, Any]
+
+    def __eq__(self, other: object) -> bool:
+        """Equal if it is the same build of the same map."""
+        return isinstance(other, MapEntry) and self._key == other._key
+
+    def __hash__(self) -> int:
+        """Hash of the same."""
+        return hash(self._key)
+
+    @property
+    def _key(self) -> tuple[Path, str, float, str, str]:
+        return self.folder, self.sha256, self.info["spacing"], self.info["builder"], self.net_sha256
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the .xodr, hexadecimal."""
+        return str(self.info["sha256"])
+
+    @property
+    def conversion(self) -> ConversionSettings:
+        """How it was converted."""
+        return ConversionSettings(spacing=float(self.info["spacing"]), converter=self.converter)
+
+    @property
+    def converter(self) -> ConverterName:
+        """Who wrote its SUMO network."""
+        name: ConverterName = self.info.get("network", {}).get("converter", "odscen")
+        return name
+
+    @property
+    def net_sha256(self) -> str:
+        """SHA-256 of its SUMO network, hexadecimal."""
+        return str(self.info.get("network", {}).get("sha256", ""))
+
+    def path(self, key: str) -> Path:
+        """Absolute path of one of the files named in ``map.json``, for example ``"net"``."""
+        return self.folder / str(self.info["files"][key])
+
+    def read(self, key: str) -> bytes:
+        """Content of one of its files.
+
+        Raises
+        ------
+        DamagedError
+            If it is not as it was written.
+        """
+        name = str(self.info["files"][key])
+        with repair_advice(self.name):
+            return read_checked(self.folder, name, self._sums())
+
+    def checked(self, key: str) -> Path:
+        """Path of one of its files, for others to read; errors as of :meth:`read`."""
+        name = str(self.info["files"][key])
+        with repair_advice(self.name):
+            if name in (sums := self._sums()):
+                refuse_damaged(self.folder, {name: sums[name]})
+        return self.path(key)
+
+    def damaged(self) -> list[DamagedFile]:
+        """Its files that are not as they were written."""
+        try:
+            return damaged_files(self.folder, self._sums())
+        except DamagedError as error:
+            return list(error.files)
+
+    def _sums(self) -> dict[str, str]:
+        """Checksums of its files; of a map by an earlier version only those it knows itself."""
+        sums = read_sums(self.folder)
+        if sums is None:
+            say_unchecked(self.folder)
+            files = self.info["files"]
+            known = {files["xodr"]: self.sha256, files["net"]: self.net_sha256}
+            return {name: one for name, one in known.items() if one}
+        return sums
+
+    def graph(self) -> MapGraph:
+        """Lane graph, segments and pedestrian graph."""
+        from odscen.lanegraph.graph_files import from_npz_bytes
+
+        return from_npz_bytes(self.read("graph_npz"))
+
+    def networkx(self) -> tuple[nx.MultiDiGraph, nx.Graph]:
+        """Lane graph and pedestrian graph, see :func:`odscen.lanegraph.networkx_form.to_networkx`.
+
+        Returns
+        -------
+        tuple
+            The lane graph: nodes are named ``road.section.lane.index`` and have ``x``, ``y``,
+            ``z`` (m, OpenDRIVE frame), ``hdg`` (rad), ``width`` (m), ``speed_limit`` (m/s),
+            ``segment``; edges have ``relation`` (successor, left, right) and ``length`` (m). Then
+            the pedestrian graph, undirected.
+        """
+        from odscen.lanegraph.networkx_form import to_networkx
+
+        return to_networkx(self.graph())
+
+    def given(self) -> GivenNetwork:
+        """Its SUMO network, as it can be given to another build of the map."""
+        from odscen.maps.converters import GivenNetwork
+
+        return GivenNetwork(self.read("net"), str(self.info["network"]["source"]))
+
+    def lane_table(self) -> LaneTable:
+        """The table between OpenDRIVE lanes and SUMO lanes."""
+        from odscen.convert.lane_table.table_json import table_from_json
+
+        return table_from_json(self.read("lane_table"))
+
+    def drawing(self) -> MapDrawing:
+        """What is drawn of the map."""
+        from odscen.drawing.map_drawing import MapDrawing
+
+        return MapDrawing.from_json(self.read("drawing"))
+
+    def fidelity(self) -> Fidelity:
+        """How faithfully the SUMO network follows the map, measured from both files anew."""
+        from odscen.convert.verify.fidelity import verify
+        from odscen.opendrive.lanes import RoadTable
+        from odscen.opendrive.parse import parse
+
+        odr = parse(self.read("xodr"), file=self.path("xodr").name)
+        with in_file(self.path("net").name):
+            return verify(self.read("net"), odr, RoadTable.of(odr))
+
+    def statistics(self) -> MapStatistics:
+        """Figures of the map."""
+        from odscen.lanegraph.map_statistics import MapStatistics
+
+        values = self.info["statistics"]
+        return MapStatistics(**{**values, "bounds": tuple(values["bounds"])})
+
+
+@dataclass(frozen=True, slots=True)
+class BrokenMap:
+    """A map of the catalogue that cannot be used: its name, and why."""
+
+    name: str
+    problem: str
+
+
+_NEEDED = {"sha256": str, "spacing": int | float, "builder": str, "files": dict, "statistics": dict}
+"""Fields of ``map.json`` without which nothing else can be said of a map, and their types."""
+
+
+def read_entry(folder: Path) -> MapEntry:
+    """Read what ``map.json`` says of a map.
+
+    Raises
+    ------
+    DamagedError
+        If it cannot be believed.
+    """
+    with repair_advice(folder.name):
+        content = read_checked(folder, INFO_FILE, read_sums(folder))
+        try:
+            info = json.loads(content)
+            if all(isinstance(info[key], kind) for key, kind in _NEEDED.items()):
+                return MapEntry(folder.name, folder, info)
+            problem = "something else"
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            problem = f"{type(error).__name__}: {error}"
+        wrong = DamagedFile(INFO_FILE, "what is said of a map", problem)
+        raise DamagedError(str(folder), [wrong])
+
+
+@contextmanager
+def repair_advice(name: str) -> Iterator[None]:
+    """Add to what is found damaged in a map how to get it back.
+
+    Raises
+    ------
+    DamagedError
+        The same, with advice.
+    """
+    try:
+        yield
+    except DamagedError as error:
+        raise DamagedError(
+            str(error.file),
+            error.files,
+            advice=f"odscen doctor --repair builds map {name!r} anew, as does adding it again",
+        ) from error

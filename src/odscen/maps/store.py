@@ -1,0 +1,386 @@
+"""The workspace: maps, scenarios and runs on disk.
+
+A map is built once (requirement R7) into a folder of its own; the folder is written beside the
+final place and renamed into it, so that a half-written map is never visible. Names are checked
+before they become paths.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from odscen.base.atomic_folders import clear_leftovers, new_folder
+from odscen.base.checksums import digest, sums_of, write_sums
+from odscen.base.errors import DamagedError, InputError, NotFoundError, OdscenError, in_file
+from odscen.base.folder_locks import locked
+from odscen.base.given_files import read_given
+from odscen.base.shown import printable
+from odscen.base.system_errors import disk_errors
+from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
+from odscen.maps.allowances import BY_SIZE
+from odscen.maps.asset_catalogue import assets_in
+from odscen.maps.folder_names import check_name, is_name, name_from_file
+from odscen.maps.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
+from odscen.maps.map_files import read_map_file
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from odscen.maps.allowances import BuildLimits
+    from odscen.maps.asset_catalogue import Assets
+    from odscen.maps.converters import GivenNetwork
+
+BUILDER = "12"
+"""Raised whenever what a map folder contains changes; older folders are rebuilt when opened."""
+
+ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"
+
+PATIENCE = 600.0
+"""Wall seconds to wait for another process that builds the same map."""
+
+ProgressCallback = Callable[[str, float], None]
+"""Called with what is being done and the share done, 0 to 1, again and again while nothing changes
+too. What it raises ends the work, and nothing is left of it."""
+
+
+def is_outdated(entry: MapEntry) -> bool:
+    """Whether an older odscen has built a map, so that it is rebuilt when it is opened."""
+    return bool(entry.info["builder"] != BUILDER)
+
+
+@dataclass(frozen=True, slots=True)
+class Workspace:
+    """A folder with ``maps/``, ``scenarios/`` and ``runs/``, and more as needed.
+
+    Attributes
+    ----------
+    root
+        The folder.
+
+    Examples
+    --------
+    >>> workspace = Workspace.open(Path("my-workspace"))
+    >>> workspace.add_map(Path("Town01.xodr")).name
+    'Town01'
+    """
+
+    root: Path
+
+    @classmethod
+    def open(cls, root: Path | None = None) -> Workspace:
+        """Open the workspace at ``root``, else ``$ODSCEN_WORKSPACE``, else the user's data folder.
+
+        Raises
+        ------
+        WorkspaceError
+            If it cannot be created or written.
+        """
+        if root is None:
+            given = os.environ.get(ENVIRONMENT_VARIABLE)
+            if given:
+                root = Path(given)
+            else:
+                from platformdirs import user_data_path
+
+                root = user_data_path("odscen", appauthor=False)
+        root = root.expanduser().absolute()
+        with _workspace_errors(root):
+            (root / "maps").mkdir(parents=True, exist_ok=True)
+        for folder in (root / "maps", root / "runs"):
+            clear_leftovers(folder)
+        return cls(root)
+
+    @property
+    def scenarios(self) -> Path:
+        """Folder that scenarios are written to by default."""
+        return self.root / "scenarios"
+
+    @property
+    def assets_folder(self) -> Path:
+        """Folder of models that were fetched from a simulator."""
+        return self.root / "assets"
+
+    def assets(self) -> Assets:
+        """Models and weather: those fetched into this workspace, else those that ship."""
+        return assets_in(self.assets_folder)
+
+    @property
+    def runs(self) -> Path:
+        """Folder that runs are written to by default."""
+        return self.root / "runs"
+
+    @property
+    def sweeps(self) -> Path:
+        """Folder of sweeps that were started in the page."""
+        return self.root / "sweeps"
+
+    @property
+    def studies(self) -> Path:
+        """Folder of studies that were started in the page."""
+        return self.root / "studies"
+
+    def map_names(self) -> list[str]:
+        """Names of all maps, sorted; some may be broken, see :meth:`catalogue`."""
+        return sorted(name for name in self._map_folders() if self._is_map(name))
+
+    def _map_folders(self) -> list[str]:
+        return [folder.name for folder in (self.root / "maps").iterdir()]
+
+    def _is_map(self, name: str) -> bool:
+        folder = self.root / "maps" / name
+        files = (INFO_FILE, XODR_FILE)
+        return is_name(name) and any((folder / one).is_file() for one in files)
+
+    def _has(self, name: str) -> bool:
+        """Whether there is such a map; asked for each run of many, and does not look at others."""
+        return name in self._map_folders() and self._is_map(name)
+
+    def maps(self) -> list[MapEntry]:
+        """All maps that can be used, as :meth:`stored` gives them, sorted by name."""
+        return self.catalogue()[0]
+
+    def catalogue(self) -> tuple[list[MapEntry], list[BrokenMap]]:
+        """All maps, sorted by name: those that can be used, and those that cannot, with why.
+
+        They are as :meth:`stored` gives them: listing builds nothing.
+        """
+        entries, broken = [], []
+        for name in self.map_names():
+            try:
+                entries.append(self.stored(name))
+            except OdscenError as error:
+                broken.append(BrokenMap(name, str(error)))
+        return entries, broken
+
+    def first_map(self, fits: Callable[[MapEntry], bool]) -> MapEntry | None:
+        """Open the first map by name that fits, as it is stored, and is not damaged."""
+        for one in self.maps():
+            if fits(one):
+                with suppress(DamagedError):
+                    return self.map(one.name)
+        return None
+
+    def stored(self, name: str) -> MapEntry:
+        """One map by name as it is stored: to be listed or compared, as it may be outdated.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        DamagedError
+            If it is broken.
+        """
+        if not self._has(name):
+            raise NotFoundError("map", name, self.map_names())
+        return read_entry(self.root / "maps" / name)
+
+    def map(self, name: str) -> MapEntry:
+        """Open one map by name; rebuilt first if an older odscen has built it.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        DamagedError
+            If it is broken.
+        OdscenError
+            If it is outdated and cannot be rebuilt, as of :meth:`add_map`.
+        """
+        entry = self.stored(name)
+        if not is_outdated(entry):
+            return entry
+        content, file = entry.read("xodr"), str(entry.info["source"])
+        return self.add_map_content(content, file=file, name=name, settings=entry.conversion)
+
+    def map_for(self, name: str, sha256: str) -> MapEntry:
+        """Map that a scenario refers to: of the same content, and of the same name if it can be.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no map of that name and none with that content.
+        InputError
+            If the map of that name has other content.
+        """
+        broken: OdscenError | None = None
+        if self._has(name):
+            try:
+                entry = self.map(name)
+            except DamagedError as error:
+                broken = error
+            else:
+                if entry.sha256 == sha256:
+                    return entry
+        other = self.first_map(lambda one: one.sha256 == sha256)
+        if other is not None:
+            return other
+        if broken is not None:
+            raise broken
+        if not self._has(name):
+            raise NotFoundError("map", name, self.map_names())
+        raise InputError(
+            f"map {name!r} in {self.root} has other content (sha256 {entry.sha256[:12]}...) "
+            f"than the one the scenario was made on ({sha256[:12]}...); "
+            "add that .xodr under another name"
+        )
+
+    def add_map(
+        self,
+        source: Path,
+        *,
+        name: str | None = None,
+        settings: ConversionSettings = USUAL,
+        limits: BuildLimits = BY_SIZE,
+        progress: ProgressCallback | None = None,
+    ) -> MapEntry:
+        """Build everything that later steps need from an OpenDRIVE file, once.
+
+        A map of the same name is replaced if the file, the settings or the builder differ, and left
+        as it is otherwise. A network that was brought in for it stays, unless the file is another
+        one or the settings name a converter. The work is done in a child process.
+
+        Parameters
+        ----------
+        source
+            The .xodr file.
+        name
+            Name in the catalogue; the file's stem if not given.
+        settings
+            How it is converted.
+        limits
+            What that may use.
+
+        Raises
+        ------
+        InputError
+            If the name, the spacing or the file cannot be used; names file, element and value.
+        LimitError
+            If the map needs more memory or time than it may have.
+        ToolError
+            If netconvert cannot convert the map.
+        WorkspaceError
+            If the workspace cannot be written.
+        """
+        name = check_name(name_from_file(source) if name is None else name)
+        return self.add_map_content(
+            read_map_file(source),
+            file=source.name,
+            name=name,
+            settings=settings,
+            limits=limits,
+            progress=progress,
+        )
+
+    def add_map_content(
+        self,
+        content: bytes,
+        *,
+        file: str,
+        name: str,
+        settings: ConversionSettings = USUAL,
+        limits: BuildLimits = BY_SIZE,
+        progress: ProgressCallback | None = None,
+    ) -> MapEntry:
+        """Build a map as :meth:`add_map` does, from the text of a file of that name."""
+        name, file = check_name(name), printable(file)
+        final = self.root / "maps" / name
+        with _workspace_errors(self.root), self._lock(name):
+            built = _whole(final)
+            same = built if built and built.sha256 == digest(content) else None
+            if settings.converter is None:
+                settings = replace(settings, converter=same.converter if same else "odscen")
+            if same and same.conversion == settings and not is_outdated(same):
+                return same
+            kept = same is not None and same.converter == settings.converter == "file"
+            given = same.given() if same and kept else None
+            return self._built(name, content, file, settings, given, limits, progress)
+
+    def set_network(
+        self,
+        name: str,
+        source: Path,
+        *,
+        limits: BuildLimits = BY_SIZE,
+        progress: ProgressCallback | None = None,
+    ) -> MapEntry:
+        """Make a SUMO network from outside that of a map; the lane table is made anew by geometry.
+
+        Parameters
+        ----------
+        name
+            Of the map.
+        source
+            The ``.net.xml``: the map's own after changes in netedit, or any other of this map.
+        limits
+            What building the map may use.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        InputError
+            If the file cannot be read, is no network, or none of this map; the map stays as it is.
+        LimitError
+            If it needs more memory or time than it may have.
+        WorkspaceError
+            If the workspace cannot be written.
+        """
+        from odscen.maps.converters import GivenNetwork
+
+        entry = self.map(name)
+        given = GivenNetwork(read_given(source), source.name)
+        settings = replace(entry.conversion, converter="file")
+        content, file = entry.read("xodr"), str(entry.info["source"])
+        with _workspace_errors(self.root), self._lock(name):
+            return self._built(name, content, file, settings, given, limits, progress)
+
+    def _lock(self, name: str) -> AbstractContextManager[int]:
+        """Hold the lock of a map; another process that builds it is waited for."""
+        return locked(self.root / "maps" / name, what=f"map {name!r}", patience=PATIENCE)
+
+    def _built(
+        self,
+        name: str,
+        content: bytes,
+        file: str,
+        settings: ConversionSettings,
+        given: GivenNetwork | None,
+        limits: BuildLimits,
+        progress: ProgressCallback | None,
+    ) -> MapEntry:
+        from odscen.maps.guarded_build import build_in_child
+
+        final, sha256 = self.root / "maps" / name, digest(content)
+        with in_file(file), new_folder(final) as folder:
+            build_in_child(
+                content,
+                folder,
+                name=name,
+                file=file,
+                settings=settings,
+                builder=BUILDER,
+                given=given,
+                limits=limits,
+                progress=progress,
+            )
+            write_sums(folder, sums_of(folder, known={XODR_FILE: sha256}))
+            info = read_entry(folder).info
+        return MapEntry(name, final, info)
+
+
+def _whole(folder: Path) -> MapEntry | None:
+    """A map that is there with all of its files as they were written, else ``None``."""
+    try:
+        entry = read_entry(folder)
+    except DamagedError:
+        return None
+    return None if entry.damaged() else entry
+
+
+def _workspace_errors(root: Path) -> AbstractContextManager[None]:
+    return disk_errors(f"workspace {root}")

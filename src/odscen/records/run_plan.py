@@ -1,0 +1,251 @@
+"""What a run is planned to do: the value that passes from preparation to run, figures and report.
+
+A :class:`Plan` is written beside the SUMO files, so that a run can be judged, and repeated, from
+its folder alone. Poses are body centres in the OpenDRIVE frame; metres, radians, seconds, m/s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from odscen.base.stored_files import stored_document, typed_rows
+from odscen.records.planned_stations import PlannedStation
+from odscen.records.row_text import (
+    VERSION,
+    field_defaults,
+    json_with_rows,
+    without_defaults,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+_Row = TypeVar("_Row")
+
+PLAN_FORMAT = "odscen-plan"
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedActor:
+    """One road user that the run is to insert; those of flows are listed one by one.
+
+    Attributes
+    ----------
+    id
+        Id in SUMO: the actor's id, or ``<flow>.<k>``.
+    x, y, z, hdg
+        Body centre at departure, lateral offset included, OpenDRIVE frame.
+    speed
+        Desired speed, ``None`` for the limit.
+    speed_factor
+        Drawn for this actor; multiplies the speed limit (vehicles) or the walking speed.
+    route_length
+        Metres from the spawn node to the goal along the lane graph.
+    free_flow_time
+        Seconds of the route at the desired speed without other traffic; ``None`` if unknown.
+    flow
+        Id of the flow it belongs to, if any.
+    problem
+        Why it is not in the SUMO files, if it is not.
+    informed
+        Whether it looks for quicker routes on the way.
+    begins_in, ends_in
+        Parking areas of its trip: ``depart`` is when it is to leave its place, and it has arrived
+        when it takes one.
+    appears
+        Whether a rule lets it appear; until then it is not due, and ``depart`` is the run's end.
+    """
+
+    id: str
+    category: str
+    spawn: str
+    goal: str | None
+    depart: float
+    length: float
+    width: float
+    x: float
+    y: float
+    z: float
+    hdg: float
+    speed: float | None = None
+    speed_factor: float = 1.0
+    route_length: float | None = None
+    free_flow_time: float | None = None
+    model: str | None = None
+    flow: str | None = None
+    ego: bool = False
+    problem: str | None = None
+    informed: bool = False
+    begins_in: str | None = None
+    ends_in: str | None = None
+    appears: bool = False
+
+    @property
+    def person(self) -> bool:
+        """Whether SUMO runs it as a person."""
+        return self.category == "pedestrian"
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMeasure:
+    """A measure of the scenario as reports tell it; ``end`` is at most the end of the run.
+
+    ``lines`` are the centre lines of its lanes, x and y in turn, or one place.
+    """
+
+    id: str
+    kind: str
+    words: str
+    begin: float
+    end: float
+    lines: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedParking:
+    """A parking area: its segment, how many places it has, and where its middle is, metres."""
+
+    id: str
+    segment: str
+    places: int
+    x: float
+    y: float
+
+
+def begin_area(area: str) -> str:
+    """Id by which SUMO knows the places of a parking area that trips begin in."""
+    return f"{area}.begin"
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedPeriod:
+    """From ``begin`` to ``end`` (s) vehicles of ``vclass`` cannot pass between these edges."""
+
+    begin: float
+    end: float
+    vclass: str
+    pairs: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a run is to do.
+
+    Attributes
+    ----------
+    until, step_length
+        Seconds.
+    net_offset
+        What is added to OpenDRIVE x and y to give SUMO's.
+    elevation
+        Whether the network has heights.
+    slice_length
+        Seconds after which the state is saved and the run goes on from what was saved; ``None``
+        for a run in one piece.
+    trajectories
+        Whether they are recorded.
+    measures
+        Of the scenario, by begin.
+    closed
+        What they close, by begin: who would pass there must find another route.
+    warm_up, interval
+        What of the run is analysed, s.
+    clock
+        Time of day at its start, s after midnight; 0 if the scenario has none.
+    stations
+        Of its study.
+    parking
+        Areas, where trips park.
+    criteria
+        Of the scenario: what must come out for the run to pass.
+    """
+
+    scenario: str
+    seed: int
+    until: float
+    step_length: float
+    net_offset: tuple[float, float]
+    actors: tuple[PlannedActor, ...]
+    elevation: bool = False
+    slice_length: float | None = None
+    trajectories: bool = True
+    measures: tuple[PlannedMeasure, ...] = ()
+    closed: tuple[ClosedPeriod, ...] = ()
+    warm_up: float = 0.0
+    interval: float | None = None
+    clock: float = 0.0
+    stations: tuple[PlannedStation, ...] = ()
+    parking: tuple[PlannedParking, ...] = ()
+    criteria: tuple[str, ...] = ()
+
+    def to_json(self) -> str:
+        """One actor per line; the same plan gives the same text."""
+        head: dict[str, Any] = {
+            "format": PLAN_FORMAT,
+            "version": VERSION,
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "until": self.until,
+            "step_length": self.step_length,
+            "net_offset": list(self.net_offset),
+            "elevation": self.elevation,
+            "slice_length": self.slice_length,
+            "trajectories": self.trajectories,
+        }
+        if self.measures:
+            head["measures"] = [asdict(one) for one in self.measures]
+            head["closed"] = [asdict(one) for one in self.closed]
+        said: dict[str, Any] = {
+            "warm_up": self.warm_up,
+            "interval": self.interval,
+            "clock": self.clock,
+        }
+        said["stations"] = [asdict(one) for one in self.stations]
+        said["parking"] = [asdict(one) for one in self.parking]
+        said["criteria"] = list(self.criteria)
+        head |= {name: value for name, value in said.items() if value}
+        return json_with_rows(
+            head, "actors", [without_defaults(actor, _DEFAULTS) for actor in self.actors]
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> Plan:
+        """Inverse of :meth:`to_json`.
+
+        Raises
+        ------
+        InputError
+            If it is not a plan of this version.
+        """
+        with stored_document(
+            text, form=PLAN_FORMAT, version=VERSION, what="a plan of a run"
+        ) as data:
+            x, y = data["net_offset"]
+            data["net_offset"] = (float(x), float(y))
+            data["actors"] = tuple(map(_PLANNED_ACTOR, data["actors"]))
+            data["measures"] = _nested(_PLANNED_MEASURE, data.get("measures", ()), "lines")
+            data["closed"] = _nested(_CLOSED_PERIOD, data.get("closed", ()), "pairs")
+            data["stations"] = tuple(map(PlannedStation.from_dict, data.get("stations", ())))
+            data["parking"] = tuple(map(_PLANNED_PARKING, data.get("parking", ())))
+            data["criteria"] = tuple(data.get("criteria", ()))
+            return _PLAN({key: data[key] for key in data.keys() - {"format", "version"}})
+
+
+def _nested(
+    make: Callable[[Mapping[str, Any]], _Row], rows: Iterable[Mapping[str, Any]], name: str
+) -> tuple[_Row, ...]:
+    """Make rows of which one field has tuples of tuples."""
+    return tuple(make({**row, name: tuple(map(tuple, row[name]))}) for row in rows)
+
+
+_PLANNED_ACTOR = typed_rows(PlannedActor)
+
+_PLANNED_MEASURE = typed_rows(PlannedMeasure)
+
+_PLANNED_PARKING = typed_rows(PlannedParking)
+
+_CLOSED_PERIOD = typed_rows(ClosedPeriod)
+
+_PLAN = typed_rows(Plan)
+_DEFAULTS = field_defaults(PlannedActor)

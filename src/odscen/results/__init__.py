@@ -1,1 +1,0 @@
-"""From trajectories and events to figures and a report."""

@@ -1,0 +1,54 @@
+"""What verdicts on a run are made of, read from its folder."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.figures.judging.actor_measures import RunRecords
+from odscen.figures.measures.summary import actors_from_json
+from odscen.records.run_events import events_from_json
+from odscen.runs import layout
+from odscen.runs.recorded import read_conflicts, trajectory_files
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import polars as pl
+
+
+def read_judged(folder: Path) -> RunRecords:
+    """Read outcomes, events and conflicts; speeds are read when they are asked for.
+
+    Raises
+    ------
+    OSError
+        If the run failed before it had any.
+    """
+    return RunRecords(
+        actors_from_json((folder / layout.ACTORS_FILE).read_text(encoding="utf-8")),
+        events_from_json((folder / layout.EVENTS_FILE).read_text(encoding="utf-8")),
+        read_conflicts(folder),
+        lambda actor: _speeds(folder, actor),
+    )
+
+
+def _speeds(folder: Path, actor: str) -> pl.DataFrame | None:
+    import polars as pl
+
+    files = trajectory_files(folder)
+    if not files:
+        return None
+    table = pl.scan_parquet(files)
+    named = table.collect_schema().names()
+    for kind in ("vehicle", "person"):
+        if f"{kind}_speed" not in named:
+            continue
+        found = (
+            table.filter(pl.col(f"{kind}_id") == actor)
+            .select(time="timestep_time", speed=f"{kind}_speed")
+            .cast(pl.Float64)
+            .collect()
+        )
+        if not found.is_empty():
+            return found
+    return None

@@ -1,0 +1,244 @@
+"""Figures of traffic of a run, from what is in its folder."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from odscen.base.stored_files import stored_document
+from odscen.figures.by_place.analysis_times import WHOLE_RUN, AnalysisTimes, on_clock
+from odscen.figures.by_place.control_delay import vehicle_passages
+from odscen.figures.by_place.facilities import (
+    FacilityData,
+    has_highways,
+    heavy_share,
+    highway_density,
+    movement_facilities,
+    passage_sums,
+)
+from odscen.figures.by_place.group_figures import group_sums
+from odscen.figures.by_place.lane_places import LanePlaces
+from odscen.figures.by_place.parking_use import ParkingUse
+from odscen.figures.by_place.queues import queue_lengths
+from odscen.figures.by_place.station_figures import station_figures
+from odscen.figures.by_place.traffic import traffic_figures
+from odscen.figures.measures.figure import RunData
+from odscen.figures.measures.signal_use import signal_use, write_signal_use
+from odscen.figures.measures.traffic_files import figures_json, write_stations, write_tables
+from odscen.records.light_programs import programs_from_json
+from odscen.records.planned_stations import PlannedStation
+from odscen.records.row_text import VERSION
+from odscen.records.run_plan import PLAN_FORMAT, Plan
+from odscen.runs import layout
+from odscen.runs.net_facts import read_net_facts
+from odscen.runs.recorded import (
+    read_conflicts,
+    read_lanes,
+    read_light_states,
+    read_stays,
+    read_trips,
+    read_visits,
+    scan_trajectories,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    import polars as pl
+
+    from odscen.figures.by_place.facilities import NetFacts
+    from odscen.figures.by_place.traffic import TrafficFigures
+    from odscen.figures.measures.summary import ActorOutcome
+    from odscen.records.light_programs import LightProgram
+
+
+def read_figures(
+    run: Path, *, end: float, meso: bool = False, times: AnalysisTimes = WHOLE_RUN
+) -> TrafficFigures | None:
+    """Figures by place and time of a run that lasted ``end`` seconds.
+
+    Parameters
+    ----------
+    meso
+        Whether it was mesoscopic: no vehicle is stopped in its trajectories, so that there are no
+        queues.
+    times
+        What is analysed of it.
+
+    Returns
+    -------
+    ``None`` if nothing was measured on lanes, or no vehicle was there.
+
+    Raises
+    ------
+    InputError
+        If the places of lanes cannot be read, or times do not fit what was measured.
+    """
+    return _figures(_Records(run, meso=meso), end=end, times=times)
+
+
+class _Records:
+    """What is in the folder of a run; each thing is read once, when it is first asked for."""
+
+    def __init__(self, run: Path, *, meso: bool) -> None:
+        self.run = run
+        self.meso = meso
+
+    @cached_property
+    def lanes(self) -> pl.DataFrame | None:
+        return read_lanes(self.run)
+
+    @cached_property
+    def places(self) -> LanePlaces | None:
+        file = self.run / layout.LANE_PLACES_FILE
+        if not file.is_file():
+            return None
+        return LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
+
+    @cached_property
+    def trajectories(self) -> pl.LazyFrame | None:
+        return scan_trajectories(self.run)
+
+    @property
+    def rows(self) -> pl.LazyFrame | None:
+        """Trajectories in which vehicles are stopped: not those of a mesoscopic run."""
+        return None if self.meso else self.trajectories
+
+    @cached_property
+    def facts(self) -> NetFacts | None:
+        return read_net_facts(self.run)
+
+    @cached_property
+    def lights(self) -> tuple[tuple[LightProgram, ...], pl.DataFrame | None]:
+        """Programs of lights and what they showed; none if the map has no lights."""
+        states, file = read_light_states(self.run), self.run / layout.LIGHTS_FILE
+        if states is None or not file.is_file():
+            return (), None
+        return programs_from_json(file.read_text(encoding="utf-8", errors="replace")), states
+
+
+def _figures(records: _Records, *, end: float, times: AnalysisTimes) -> TrafficFigures | None:
+    lanes, places, rows = records.lanes, records.places, records.rows
+    if lanes is None or places is None:
+        return None
+    clock = times.clock(lanes, end=end)
+    lanes = on_clock(lanes, clock)
+    return traffic_figures(
+        lanes,
+        places,
+        end=end,
+        queues=None if rows is None else queue_lengths(rows, places, clock),
+        facilities=_facilities(records, lanes, places, clock),
+        times=times,
+        clock=clock,
+    )
+
+
+def _facilities(
+    records: _Records, lanes: pl.DataFrame, places: LanePlaces, clock: pl.DataFrame
+) -> FacilityData | None:
+    """Kinds of facilities, control delay and density; ``None`` without the run's SUMO files."""
+    facts, rows = records.facts, records.rows
+    if facts is None:
+        return None
+    movements = movement_facilities(places, facts)
+    passed = None if rows is None else vehicle_passages(rows, places, facts)
+    groups = group_of = None
+    if rows is not None and passed is not None:
+        programs, states = records.lights
+        groups, group_of = group_sums(
+            rows, passed, places, facts, clock, programs=programs, states=states
+        )
+    by_junction, by_movement = (
+        (None, None) if passed is None else passage_sums(passed, movements, clock)
+    )
+    graded = rows is not None and has_highways(places, facts)
+    heavy = heavy_share(rows, facts, clock) if rows is not None and graded else None
+    density = highway_density(lanes, places, facts, heavy)
+    return FacilityData(movements, by_junction, by_movement, density, groups, group_of)
+
+
+def read_run_data(
+    run: Path,
+    outcomes: Sequence[ActorOutcome],
+    *,
+    end: float,
+    meso: bool = False,
+    times: AnalysisTimes = WHOLE_RUN,
+) -> RunData:
+    """Read all that the figures of a run of ``end`` seconds are computed from.
+
+    With a warm-up, these are the road users who were to depart after it, and what lanes, conflicts
+    and stops had from then on; signals are of the whole run.
+
+    Raises
+    ------
+    InputError
+        If the places of lanes cannot be read, or times do not fit what was measured.
+    """
+    first, records = times.warm_up, _Records(run, meso=meso)
+    return RunData(
+        outcomes=[one for one in outcomes if one.depart >= first],
+        traffic=_figures(records, end=end, times=times),
+        trips=_since(read_trips(run), "depart", first),
+        conflicts=_since(read_conflicts(run), "begin", first),
+        end=end,
+        signals=_signal_use(records, end=end),
+        visits=read_visits(run),
+        stations=None if meso else _stations(records, end=end, times=times),
+        parking=read_parking(run, begin=first, end=end),
+    )
+
+
+def read_parking(run: Path, *, begin: float = 0.0, end: float) -> ParkingUse | None:
+    """Read the use of parking areas from ``begin`` to ``end`` (s); ``None`` if no trip parks."""
+    stays = read_stays(run)
+    if stays is None:
+        return None
+    plan = Plan.from_json((run / layout.PLAN_FILE).read_text(encoding="utf-8", errors="replace"))
+    return ParkingUse.of(stays, plan, begin=begin, end=end)
+
+
+def _stations(records: _Records, *, end: float, times: AnalysisTimes) -> pl.DataFrame | None:
+    """What the stations of the study counted; ``None`` if there are none, or no trajectories."""
+    file = records.run / layout.PLAN_FILE
+    rows, lanes = records.trajectories, records.lanes
+    if not file.is_file() or rows is None or lanes is None:
+        return None
+    text = file.read_text(encoding="utf-8", errors="replace")
+    with stored_document(
+        text, form=PLAN_FORMAT, version=VERSION, what="a plan of a run"
+    ) as data:  # actor by actor it takes longer to read
+        stations = tuple(map(PlannedStation.from_dict, data.get("stations", ())))
+    facts = records.facts if stations else None
+    if facts is None:
+        return None
+    found = station_figures(rows, stations, facts, times.clock(lanes, end=end))
+    return None if found is None else times.analysed(found)
+
+
+def _since(table: pl.DataFrame | None, column: str, first: float) -> pl.DataFrame | None:
+    return table if table is None or not first else table.filter(table[column] >= first)
+
+
+def _signal_use(records: _Records, *, end: float) -> pl.DataFrame | None:
+    """How signal groups were used; ``None`` if the map has no lights."""
+    programs, states = records.lights
+    if states is None:
+        return None
+    ways = None if records.places is None else records.places.ways
+    return signal_use(programs, states, end=end, rows=records.rows, ways=ways)
+
+
+def write_figures(run: Path, data: RunData) -> None:
+    """Write ``figures.json`` and the tables of a run; neither if nothing was measured on lanes."""
+    if data.signals is not None:
+        write_signal_use(data.signals, run / layout.FIGURES_FOLDER)
+    if data.stations is not None:
+        write_stations(data.stations, run / layout.FIGURES_FOLDER)
+    if data.traffic is None:
+        return
+    text = figures_json(data, data.traffic)
+    (run / layout.FIGURES_FILE).write_text(text, encoding="utf-8")
+    write_tables(data.traffic, run / layout.FIGURES_FOLDER)

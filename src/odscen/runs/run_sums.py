@@ -1,0 +1,128 @@
+"""Checksums of a run folder: nothing is computed from a file that is not as it was written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.base.checksums import (
+    SUMS_FILE,
+    damaged_files,
+    file_digest,
+    read_sums,
+    say_unchecked,
+    sums_of,
+    write_sums,
+)
+from odscen.base.errors import DamagedError, DamagedFile
+from odscen.runs import layout
+from odscen.runs.checkpoint import part_sums
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+    from pathlib import Path
+
+CHANGING = frozenset({layout.STATUS_FILE, layout.LOG_FILE, layout.SUMMARY_FILE})
+"""Not of what a run starts from: the first has its own checksum, the log is only added to."""
+_START = (
+    layout.SCENARIO_FILE,
+    layout.PLAN_FILE,
+    layout.SETTINGS_FILE,
+    layout.LANE_PLACES_FILE,
+    layout.LIGHTS_FILE,
+    *(
+        f"{layout.SUMO_FOLDER}/{name}"
+        for name in (
+            layout.NET_FILE,
+            layout.ROUTES_FILE,
+            layout.SIGNALS_FILE,
+            layout.STORY_FILE,
+            layout.REGION_FILE,
+            layout.MEASURES_FILE,
+            layout.CONFIG_FILE,
+        )
+    ),
+)
+"""What a run in slices starts from."""
+_INNER = frozenset({layout.STATUS_FILE, layout.SETTINGS_FILE})
+"""Removed when a run in slices has ended."""
+REPAIR = "odscen doctor --repair rebuilds what can be rebuilt"
+
+
+def seal_start(run: Path) -> None:
+    """Write down the checksums of what a run in slices starts from."""
+    start = (name for name in _START if (run / name).is_file())
+    write_sums(run, {name: file_digest(run / name) for name in start})
+
+
+def seal_run(run: Path, *, hidden: bool = False) -> None:
+    """Write down the checksums of a run that has ended, perhaps in a folder that is still hidden.
+
+    What has been written down before is not computed again: what was damaged meanwhile shows.
+    """
+    known = {**(read_sums(run) or {}), **part_sums(run)}
+    for name in CHANGING:
+        known.pop(name, None)
+    sums = sums_of(run, leave=_INNER, known=known)
+    slices = f"{layout.SLICES_FOLDER}/"
+    kept = {name: one for name, one in sums.items() if not name.startswith(slices)}
+    write_sums(run, kept, hidden=hidden)
+
+
+def seal_interrupted(run: Path) -> None:
+    """Add what is said of a run in slices when it is interrupted."""
+    names = (layout.SUMMARY_FILE, layout.LOG_FILE)
+    seal_again(run, *(name for name in names if (run / name).is_file()))
+
+
+def unseal_interrupted(run: Path) -> None:
+    """Forget the checksums of what changes when a run goes on: undo :func:`seal_interrupted`."""
+    sums = read_sums(run)
+    if sums is not None:
+        write_sums(run, {name: one for name, one in sums.items() if name not in CHANGING})
+
+
+def seal_again(run: Path, *names: str) -> None:
+    """Write down the checksums of files of a run that have been written anew."""
+    sums = read_sums(run)
+    if sums is not None:
+        write_sums(run, {**sums, **{name: file_digest(run / name) for name in names}})
+
+
+def check_run_files(run: Path, *, leave: Collection[str] = ()) -> None:
+    """Compare every file of a run with its checksum; those recorded may have been deleted.
+
+    Raises
+    ------
+    DamagedError
+        With each file that is not as it was written.
+    """
+    wrong = damaged_in(run, leave=leave)
+    if wrong:
+        raise DamagedError(str(run), wrong, advice=REPAIR)
+
+
+def damaged_in(
+    run: Path, *, leave: Collection[str] = (), only: str | None = None
+) -> list[DamagedFile]:
+    """Files of a run that are not as they were written; says once where it cannot know."""
+    try:
+        sums = read_sums(run)
+    except DamagedError as error:
+        return list(error.files)
+    if sums is None:
+        say_unchecked(run)
+        return []
+    asked = {name: one for name, one in sums.items() if name not in leave}
+    if only is not None:
+        asked = {only: sums[only]} if only in sums else {}
+    return damaged_files(run, asked, may_miss=[name for name in asked if _may_miss(name)])
+
+
+def without_sums(run: Path) -> bool:
+    """Whether a run was written by a version that kept no checksums."""
+    return not (run / SUMS_FILE).is_file()
+
+
+def _may_miss(name: str) -> bool:
+    recorded = {*layout.RECORDED, *layout.RECORDED.values()}
+    return name.split("/", maxsplit=1)[0] in {*recorded, layout.REPORT_FILE, layout.LOG_FILE}
