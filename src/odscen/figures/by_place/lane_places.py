@@ -66,23 +66,23 @@ class LanePlaces:
     """Of each table: what a run writes, which then need not wait for a library for tables."""
 
     @cached_property
-    def lanes(self) -> pl.DataFrame:  # noqa: D102 - above
+    def lanes(self) -> pl.DataFrame:
         return self._table("lanes")
 
     @cached_property
-    def ways(self) -> pl.DataFrame:  # noqa: D102
+    def ways(self) -> pl.DataFrame:
         return self._table("ways")
 
     @cached_property
-    def segments(self) -> pl.DataFrame:  # noqa: D102
+    def segments(self) -> pl.DataFrame:
         return self._table("segments")
 
     @cached_property
-    def junctions(self) -> pl.DataFrame:  # noqa: D102
+    def junctions(self) -> pl.DataFrame:
         return self._table("junctions")
 
     @cached_property
-    def movements(self) -> pl.DataFrame:  # noqa: D102
+    def movements(self) -> pl.DataFrame:
         return self._table("movements")
 
     def to_json(self) -> str:
