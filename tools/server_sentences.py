@@ -32,6 +32,8 @@ SHOWN = (
     "experiments/datasets/",
     "experiments/studies/",
     "experiments/sweeps/",
+    "formats/__init__",
+    "formats/base",
     "formats/openscenario",
     "formats/tll_",
     "lanegraph/",

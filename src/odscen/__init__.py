@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 from odscen.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from odscen.app.export import export
+    from odscen.app.exchange.exports import export
+    from odscen.app.exchange.imports import ImportedFile, import_file
     from odscen.app.learner_arrays import scenario_arrays, scenario_from_arrays
     from odscen.app.running.batches import run_many
     from odscen.app.running.reports import renew_report
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.experiments.regression.compare import RunComparison, compare
     from odscen.figures.judging.expectations import parse_expectation
+    from odscen.formats.base import Format
     from odscen.learning.hetero_data import read_arrays
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.shipped import shipped_maps
@@ -68,7 +70,10 @@ _HOMES = {
     "read_scenario": "odscen.app.scenarios",
     "write_scenario": "odscen.app.scenarios",
     "check": "odscen.app.scenarios:check_scenario",
-    "export": "odscen.app.export",
+    "export": "odscen.app.exchange.exports",
+    "import_file": "odscen.app.exchange.imports",
+    "ImportedFile": "odscen.app.exchange.imports",
+    "Format": "odscen.formats.base",
     "scenario_arrays": "odscen.app.learner_arrays",
     "scenario_from_arrays": "odscen.app.learner_arrays",
     "read_arrays": "odscen.learning.hetero_data",
@@ -108,7 +113,9 @@ __all__ = [
     "ConditionKind",
     "ConflictError",
     "ConversionSettings",
+    "Format",
     "GenerationSettings",
+    "ImportedFile",
     "InputError",
     "LimitError",
     "MapEntry",
@@ -132,6 +139,7 @@ __all__ = [
     "compare",
     "export",
     "generate",
+    "import_file",
     "parse_expectation",
     "read_arrays",
     "read_scenario",

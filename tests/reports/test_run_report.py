@@ -96,7 +96,7 @@ class Reader(HTMLParser):
             self.text += data + " "
 
 
-def test_the_report_is_well_formed_and_says_what_happened():
+def test_the_report_is_well_formed_and_says_what_read_recorded():
     text = re.sub(r"\s+", " ", Reader(report(drawing=road())).text)
     assert "Crossing" in text
     assert "Not usable, 2 of 2 expectations not met" in text

@@ -383,7 +383,7 @@ def test_watching_goes_on_across_slices_and_changes_nothing(
     assert results(tmp_path / "run") == whole
 
 
-def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
+def test_a_long_run_that_somebody_stops_keeps_what_has_read_recorded(
     long: PreparedRun, tmp_path: Path
 ) -> None:
     live = Live(Pace())

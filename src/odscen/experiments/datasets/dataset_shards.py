@@ -11,7 +11,7 @@ import pickle
 from typing import TYPE_CHECKING, Final
 
 from odscen.base.atomic_folders import new_folder
-from odscen.formats.scenarionet_export import pickled
+from odscen.formats.scenarionet_format import pickled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

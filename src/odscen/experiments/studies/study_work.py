@@ -286,7 +286,7 @@ class GivenUpError(Exception):
 def _exported(
     formats: tuple[str, ...], workspace: Workspace, result: Run
 ) -> dict[str, dict[str, bytes]]:
-    from odscen.app.export import export_run
+    from odscen.app.exchange.exports import export_run
 
     found = {}
     for one in formats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from odscen.app.export import export
+from odscen.app.exchange.exports import export
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
 from odscen.app.scenarios import SUFFIX
