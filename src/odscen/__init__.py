@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         WorkspaceError,
     )
     from odscen.convert.model.conversion_settings import ConversionSettings
-    from odscen.experiments.regression.compare import RunComparison, compare
+    from odscen.experiments.compare import RunComparison, compare
     from odscen.figures.judging.expectations import parse_expectation
     from odscen.learning.hetero_data import read_arrays
     from odscen.maps.map_entry import MapEntry
@@ -87,8 +87,8 @@ _HOMES = {
     "Step": "odscen.sumo.runner.in_step",
     "Run": "odscen.runs.finished_run",
     "renew_report": "odscen.app.running.reports",
-    "compare": "odscen.experiments.regression.compare",
-    "RunComparison": "odscen.experiments.regression.compare",
+    "compare": "odscen.experiments.compare",
+    "RunComparison": "odscen.experiments.compare",
     "OdscenError": "odscen.base.errors",
     "InputError": "odscen.base.errors",
     "ScenarioError": "odscen.base.errors",
