@@ -16,10 +16,10 @@ from odscen.experiments.sweeps import (
     PATIENCE,
     SWEEP_FILE,
     TABLE_FILE,
+    CaseRuns,
     SweepSettings,
     begin_sweep,
     estimate,
-    limits_of,
     opened_case,
     read_plan,
     read_sweep,
@@ -94,7 +94,7 @@ class Sweeps:
         """
         plan, settings = plan_from_data(wish.plan), _settings(wish)
         refuse_unknown(plan.names, scenario)
-        limits_of(settings)
+        CaseRuns(scenario, self._folder, settings)  # an unknown figure or limit is refused
         plan.cases()
         with self._work.lock:
             self._work.refuse_more()
@@ -227,7 +227,6 @@ class Sweeps:
         def work(known: UnderWay) -> None:
             def done(ended: int, _count: int) -> None:
                 known.ended = ended
-                known.check()
 
             sweep(
                 self._workspace,
@@ -236,8 +235,7 @@ class Sweeps:
                 folder,
                 settings=settings,
                 processes=processes,
-                tell=lambda _words: known.check(),
-                progress=lambda _job, _message: known.check(),
+                check=known.check,
                 done=done,
             )
 
