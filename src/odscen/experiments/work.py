@@ -402,7 +402,7 @@ class PreparedOrder:
     progress: Callable[[RunJob, Progress], None] | None = None
 
     def carry_out(self, workspace: Workspace, stopped: Callable[[], bool]) -> list[Outcome]:
-        """Carry it out; what cannot be prepared is refused."""
+        """Carry it out; what cannot be prepared, or has no row, is refused."""
         del workspace
 
         def follow(job: RunJob, message: Progress) -> None:
@@ -415,10 +415,10 @@ class PreparedOrder:
             (result,) = run_all(
                 [self.run], reports=self.reports, figures=self.figures, progress=follow
             )
+            if self.row_of is not None:
+                return [Outcome(self.run.name, self.row_of(result))]
         except InputError as error:
             return [Outcome(self.run.name, outcome_row(REFUSED, str(error)))]
-        if self.row_of is not None:
-            return [Outcome(self.run.name, self.row_of(result))]
         return [Outcome(self.run.name, outcome_row(result.status, result.known["error"]))]
 
 
