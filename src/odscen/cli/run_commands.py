@@ -31,16 +31,16 @@ from odscen.cli.console import (
     progress,
 )
 from odscen.records.outcomes import RunStatus
+from odscen.runs.reporter import Reporter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.runs.run_settings import RunSettings, SliceLength
     from odscen.scenario.sampling.redrawn_traffic import Redraw
-    from odscen.sumo.runner.run_jobs import RunJob
-    from odscen.sumo.worker.protocol import Progress
 
 
 @contextmanager
@@ -234,8 +234,7 @@ def run(
             processes=jobs,
             reports=reports,
             figures=reports or as_json,
-            progress=_follow(step, len(paths) * len(seeds or (None,))),
-            tell=log,
+            reporter=_BarReporter(step, len(paths) * len(seeds or (None,))),
         )
     show_results(results, as_json=as_json, several=len(results) > 1 or scenarios[0].is_dir())
     if seeds is not None:
@@ -267,7 +266,7 @@ def _run_until_confident(
         runs, found = run_until_confident(
             store, path, share=wanted, figure=figure, most=most, settings=settings, out=out,
             seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds, processes=processes,
-            reports=reports, tell=log,
+            reports=reports, reporter=_BarReporter(),
         )  # fmt: skip
         results += runs
         intervals.append(found)
@@ -317,12 +316,11 @@ def resume(
     from odscen.maps.store import Workspace
 
     with progress("resuming") as step:
-
-        def follow(message: Progress) -> None:
-            step(_words(run.name, message), message.time / message.until)
-
         result = resumed_runs.resume(
-            Workspace.open(workspace), run, time_limit=time_limit, progress=follow, tell=log
+            Workspace.open(workspace),
+            run,
+            time_limit=time_limit,
+            reporter=_BarReporter(step).of_run(run.name),
         )
     show_results([result], as_json=as_json, several=False)
     raise typer.Exit(result.exit_code)
@@ -375,18 +373,30 @@ def _say_verdicts(result: Run) -> None:
         log(f"{result.folder.name}: failed: {has}")
 
 
-def _follow(step: Callable[[str, float], None], total: int) -> Callable[[RunJob, Progress], None]:
-    shares: dict[str, float] = {}
+class _BarReporter(Reporter):
+    """Shows runs that go on at the same time as one bar; what they say is logged.
 
-    def follow(job: RunJob, message: Progress) -> None:
-        shares[job.name] = message.time / message.until if message.until else 0.0
-        step(_words(job.name, message), sum(shares.values()) / total)
+    ``show`` gets words and the share done of ``total`` runs.
+    """
 
-    return follow
+    def __init__(self, show: Callable[[str, float], None] | None = None, total: int = 1) -> None:
+        self._show, self._total = show, total
+        self._shares: dict[str, float] = {}
+        self._name = ""
 
+    def of_run(self, name: str) -> Reporter:
+        own = _BarReporter(self._show, self._total)
+        own._shares, own._name = self._shares, name
+        return own
 
-def _words(name: str, message: Progress) -> str:
-    line = f"{name}: {message.time:,.0f} s, {message.running:,} on the road"
-    if message.time_left is None:
-        return line
-    return f"{line}, about {clock(message.time_left + 59)} h left"
+    def advanced(self, progress: Progress) -> None:
+        if self._show is None:
+            return
+        self._shares[self._name] = progress.time / progress.until if progress.until else 0.0
+        line = f"{self._name}: {progress.time:,.0f} s, {progress.running:,} on the road"
+        if progress.time_left is not None:
+            line = f"{line}, about {clock(progress.time_left + 59)} h left"
+        self._show(line, sum(self._shares.values()) / self._total)
+
+    def said(self, words: str) -> None:
+        log(words)

@@ -21,10 +21,12 @@ from odscen.carla.served.served_run import ServedJob, run_served
 from odscen.records.run_plan import Plan
 from odscen.runs import layout
 from odscen.runs.recording import Recording
+from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_status import read_status
 from odscen.scenario.document.json_form import dumps
 from odscen.sumo.runner.live_run import Live
+from odscen.sumo.runner.run_folder import SumoPreparedRun
 from odscen.sumo.worker.behaviour.behaviour_doors import chosen_behaviour
 from odscen.sumo.worker.protocol import Command, Failed, Pace
 from odscen.sumo.worker.snapshots import origin
@@ -40,8 +42,8 @@ if TYPE_CHECKING:
     from odscen.carla.server.client import Address
     from odscen.maps.store import Workspace
     from odscen.maps.wastebasket import RemovedItem
-    from odscen.records.assignment_steps import AssignmentStep
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.web.wire.run_messages import GoOn, NewRun, RunControl
 
@@ -49,6 +51,23 @@ MOST = 8
 """Runs that can go on at a time."""
 PATIENCE = 5.0
 """Wall seconds that runs have for their end when the server ends."""
+
+
+class PageReporter(Reporter):
+    """Shows on the page how far a run is; the page can end it."""
+
+    def __init__(self, active: Active) -> None:
+        self._active = active
+
+    def advanced(self, progress: Progress) -> None:
+        self._active.live.take(progress, b"")
+
+    def said(self, words: str) -> None:
+        self._active.preparing = words
+
+    @property
+    def cancelled(self) -> bool:
+        return self._active.live.stop_wanted
 
 
 class Runs:
@@ -152,8 +171,9 @@ class Runs:
         prepared = prepare_run(
             check_run(self._workspace, scenario, name=wish.scenario, settings=settings)
         )
+        if not isinstance(prepared, SumoPreparedRun) or prepared.expected is None:
+            raise InputError("what a run will need is known of runs in SUMO only")
         expected = prepared.expected
-        assert expected is not None
         return RunForecast(
             planned=len(prepared.plan.actors),
             running=expected.running,
@@ -302,18 +322,14 @@ class Runs:
     def _simulate(
         self, active: Active, run: CheckedRun, wish: NewRun
     ) -> tuple[RunState, str | None]:
-        def iterated(step: AssignmentStep) -> None:
-            active.preparing = step.words
-
-        prepared = prepare_run(run, iterated=iterated)
+        reporter = PageReporter(active)
+        prepared = prepare_run(run, reporter=reporter)
         active.prepared(prepared.plan)
         if wish.carla:
             return self._mirror(active, prepared.plan, run.settings, wish)
 
-        def ended(_folder: Path) -> None:
-            active.finishing = True
-
-        return _end_of(carry_out(run, prepared, ended=ended, live=active.live), active)
+        result = carry_out(run, prepared, reporter=reporter, live=active.live)
+        return _end_of(result, active)
 
     def _follow(self, active: Active, large: LargeRun) -> tuple[RunState, str | None]:
         def prepared(slice_length: float | None) -> None:

@@ -28,6 +28,7 @@ from odscen.base.errors import ConflictError, InputError, MissingDependencyError
 from odscen.base.version import __version__
 from odscen.experiments.studies.study_rows import REFUSED, outcome_row, row_of
 from odscen.records.outcomes import RunStatus
+from odscen.runs.reporter import Reporter
 from odscen.scenario.document.json_form import loads
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.validation import validated
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
 
 
@@ -249,16 +251,12 @@ def _simulated(
     workspace: Workspace,
     stopped: Callable[[], bool],
 ) -> Outcome:
-    def follow(*_: object) -> None:
-        if stopped():
-            raise GivenUpError
-
     refusals: list[str] = []
     ended = run_all(
         [checked],
         reports=False,
-        progress=follow,
-        refused=lambda _job, error: refusals.append(_words(error)),
+        reporter=_StudyReporter(stopped),
+        refused=lambda _name, error: refusals.append(_words(error)),
     )
     if not ended:
         return Outcome(run.name, outcome_row(REFUSED, refusals[0]))
@@ -281,6 +279,18 @@ def _simulated(
 
 class GivenUpError(Exception):
     """The study has been stopped, and what is under way with it."""
+
+
+class _StudyReporter(Reporter):
+    """Ends a run whose study has been stopped."""
+
+    def __init__(self, stopped: Callable[[], bool]) -> None:
+        self._stopped = stopped
+
+    def advanced(self, progress: Progress) -> None:
+        del progress
+        if self._stopped():
+            raise GivenUpError
 
 
 def _exported(

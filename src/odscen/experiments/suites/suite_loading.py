@@ -16,10 +16,10 @@ from odscen.base.errors import InputError, ToolError, in_file
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.experiments.regression.baseline import fingerprint, read_baseline
 from odscen.figures.judging.expectations import needs_criticality
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.maps.folder_names import name_from_file
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
+from odscen.simulators.assets import shipped_assets
 
 if TYPE_CHECKING:
     from odscen.app.running.runs import CheckedRun

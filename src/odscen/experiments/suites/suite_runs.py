@@ -16,6 +16,7 @@ from odscen.figures.judging.criteria import missed_rows, missed_words
 from odscen.figures.judging.expectations import CRITERIA, USABLE, evaluate
 from odscen.records.outcomes import RunStatus
 from odscen.runs.judged import read_judged
+from odscen.runs.reporter import Reporter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,8 +26,7 @@ if TYPE_CHECKING:
     from odscen.experiments.suites.suite import Suite
     from odscen.experiments.suites.suite_loading import LoadedCase
     from odscen.runs.finished_run import Run
-    from odscen.sumo.runner.run_jobs import RunJob
-    from odscen.sumo.worker.protocol import Progress
+    from odscen.runs.reporter import Progress
 
 
 class RunPlace(NamedTuple):
@@ -46,7 +46,7 @@ class SeedRunner:
 
     def run(self, cases: Sequence[LoadedCase], place: RunPlace) -> None:
         """Run each case with those of its seeds that it was not run with, and keep the results."""
-        jobs: dict[Path, tuple[LoadedCase, int]] = {}
+        jobs: dict[str, tuple[LoadedCase, int]] = {}
         runs = []
         for case in cases:
             for seed in case.case.seeds:
@@ -54,57 +54,73 @@ class SeedRunner:
                     continue
                 name = f"{case.case.name}/seed-{seed}"
                 folder = place.root / name
-                jobs[folder] = case, seed
+                jobs[name] = case, seed
                 settings = replace(case.run.settings, seed=seed)
                 runs.append(replace(case.run, name=name, folder=folder, settings=settings))
         if not runs:
             return
-        follow = _Follow(len(runs), self.tell)
 
-        def done(job: RunJob, result: Run) -> None:
-            case, seed = jobs[job.out]
+        def keep_result(name: str, result: Run) -> None:
+            case, seed = jobs[name]
             case.runs[seed] = _seed_result(case, seed, result, self.suite, kept=place.keep)
             if not place.keep:
                 shutil.rmtree(result.folder)
-            follow.done(job)
 
-        def refused(job: RunJob, error: InputError) -> None:
-            case, seed = jobs[job.out]
+        def note_refusal(name: str, error: InputError) -> None:
+            case, seed = jobs[name]
             case.refused[seed] = f"seed {seed}: {error}"
-            follow.done(job)
+            follow.set_share(name, 1.0)
 
+        follow = _SuiteProgress(len(runs), self.tell, keep_result)
         run_all(
             runs,
             processes=self.processes,
             reports=place.keep,
-            progress=follow.step,
-            done=done,
-            refused=refused,
+            reporter=follow,
+            refused=note_refusal,
         )
 
 
-class _Follow:
-    """Adds up the progress of runs that go on at the same time."""
+class _SuiteProgress(Reporter):
+    """Adds up the progress of runs that go on at the same time, and keeps their results."""
 
-    def __init__(self, total: int, tell: Callable[[str, float], None] | None) -> None:
+    def __init__(
+        self,
+        total: int,
+        tell: Callable[[str, float], None] | None,
+        keep_result: Callable[[str, Run], None],
+    ) -> None:
         self._shares: dict[str, float] = {}
         self._total = total
         self._tell = tell
         self._lock = threading.Lock()
+        self.keep_result = keep_result
 
-    def step(self, job: RunJob, message: Progress) -> None:
-        share = message.time / message.until if message.until else 0.0
-        self._set(job.name, min(share, 1.0))
+    def of_run(self, name: str) -> Reporter:
+        return _SeedProgress(self, name)
 
-    def done(self, job: RunJob) -> None:
-        self._set(job.name, 1.0)
-
-    def _set(self, name: str, share: float) -> None:
+    def set_share(self, name: str, share: float) -> None:
+        """Say how much of a run is done."""
         with self._lock:
             self._shares[name] = share
             total = sum(self._shares.values()) / self._total
         if self._tell is not None:
             self._tell(name, total)
+
+
+class _SeedProgress(Reporter):
+    """One of the runs."""
+
+    def __init__(self, suite: _SuiteProgress, name: str) -> None:
+        self._suite, self._name = suite, name
+
+    def advanced(self, progress: Progress) -> None:
+        share = progress.time / progress.until if progress.until else 0.0
+        self._suite.set_share(self._name, min(share, 1.0))
+
+    def finished(self, run: Run) -> None:
+        self._suite.keep_result(self._name, run)
+        self._suite.set_share(self._name, 1.0)
 
 
 def _seed_result(

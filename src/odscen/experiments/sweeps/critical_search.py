@@ -28,6 +28,7 @@ from odscen.experiments.sweeps.sweep_runs import checked_cases, has_completed, r
 from odscen.experiments.sweeps.sweep_table import limits_of, rows_of, watched_actors, write_cases
 from odscen.records.run_plan import Plan
 from odscen.runs import layout
+from odscen.runs.reporter import Reporter
 from odscen.scenario.sweeps.sweep_plan import MOST_CASES, SweepPlan
 
 if TYPE_CHECKING:
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import Range, Table
-    from odscen.sumo.runner.run_jobs import RunJob
 
 FORMAT: Final = "odscen-search"
 VERSION: Final = 1
@@ -165,7 +165,7 @@ def search(
         return looking.found()
 
 
-class _Looking:
+class _Looking(Reporter):
     """Cases that have been run so far."""
 
     def __init__(
@@ -200,7 +200,7 @@ class _Looking:
             [run for run in checked if not has_completed(run.folder)],
             processes=self._processes,
             reports=self._settings.reports,
-            done=self._one_more,
+            reporter=self,
         )
         rows = rows_of(
             self._scenario,
@@ -244,7 +244,9 @@ class _Looking:
         write_text(self._out / ARCHIVE_FILE, text)
         return found
 
-    def _one_more(self, _job: RunJob, _run: Run) -> None:
+    def finished(self, run: Run) -> None:
+        """Say how many have ended."""
+        del run
         if self._done is not None:
             ended = len([*(self._out / "runs").glob(f"case-*/{layout.SUMMARY_FILE}")])
             self._done(ended, self._plan.samples or 0)

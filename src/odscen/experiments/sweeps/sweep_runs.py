@@ -20,6 +20,7 @@ from odscen.formats.openscenario.dialect import Dialect
 from odscen.records.outcomes import RunStatus
 from odscen.runs.finished_run import Run
 from odscen.runs.recording import Recording
+from odscen.runs.reporter import SILENT, Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.sweeps.sweep_plan import concrete
@@ -31,10 +32,9 @@ if TYPE_CHECKING:
     from odscen.app.running.runs import CheckedRun
     from odscen.experiments.sweeps.sweep_table import Sweep
     from odscen.maps.store import Workspace
+    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
-    from odscen.sumo.runner.run_jobs import RunJob
-    from odscen.sumo.worker.protocol import Progress
 
 WATCHES_CLOSENESS = Recording(emissions=False, criticality=True)
 """What of each case is recorded."""
@@ -49,7 +49,7 @@ def sweep(
     settings: SweepSettings | None = None,
     processes: int = 1,
     tell: Callable[[str], None] | None = None,
-    progress: Callable[[RunJob, Progress], None] | None = None,
+    reporter: Reporter = SILENT,
     done: Callable[[int, int], None] | None = None,
 ) -> Sweep:
     """Run every case of a plan; cases that ``out`` has from an earlier, interrupted time are kept.
@@ -64,8 +64,10 @@ def sweep(
         How many run at a time.
     tell
         Called with how many cases there are, and, after the first, with what the rest will take.
-    progress, done
-        Called from the threads that wait for runs; ``done`` with how many of how many have ended.
+    reporter
+        Hears of each run, from the threads that wait for runs.
+    done
+        Called from these with how many of how many have ended.
 
     Raises
     ------
@@ -88,7 +90,7 @@ def sweep(
         left = [run for run in checked if not has_completed(run.folder)]
         if tell is not None:
             tell(_first_words(len(cases), len(refused), len(left), plan))
-        _run(left, len(checked), processes, settings, tell=tell, progress=progress, done=done)
+        _run(left, len(checked), processes, settings, tell=tell, reporter=reporter, done=done)
         _export(workspace, checked, out / "cases", settings.openscenario)
         rows = rows_of(scenario, cases, out, refused=refused, settings=settings, limits=limits)
         return write_table(out, scenario, plan, rows=rows, limits=limits)
@@ -145,18 +147,11 @@ def _run(
     settings: SweepSettings,
     *,
     tell: Callable[[str], None] | None,
-    progress: Callable[[RunJob, Progress], None] | None,
+    reporter: Reporter,
     done: Callable[[int, int], None] | None,
 ) -> None:
     """Run the first case alone, say what the others will take, and run them."""
-    ended = count - len(left)
-
-    def one_more(_job: RunJob, _run: Run) -> None:
-        nonlocal ended
-        ended += 1
-        if done is not None:
-            done(ended, count)
-
+    counting = _CountingReporter(reporter, count - len(left), count, done)
     for these in (left[:1], left[1:]):
         if not these:
             continue
@@ -166,8 +161,7 @@ def _run(
             processes=processes,
             reports=settings.reports,
             figures=bool(settings.figures),
-            progress=progress,
-            done=one_more,
+            reporter=counting,
         )
         if these[0] is left[0] and len(left) > 1 and tell is not None:
             spent = time.monotonic() - began
@@ -178,6 +172,24 @@ def _run(
                 f"{clock(rest * spent / processes + 59)} h and {rest * disk / 1e6:,.0f} MB for the "
                 f"other {rest}"
             )
+
+
+class _CountingReporter(Reporter):
+    """Passes on what runs report, and counts those that have ended."""
+
+    def __init__(
+        self, own: Reporter, ended: int, count: int, done: Callable[[int, int], None] | None
+    ) -> None:
+        self._own, self._ended, self._count, self._done = own, ended, count, done
+
+    def advanced(self, progress: Progress) -> None:
+        self._own.advanced(progress)
+
+    def finished(self, run: Run) -> None:
+        self._own.finished(run)
+        self._ended += 1
+        if self._done is not None:
+            self._done(self._ended, self._count)
 
 
 def _export(
