@@ -1,4 +1,4 @@
-"""``odscen run``: scenarios in SUMO."""
+"""``odscen run``: scenarios in SUMO, or in another simulator."""
 
 from __future__ import annotations
 
@@ -21,11 +21,14 @@ from odscen.cli.console import (
     JobsOption,
     JsonOption,
     SeedsOption,
+    SimulatorOption,
+    SimulatorSettingOption,
     WarmUpOption,
     WorkspaceOption,
     behaviour_door,
     duration,
     log,
+    option_settings,
     print_json,
     print_table,
     progress,
@@ -144,6 +147,8 @@ def run(
     behaviour_set: BehaviourSettingOption = None,
     behaviour_cmd: BehaviourCommandOption = None,
     behaviour_timeout: BehaviourTimeoutOption = 60.0,
+    simulator: SimulatorOption = "sumo",
+    simulator_set: SimulatorSettingOption = None,
     reports: Annotated[
         bool | None,
         typer.Option(
@@ -177,9 +182,10 @@ def run(
     completed; 1: completed, but an expectation failed; 2: bad input, or the folder is in the hands
     of another process; 3: a run failed, or the machine lacks room, memory or handles.
     """
-    from odscen.sumo.runner.forked_worker import get_ready
+    if simulator == "sumo":
+        from odscen.sumo.runner.forked_worker import get_ready
 
-    get_ready()  # its imports take as long as ours, and are done meanwhile
+        get_ready()  # its imports take as long as ours, and are done meanwhile
     gc.disable()  # what is imported stays, and need not be gone through again and again
     from odscen.app.running import batches
     from odscen.app.scenarios import scenario_files
@@ -210,6 +216,8 @@ def run(
         warm_up=warm_up,
         interval=interval,
         behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout),
+        simulator=simulator,
+        simulator_options=option_settings(simulator_set or (), element="--simulator-set"),
     )
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)
@@ -305,12 +313,16 @@ def resume(
     time_limit: Annotated[
         float | None, typer.Option(min=1, help="Wall seconds after which it is interrupted again.")
     ] = None,
+    behaviour: BehaviourOption = None,
+    behaviour_set: BehaviourSettingOption = None,
+    behaviour_cmd: BehaviourCommandOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Resume an interrupted long run; it ends as if it had not been interrupted.
 
-    Exit codes as of ``run``.
+    A run that is driven by a program, a module or a file resumes when that is named again: what
+    a folder says is never executed by itself. Exit codes as of ``run``.
     """
     from odscen.app.running import resumed_runs
     from odscen.maps.store import Workspace
@@ -321,6 +333,7 @@ def resume(
             run,
             time_limit=time_limit,
             reporter=_BarReporter(step).of_run(run.name),
+            behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, 60.0),
         )
     show_results([result], as_json=as_json, several=False)
     raise typer.Exit(result.exit_code)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
     from odscen.runs.reporter import Reporter
@@ -29,6 +30,7 @@ def resume(
     time_limit: float | None = None,
     reporter: Reporter = SILENT,
     live: Companion | None = None,
+    behaviour: BehaviourDoor | None = None,
 ) -> Run:
     """Resume an interrupted run and write its report.
 
@@ -44,6 +46,8 @@ def resume(
         Hears where it goes on, what is damaged, and how far it is, in this thread.
     live
         Makes it a run that can be watched and steered.
+    behaviour
+        What drives instead of SUMO, named again where it is a program, a module or a file.
 
     Returns
     -------
@@ -56,6 +60,8 @@ def resume(
         If there is no such run.
     ConflictError
         If it has ended, or is going on.
+    InputError
+        If it is driven by code that only its folder names.
     """
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
@@ -67,7 +73,12 @@ def resume(
 
     folder = run if run.is_dir() else workspace.runs / run
     result = long_runs.resume(
-        folder, reporter=reporter, time_limit=time_limit, finish=finish, live=live
+        folder,
+        reporter=reporter,
+        time_limit=time_limit,
+        finish=finish,
+        live=live,
+        behaviour=behaviour,
     )
     reporter.finished(result)
     return result

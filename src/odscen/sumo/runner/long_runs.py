@@ -38,6 +38,7 @@ from odscen.runs.run_status import (
 )
 from odscen.runs.run_sums import (
     check_run_files,
+    refuse_additions,
     seal_interrupted,
     seal_run,
     seal_start,
@@ -46,10 +47,12 @@ from odscen.runs.run_sums import (
 from odscen.sumo.runner.forked_worker import is_ready
 from odscen.sumo.runner.run_folder import SumoPreparedRun
 from odscen.sumo.runner.worker_process import run_worker
+from odscen.sumo.worker.behaviour.behaviour_doors import is_installed, read_behaviour
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.runs.new_run import Finish
     from odscen.runs.reporter import Reporter
     from odscen.sumo.runner.worker_process import Companion
@@ -92,6 +95,7 @@ def resume(
     time_limit: float | None = None,
     finish: Finish | None = None,
     live: Companion | None = None,
+    behaviour: BehaviourDoor | None = None,
 ) -> Run:
     """Go on with an interrupted run from its last complete slice.
 
@@ -101,6 +105,9 @@ def resume(
     ----------
     reporter
         Hears where it goes on, and which slices are damaged, too.
+    behaviour
+        What drives instead of SUMO, named again where the run has a program, a socket or a file:
+        what a folder says is data, and is not executed for that.
     time_limit
         Wall seconds after which it is interrupted again.
 
@@ -112,6 +119,8 @@ def resume(
         If it has ended already, or is going on.
     DamagedError
         If what it starts from is not as it was written.
+    InputError
+        If it is driven by code that is named in its folder alone, or by another than is named now.
     """
     _refuse_absent(folder)
     with disk_errors(f"run folder {folder}", advice=_again(folder)), run_lock(folder) as lock:
@@ -120,6 +129,7 @@ def resume(
         check_run_files(folder)
         unsealed(folder / layout.STATUS_FILE)
         prepared = _restore(folder, time_limit)
+        _refuse_unnamed_code(folder, behaviour)
         number, problems = survey(folder)
         for problem in problems:
             reporter.said(problem)
@@ -227,6 +237,7 @@ def _write_settings(prepared: SumoPreparedRun, folder: Path) -> None:
     settings = {
         "format": FORMAT,
         "version": VERSION,
+        "sealed": "whole",
         "problems": list(prepared.problems),
         "notes": list(prepared.notes),
         "about": dict(prepared.about),
@@ -234,6 +245,31 @@ def _write_settings(prepared: SumoPreparedRun, folder: Path) -> None:
     }
     text = json.dumps(settings, indent=2, ensure_ascii=False) + "\n"
     (folder / layout.SETTINGS_FILE).write_text(text, encoding="utf-8")
+
+
+def _refuse_unnamed_code(folder: Path, named: BehaviourDoor | None) -> None:
+    """Refuse to execute what only the folder names: it may come from anybody."""
+    path = folder / layout.SUMO_FOLDER / layout.BEHAVIOUR_FILE
+    if not path.is_file():
+        if named is not None:
+            raise InputError("SUMO drives this run; no behaviour model is resumed in it")
+        return
+    stored = read_behaviour(path.read_text(encoding="utf-8"))
+    if named is not None and (
+        (named.name, named.command, named.socket) != (stored.name, stored.command, stored.socket)
+        or (named.options and dict(named.options) != dict(stored.options))
+    ):
+        raise InputError(
+            f"it is not what drives this run, which is {stored.shown!r} with "
+            f"{dict(stored.options) or 'no options'}",
+            element=named.shown,
+        )
+    if named is None and not is_installed(stored):
+        option = "--behaviour-cmd" if stored.command is not None else "--behaviour"
+        raise InputError(
+            f"this run is driven by code that its folder names; name it again if you trust it: "
+            f"odscen resume {folder} {option} {stored.name or stored.command or stored.socket!r}"
+        )
 
 
 def _restore(folder: Path, time_limit: float | None) -> SumoPreparedRun:
@@ -246,6 +282,8 @@ def _restore(folder: Path, time_limit: float | None) -> SumoPreparedRun:
                 f"format {data['format']!r} version {data['version']!r} is not a run to resume",
                 file=str(path),
             )
+        if data.get("sealed") == "whole":  # earlier versions left some files without checksums
+            refuse_additions(folder)
         expectations = tuple(parse_expectation(text) for text in data["expectations"])
         return SumoPreparedRun(
             plan=Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8")),
