@@ -295,7 +295,7 @@ def _run_until_confident(
 
 def _warn_of_seeds(results: Sequence[Run], seeds: int) -> None:
     """Say of which scenario the seeds hardly vary; runs of one scenario follow each other."""
-    from odscen.experiments.regression.scatter import VARYING, hardly_varying
+    from odscen.experiments.tolerance import VARYING, hardly_varying
     from odscen.figures.measures.registry import run_figure
 
     figure = run_figure(VARYING)
