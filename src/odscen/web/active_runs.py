@@ -25,8 +25,10 @@ from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_status import read_status
 from odscen.scenario.document.json_form import dumps
+from odscen.simulators.installed import CARLA_MIRROR, CARLA_NATIVE, SUMO, open_simulator
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.sumo_simulator import SumoSimulator
 from odscen.sumo.worker.behaviour.behaviour_doors import chosen_behaviour
 from odscen.sumo.worker.protocol import Command, Failed, Pace
 from odscen.sumo.worker.snapshots import origin
@@ -54,13 +56,17 @@ PATIENCE = 5.0
 
 
 class PageReporter(Reporter):
-    """Shows on the page how far a run is; the page can end it."""
+    """Shows on the page how far a run is; the page can end it.
 
-    def __init__(self, active: Active) -> None:
-        self._active = active
+    ``watched`` runs have the page as their companion.
+    """
+
+    def __init__(self, active: Active, *, watched: bool) -> None:
+        self._active, self._watched = active, watched
 
     def advanced(self, progress: Progress) -> None:
-        self._active.live.take(progress, b"")
+        if not self._watched:  # who watches a run in SUMO has heard it
+            self._active.live.take(progress, b"")
 
     def said(self, words: str) -> None:
         self._active.preparing = words
@@ -91,7 +97,9 @@ class Runs:
         ConflictError
             If too many are going on, or CARLA shows another one.
         """
-        run = check_run(self._workspace, scenario, name=name, settings=_settings(wish))
+        if wish.simulator is not None and wish.simulator.name == CARLA_MIRROR:
+            wish = wish.model_copy(update={"carla": True, "simulator": None})
+        run = check_run(self._workspace, scenario, name=name, settings=self._settings(wish))
         if wish.carla and (wish.every is not None or not wish.trajectories):
             raise InputError(
                 "a run that CARLA shows is recorded step by step; leave every and trajectories out"
@@ -123,7 +131,7 @@ class Runs:
             self._refuse_more()
         live = Live(Pace(paused=wish.paused, speed=wish.speed))
         file = self._workspace.scenarios / f"{name}{SUFFIX}"
-        large = LargeRun(self._workspace, file, name=name, settings=_settings(wish), live=live)
+        large = LargeRun(self._workspace, file, name=name, settings=self._settings(wish), live=live)
         try:
             with self._lock:
                 self._refuse_more()
@@ -167,7 +175,7 @@ class Runs:
         ScenarioError
             If the scenario has errors.
         """
-        settings = _settings(wish)
+        settings = self._settings(wish)
         prepared = prepare_run(
             check_run(self._workspace, scenario, name=wish.scenario, settings=settings)
         )
@@ -322,7 +330,7 @@ class Runs:
     def _simulate(
         self, active: Active, run: CheckedRun, wish: NewRun
     ) -> tuple[RunState, str | None]:
-        reporter = PageReporter(active)
+        reporter = PageReporter(active, watched=isinstance(run.simulator, SumoSimulator))
         prepared = prepare_run(run, reporter=reporter)
         active.prepared(prepared.plan)
         if wish.carla:
@@ -381,23 +389,37 @@ class Runs:
             return "failed", last.reason
         return ("stopped" if last.stopped else "completed"), None
 
+    def _settings(self, wish: NewRun) -> RunSettings:
+        """How a run is wished for; a CARLA server is the one that the page was started with.
+
+        Raises
+        ------
+        InputError
+            If a behaviour model or simulator is not one of those installed, or not possible so.
+        """
+        driver, chosen = wish.behaviour, wish.simulator
+        name, options = SUMO, {}
+        if chosen is not None:
+            name, options = chosen.name, dict(chosen.options)
+            if name == CARLA_NATIVE:
+                options["address"] = str(self._carla)
+            open_simulator(name, options, installed_only=True)
+        return RunSettings(
+            seed=wish.seed,
+            until=wish.until,
+            step_length=wish.step_length,
+            recording=Recording(trajectories=wish.trajectories, every=wish.every),
+            behaviour=None if driver is None else chosen_behaviour(driver.name, driver.options),
+            simulator=name,
+            simulator_options=options,
+        )
+
     def _free_id(self, name: str) -> str:
         for number in itertools.count(1):
             free = f"{numbered_stem(name)}-{number}"
             if free not in self._active and not (self._workspace.runs / free).exists():
                 return free
         raise AssertionError
-
-
-def _settings(wish: NewRun) -> RunSettings:
-    chosen = wish.behaviour
-    return RunSettings(
-        seed=wish.seed,
-        until=wish.until,
-        step_length=wish.step_length,
-        recording=Recording(trajectories=wish.trajectories, every=wish.every),
-        behaviour=None if chosen is None else chosen_behaviour(chosen.name, chosen.options),
-    )
 
 
 def _end_of(result: Run, active: Active) -> tuple[RunState, str | None]:
