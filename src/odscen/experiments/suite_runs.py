@@ -32,13 +32,14 @@ from odscen.experiments.verdict import causes_between
 from odscen.experiments.work import PreparedOrder, PreparedOrders, carry_out
 from odscen.figures.judging.criteria import missed_rows, missed_words
 from odscen.figures.judging.expectations import CRITERIA, USABLE, evaluate, needs_criticality
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.maps.folder_names import name_from_file
 from odscen.records.outcomes import RunStatus
 from odscen.records.row_text import json_with_rows
 from odscen.runs.judged import read_judged
 from odscen.runs.recording import Recording
+from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
+from odscen.simulators.assets import shipped_assets
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -51,9 +52,8 @@ if TYPE_CHECKING:
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import RunJob
-    from odscen.sumo.worker.protocol import Progress
 
 
 @dataclass(slots=True)
@@ -271,8 +271,14 @@ class SeedRunner:
             if self.tell is not None:
                 self.tell(name, total)
 
-        def follow(job: RunJob, message: Progress) -> None:
-            report(job.name, message.time / message.until if message.until else 0.0)
+        class SeedReporter(Reporter):
+            """Adds up the progress of runs that go on at the same time."""
+
+            def __init__(self, name: str) -> None:
+                self._name = name
+
+            def advanced(self, progress: Progress) -> None:
+                report(self._name, progress.time / progress.until if progress.until else 0.0)
 
         def make_row(case: LoadedCase, seed: int, result: Run) -> dict[str, Any]:
             made = _seed_result(case, seed, result, self.suite, kept=place.keep)
@@ -290,7 +296,9 @@ class SeedRunner:
                 run = replace(case.run, name=name, folder=place.root / name, settings=settings)
                 row_of = partial(make_row, case, seed)
                 orders.append(
-                    PreparedOrder(run, reports=place.keep, row_of=row_of, progress=follow)
+                    PreparedOrder(
+                        run, reports=place.keep, row_of=row_of, reporter=SeedReporter(name)
+                    )
                 )
 
         def take(outcome: Outcome) -> None:

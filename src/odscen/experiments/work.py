@@ -32,6 +32,7 @@ from odscen.base.errors import ConflictError, InputError, MissingDependencyError
 from odscen.base.version import __version__
 from odscen.experiments.table import REFUSED, outcome_row, row_of
 from odscen.records.outcomes import RunStatus
+from odscen.runs.reporter import SILENT, Reporter
 from odscen.scenario.document.json_form import loads
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.validation import validated
@@ -49,9 +50,8 @@ if TYPE_CHECKING:
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import RunJob
-    from odscen.sumo.worker.protocol import Progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,16 +260,12 @@ def _simulated(
     workspace: Workspace,
     stopped: Callable[[], bool],
 ) -> Outcome:
-    def follow(*_: object) -> None:
-        if stopped():
-            raise GivenUpError
-
     refusals: list[str] = []
     ended = run_all(
         [checked],
         reports=False,
-        progress=follow,
-        refused=lambda _job, error: refusals.append(_words(error)),
+        reporter=_StoppableReporter(stopped),
+        refused=lambda _name, error: refusals.append(_words(error)),
     )
     if not ended:
         return Outcome(run.name, outcome_row(REFUSED, refusals[0]))
@@ -292,6 +288,18 @@ def _simulated(
 
 class GivenUpError(Exception):
     """The study has been stopped, and what is under way with it."""
+
+
+class _StoppableReporter(Reporter):
+    """Ends a run whose experiment has been stopped."""
+
+    def __init__(self, stopped: Callable[[], bool], own: Reporter = SILENT) -> None:
+        self._stopped, self._own = stopped, own
+
+    def advanced(self, progress: Progress) -> None:
+        if self._stopped():
+            raise GivenUpError
+        self._own.advanced(progress)
 
 
 def _exported(
@@ -391,29 +399,23 @@ class PreparedOrder:
         Whether its report is written, and whether its figures are computed at once.
     row_of
         Makes its row while the run is at hand.
-    progress
-        Called from the thread that waits for it.
+    reporter
+        Hears of it, from the thread that waits for it.
     """
 
     run: CheckedRun
     reports: bool = False
     figures: bool = True
     row_of: Callable[[Run], dict[str, Any]] | None = None
-    progress: Callable[[RunJob, Progress], None] | None = None
+    reporter: Reporter = SILENT
 
     def carry_out(self, workspace: Workspace, stopped: Callable[[], bool]) -> list[Outcome]:
         """Carry it out; what cannot be prepared, or has no row, is refused."""
         del workspace
-
-        def follow(job: RunJob, message: Progress) -> None:
-            if stopped():
-                raise GivenUpError
-            if self.progress is not None:
-                self.progress(job, message)
-
+        reporter = _StoppableReporter(stopped, self.reporter)
         try:
             (result,) = run_all(
-                [self.run], reports=self.reports, figures=self.figures, progress=follow
+                [self.run], reports=self.reports, figures=self.figures, reporter=reporter
             )
             if self.row_of is not None:
                 return [Outcome(self.run.name, self.row_of(result))]

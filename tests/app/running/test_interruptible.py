@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from odscen.sumo.runner.interruptible import BrokenOff, Interruptible
+from odscen.app.running.interruptible import BrokenOff, Interruptible
 
 
 def test_a_thread_that_computes_is_broken_off_and_cleans_up() -> None:

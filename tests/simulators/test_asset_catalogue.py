@@ -6,7 +6,7 @@ import pytest
 
 from odscen.base.categories import Body, Category
 from odscen.base.errors import NotFoundError
-from odscen.maps.asset_catalogue import shipped_assets
+from odscen.simulators.assets import shipped_assets
 
 
 def test_the_catalogue_has_every_blueprint_of_carla_0_9_16():
