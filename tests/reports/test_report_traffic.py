@@ -7,10 +7,10 @@ import pytest
 
 from odscen.drawing.map_drawing import Lines
 from odscen.figures.by_place.traffic import TrafficFigures, traffic_figures
-from odscen.reports.place_shapes import PlaceShapes
 from odscen.reports.report_corridor import NONE_RECORDED, CorridorTraces, corridor_section
 from odscen.reports.report_emissions import emission_section
 from odscen.reports.report_flow import diagram_section, flow_section
+from odscen.reports.report_maps import PlaceShapes
 from odscen.reports.report_service import level_strip, service_map, service_section
 from odscen.reports.report_words import stretch
 from tests.figures.made_traffic import NOBODY, PLACES, lane_rows, made_figures

@@ -10,9 +10,9 @@ from odscen.base.markup import Markup, element, join, number
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.figures.measures.parity import error_curve, errors_by_place
 from odscen.records.traces import bin_width
+from odscen.reports.charts import Series, line_chart
 from odscen.reports.page_templates import html_page, html_table, page_head, report_section
-from odscen.reports.plots import Series, line_chart
-from odscen.reports.report_map import CATEGORIES, fitted_view, scale_bar, swatch
+from odscen.reports.report_maps import CATEGORIES, fitted_view, scale_bar, swatch
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

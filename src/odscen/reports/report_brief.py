@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from odscen.figures.by_place.traffic import TrafficFigures
     from odscen.figures.measures.usability import Usability
-    from odscen.reports.place_shapes import PlaceShapes
+    from odscen.reports.report_maps import PlaceShapes
 
 SIX = (
     "arrived",

@@ -9,8 +9,8 @@ import numpy as np
 
 from odscen.base.arrays import FloatArray, IntArray, offsets, ranges
 from odscen.base.markup import Markup, element, number, path_data
+from odscen.reports.charts import ChartFrame, chart, clock_axis, legend, text_at, value_axis
 from odscen.reports.page_templates import report_section
-from odscen.reports.plots import ChartFrame, chart, clock_axis, legend, text_at, value_axis
 from odscen.reports.report_words import stretch
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.base.markup import Markup, element, number
-from odscen.reports.page_templates import html_table, report_section
-from odscen.reports.plots import (
+from odscen.reports.charts import (
     Axis,
     ChartFrame,
     Dots,
@@ -17,6 +16,7 @@ from odscen.reports.plots import (
     legend,
     value_axis,
 )
+from odscen.reports.page_templates import html_table, report_section
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

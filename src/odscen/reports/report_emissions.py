@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, number
 from odscen.figures.by_place.traffic import over_run
+from odscen.reports.charts import Series
 from odscen.reports.page_templates import html_table, report_section
-from odscen.reports.plots import Series
 from odscen.reports.report_figures import Card, card_grid
 from odscen.reports.report_flow import column, network_chart
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.markup import Markup, element, number
+from odscen.reports.charts import Dots, Series, dot_chart, line_chart
 from odscen.reports.page_templates import report_section
-from odscen.reports.plots import Dots, Series, dot_chart, line_chart
 from odscen.reports.report_words import stretch
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 from odscen.base.markup import Markup, element, number
 from odscen.figures.measures.figure import ReportSection
 from odscen.records.traces import bin_width
+from odscen.reports.charts import Series, line_chart
 from odscen.reports.page_templates import html_table, report_section
-from odscen.reports.plots import Series, line_chart
 from odscen.reports.report_figures import card_grid, figure_cards
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.markup import Markup, element, join, number, path_data
 from odscen.figures.by_place.level_of_service import FEWEST
 from odscen.figures.by_place.traffic import over_run
+from odscen.reports.charts import legend
 from odscen.reports.page_templates import html_table, report_section
-from odscen.reports.plots import legend
-from odscen.reports.report_map import fitted_view, scale_bar, view_box
+from odscen.reports.report_maps import fitted_view, scale_bar, view_box
 from odscen.reports.report_words import stretch
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.figures.by_place.traffic import TrafficFigures
-    from odscen.reports.place_shapes import PlaceShapes
+    from odscen.reports.report_maps import PlaceShapes
 
 LEVELS = {
     "A": "A: free flow",

@@ -9,8 +9,8 @@ import numpy as np
 from odscen.figures.measures.figure import ReportSection
 from odscen.records.outcomes import ActorStatus
 from odscen.records.traces import bin_width, speed_over_time
+from odscen.reports.charts import Series, line_chart
 from odscen.reports.page_templates import report_section
-from odscen.reports.plots import Series, line_chart
 from odscen.reports.report_figures import Card, card_grid, figure_cards
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from odscen.figures.measures.registry import figure_values
 from odscen.figures.measures.usability import UsabilityLevel, run_usability
 from odscen.records.outcomes import RunStatus
 from odscen.records.traces import bin_width, speed_over_time, tidy, travel
+from odscen.reports.charts import Series, line_chart
 from odscen.reports.page_templates import html_page, page_head, report_section
-from odscen.reports.plots import Series, line_chart
 from odscen.reports.report_brief import brief_section
 from odscen.reports.report_conflicts import conflict_section
 from odscen.reports.report_corridor import corridor_section
@@ -28,10 +28,11 @@ from odscen.reports.report_figures import key_figure_section
 from odscen.reports.report_flow import diagram_section, flow_section
 from odscen.reports.report_groups import group_section, station_section
 from odscen.reports.report_incidents import incident_section
-from odscen.reports.report_map import CATEGORIES, run_map
+from odscen.reports.report_maps import CATEGORIES, run_map
 from odscen.reports.report_measures import measure_section
 from odscen.reports.report_parking import parking_section
 from odscen.reports.report_service import service_section
+from odscen.reports.report_signals import signal_section
 from odscen.reports.report_tables import (
     actor_table,
     criteria_table,
@@ -41,7 +42,6 @@ from odscen.reports.report_tables import (
 from odscen.reports.report_transit import transit_section
 from odscen.reports.report_walking import walking_section
 from odscen.reports.report_words import duration, starting_at
-from odscen.reports.signals.report_signals import signal_section
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -58,9 +58,9 @@ if TYPE_CHECKING:
     from odscen.records.assignment_steps import Assignment
     from odscen.records.run_events import Event
     from odscen.records.run_plan import Plan
-    from odscen.reports.place_shapes import PlaceShapes
     from odscen.reports.report_corridor import CorridorTraces
-    from odscen.reports.signals.report_signals import LightsOfRun
+    from odscen.reports.report_maps import PlaceShapes
+    from odscen.reports.report_signals import LightsOfRun
 
 
 def render_report(

@@ -12,9 +12,8 @@ from odscen.base.markup import Markup, element
 from odscen.experiments.regression.place_map import place_map
 from odscen.experiments.regression.verdict import FEWEST
 from odscen.experiments.suites.suite_loading import map_before
-from odscen.reports.place_shapes import place_shapes
-from odscen.reports.plots import legend
-from odscen.reports.report_map import SPEED_STEPS_KMH
+from odscen.reports.charts import legend
+from odscen.reports.report_maps import SPEED_STEPS_KMH, place_shapes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

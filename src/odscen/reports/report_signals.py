@@ -8,10 +8,14 @@ from odscen.base.markup import Markup, element, join, number
 from odscen.figures.measures.figure import ReportSection
 from odscen.reports.page_templates import html_table, report_section
 from odscen.reports.report_figures import card_grid, figure_cards
-from odscen.reports.signals.signal_charts import bar_chart, plan_chart, shown_bars
-from odscen.reports.signals.signal_sheet import legend_picture, legend_shapes
-from odscen.reports.signals.signal_tables import detector_table, split_table
-from odscen.reports.signals.stage_diagrams import JunctionPictures, stage_diagram
+from odscen.reports.signal_pictures import (
+    JunctionPictures,
+    bar_chart,
+    plan_chart,
+    shown_bars,
+    stage_diagram,
+)
+from odscen.reports.signal_sheet import detector_table, legend_picture, legend_shapes, split_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

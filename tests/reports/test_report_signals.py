@@ -12,9 +12,8 @@ from odscen.records.light_programs import (
     ShownGroup,
     ShownPlan,
 )
-from odscen.reports.signals.report_signals import LightsOfRun, signal_section
-from odscen.reports.signals.signal_charts import program_bars, shown_bars
-from odscen.reports.signals.stage_diagrams import stage_diagram
+from odscen.reports.report_signals import LightsOfRun, signal_section
+from odscen.reports.signal_pictures import program_bars, shown_bars, stage_diagram
 
 GROUPS = (
     ShownGroup(
