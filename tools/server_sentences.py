@@ -44,7 +44,7 @@ SHOWN = (
     "figures/measures/traffic_files",
     "records/",
     "runs/",
-    "reports/signals/stage_diagrams",
+    "reports/signal_pictures",
     "scenario/",
     "sumo/",
     "web/",

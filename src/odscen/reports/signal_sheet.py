@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING
 
 from odscen.base.markup import Markup, element, number
 from odscen.records.light_programs import stage_spans
-from odscen.reports.page_templates import html_table
+from odscen.reports.signal_charts import plan_chart, plan_height
 from odscen.reports.signal_pictures import (
     SIDE,
     SITE,
     JunctionPictures,
     detector_label,
     detector_purpose,
-    plan_chart,
-    plan_height,
 )
 
 if TYPE_CHECKING:
@@ -23,7 +21,9 @@ if TYPE_CHECKING:
 
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.records.light_programs import LightProgram, ShownPlan
-    from odscen.reports.signal_pictures import StagePicture
+    from odscen.reports.signal_pictures import (
+        StagePicture,
+    )
 
 
 SPLIT_HEADS = ("Stage", "Green, s", "Split, s", "Split, %", "Groups")
@@ -56,34 +56,6 @@ def detector_rows(light: LightProgram) -> list[tuple[str, ...]]:
         row = (detector_label(light, one), before, gap, detector_purpose(one))
         loops[row] = loops.get(row, 0) + 1
     return [(name, str(count), *more) for (name, *more), count in loops.items()]
-
-
-def split_table(light: LightProgram, plan: ShownPlan) -> Markup:
-    """Splits of a plan."""
-    label = f"Splits of junction {light.junctions[0]}, plan {plan.id}"
-    return html_table(SPLIT_HEADS, _html(split_rows(light, plan), numbers=(1, 2, 3)), label=label)
-
-
-def detector_table(light: LightProgram) -> Markup | None:
-    """Detectors of a light; ``None`` if it has none."""
-    if not light.detectors:
-        return None
-    label = f"Detectors of junction {light.junctions[0]}"
-    return html_table(DETECTOR_HEADS, _html(detector_rows(light), numbers=(1, 2, 3)), label=label)
-
-
-def _html(rows: Sequence[Sequence[str]], *, numbers: Sequence[int]) -> list[Markup]:
-    return [
-        element(
-            "tr",
-            element("th", row[0], scope="row"),
-            *(
-                element("td", cell, class_="n" if at in numbers else None)
-                for at, cell in enumerate(row[1:], 1)
-            ),
-        )
-        for row in rows
-    ]
 
 
 WIDTH = 1120.0

@@ -11,7 +11,7 @@ from odscen.experiments.regression.place_map import place_map
 from odscen.figures.measures.comparison import Finding
 from odscen.reports.charts import Dots, dot_chart, legend
 from odscen.reports.page_templates import html_page, html_table, page_head, report_section
-from odscen.reports.report_flow import DENSITY, FLOW, column
+from odscen.reports.report_sections import DENSITY, FLOW, column
 from odscen.reports.report_words import stretch
 
 if TYPE_CHECKING:

@@ -24,11 +24,10 @@ from odscen.app.signals.signal_views import (
 from odscen.app.signals.turn_arrows import arrow_words, with_turn_arrows
 from odscen.base.errors import InputError, NotFoundError
 from odscen.records.light_programs import programs_from_json, stage_spans
+from odscen.reports.signal_charts import plan_chart, plan_scale
 from odscen.reports.signal_pictures import (
     JunctionPictures,
     detector_label,
-    plan_chart,
-    plan_scale,
     stage_words,
 )
 from odscen.reports.signal_sheet import legend_picture, legend_shapes
