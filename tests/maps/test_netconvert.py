@@ -87,7 +87,7 @@ def fake(folder: Path, script: str) -> Path:
     ],
 )
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a script that runs by itself")
-def test_every_way_to_fail_says_what_read_recorded(
+def test_every_way_to_fail_says_what_happened(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, problem: str
 ) -> None:
     program = fake(tmp_path, script)

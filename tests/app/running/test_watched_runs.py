@@ -58,7 +58,7 @@ def test_steps_are_where_the_trajectories_are(
             assert np.abs(speed - step.speed[order]).max(initial=0.0) < 1e-4
 
 
-def test_leaving_the_loop_stops_the_run_and_keeps_what_read_recorded(
+def test_leaving_the_loop_stops_the_run_and_keeps_what_happened(
     workspace: Workspace, sampled: Path, tmp_path: Path, plain: Run
 ) -> None:
     with watch(workspace, sampled, settings=SETTINGS, out=tmp_path) as steps:

@@ -314,7 +314,7 @@ def test_a_scene_of_esmini_is_imported_with_its_map(client: TestClient) -> None:
 
 
 @pytest.mark.slow
-def test_a_finished_run_is_downloaded_as_it_read_recorded(client: TestClient, sampled: str) -> None:
+def test_a_finished_run_is_downloaded_as_it_happened(client: TestClient, sampled: str) -> None:
     answer = client.post("/api/runs", json={"scenario": sampled, "until": 3})
     run = str(answer.json()["run"])
     finished(client, run)
