@@ -8290,11 +8290,8 @@ export interface components {
             state: "running" | "done" | "stopped" | "failed";
             /** Parameters */
             parameters: string[];
-            /**
-             * Method
-             * @enum {string}
-             */
-            method: "grid" | "latin" | "sobol" | "random";
+            /** Method */
+            method: string;
             /** Cases */
             cases: number;
             /** Ended */
@@ -8336,9 +8333,8 @@ export interface components {
             /**
              * Method
              * @default grid
-             * @enum {string}
              */
-            method?: "grid" | "latin" | "sobol" | "random";
+            method?: string;
             /** Samples */
             samples?: number | null;
             /**
