@@ -50,7 +50,7 @@ SHOWN = (
     "figures/measures/traffic_files",
     "records/",
     "runs/",
-    "reports/signals/stage_diagrams",
+    "reports/signal_pictures",
     "scenario/",
     "simulators/",
     "sumo/",
