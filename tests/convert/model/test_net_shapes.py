@@ -5,7 +5,7 @@ import pytest
 
 from odscen.base.ids import SumoEdgeId, SumoLaneId
 from odscen.convert.model.net import INTERNAL, Net, NetEdge, NetLane, NetLink
-from odscen.convert.model.net_xml import border
+from odscen.convert.model.net_shapes import border
 
 BEND = np.array([[0.0, 0.0, 1.0], [10.0, 0.0, 1.0], [10.0, 10.0, 2.0]])
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.convert.model.net_xml import LinkPath
+from odscen.convert.model.net_shapes import LinkPath
 
 if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
