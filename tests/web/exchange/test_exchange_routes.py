@@ -16,6 +16,7 @@ from starlette.testclient import TestClient
 
 from odscen.app.exchange.imports import import_file
 from odscen.formats.base import VERDICTS
+from odscen.maps import child_process
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import loads
 from odscen.web.application import create_app
@@ -332,7 +333,7 @@ def test_a_finished_run_is_downloaded_as_it_happened(client: TestClient, sampled
     assert client.get(f"/api/runs/{run}/export", params={"to": "graphml"}).status_code == 422
 
 
-def test_a_format_of_a_package_is_listed_and_downloaded(
+def test_a_format_of_a_package_is_listed_downloaded_and_read(
     client: TestClient, sampled: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own_format.install(tmp_path, monkeypatch)
@@ -343,7 +344,21 @@ def test_a_format_of_a_package_is_listed_and_downloaded(
         assert (own["title"], own["reads"], own["writes"]) == (
             "Table of road users (CSV)", True, True,
         )  # fmt: skip
-        (name,) = opened(client, sampled, to="actors")
+        (name,) = files = opened(client, sampled, to="actors")
         assert name == f"{sampled}.actors.csv"
+        # A child that waits for work has been started before the package was there.
+        monkeypatch.setattr(child_process, "_taken", child_process._Child)
+        parts = [("files", (name, files[name]))]
+        started = client.post("/api/imports/actors", files=parts)
+        assert "names no map" in job(client, started)["error"]["message"]
+        road = Path(__file__).parents[3] / "maps" / f"{CROSSING}.xodr"
+        parts.append(("files", (road.name, road.read_bytes())))
+        ended = job(client, client.post("/api/imports/actors", files=parts))
+        assert ended["state"] == "done", ended["error"]
+        place = f"/api/scenarios/{ended['result']}"
+        before = client.get(f"/api/scenarios/{sampled}").json()["document"]["actors"]
+        after = client.get(place).json()["document"]["actors"]
+        assert [one["spawn"] for one in after] == [one["spawn"] for one in before]
+        assert len(client.get(f"{place}/import").json()["taken"]) == len(before)
     finally:
         own_format.forget()

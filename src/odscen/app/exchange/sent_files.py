@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from odscen.app.exchange.imports import bare_map_name, plan_text, read_content
 from odscen.base.checksums import digest
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, OdscenError
 from odscen.base.given_files import MOST, read_given
 from odscen.base.shown import printable
 from odscen.formats import find_format
@@ -206,8 +206,11 @@ def _is_map(name: str) -> bool:
 # ---------------------------------------------------------------------------- in the child
 
 
-class _MapAskedError(Exception):
-    """A reader asks for a map that is not settled yet."""
+class _MapAskedError(OdscenError):
+    """A reader asks for a map that is not settled yet.
+
+    It is one of ours, so that it passes through formats of installed packages as it is.
+    """
 
     def __init__(self, named: str) -> None:
         self.named = named
