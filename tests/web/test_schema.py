@@ -85,6 +85,7 @@ def test_the_server_keeps_to_its_schema(
         "study": "rain",
         "case": "case-001",
         "job": "job-1",
+        "simulator": "carla-native",
         "junction": light,
         "item": item,
     }

@@ -16,7 +16,7 @@ from odscen.scenario.signals.stage_sequence import cycle_length
 from odscen.sumo.realize.lights.light_realization import realized_lights
 from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.runner.prepare import prepare
-from odscen.sumo.runner.run_jobs import write_sumo_files
+from odscen.sumo.runner.run_folder import write_sumo_files
 from tests.signal_case import (
     carried_out,
     crossing,

@@ -31,7 +31,8 @@ from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.runner.prepare import prepare
-from odscen.sumo.runner.run_jobs import run_prepared, write_sumo_files
+from odscen.sumo.runner.run_folder import write_sumo_files
+from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.conftest import BIN
 
 if TYPE_CHECKING:
