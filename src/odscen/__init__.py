@@ -38,10 +38,12 @@ if TYPE_CHECKING:
         ToolError,
         WorkspaceError,
     )
+    from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.experiments.regression.compare import RunComparison, compare
     from odscen.figures.judging.expectations import parse_expectation
     from odscen.learning.hetero_data import read_arrays
+    from odscen.maps.importers.base import ImportedMap, ImportSettings, MapImporter
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.shipped import shipped_maps
     from odscen.maps.store import Workspace
@@ -60,6 +62,11 @@ _HOMES = {
     "Workspace": "odscen.maps.store",
     "MapEntry": "odscen.maps.map_entry",
     "shipped_maps": "odscen.maps.shipped",
+    "MapImporter": "odscen.maps.importers.base",
+    "ImportedMap": "odscen.maps.importers.base",
+    "ImportSettings": "odscen.maps.importers.base",
+    "ReportEntry": "odscen.convert.model.conversion_report",
+    "ElementOutcome": "odscen.convert.model.conversion_report",
     "ConversionSettings": "odscen.convert.model.conversion_settings",
     "Scenario": "odscen.scenario.document.scenario_document",
     "GenerationSettings": "odscen.scenario.sampling.generation_settings",
@@ -108,15 +115,20 @@ __all__ = [
     "ConditionKind",
     "ConflictError",
     "ConversionSettings",
+    "ElementOutcome",
     "GenerationSettings",
+    "ImportSettings",
+    "ImportedMap",
     "InputError",
     "LimitError",
     "MapEntry",
+    "MapImporter",
     "NotFoundError",
     "OdscenError",
     "Problem",
     "Reading",
     "Recording",
+    "ReportEntry",
     "Run",
     "RunComparison",
     "RunSettings",
