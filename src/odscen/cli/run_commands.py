@@ -306,12 +306,16 @@ def resume(
     time_limit: Annotated[
         float | None, typer.Option(min=1, help="Wall seconds after which it is interrupted again.")
     ] = None,
+    behaviour: BehaviourOption = None,
+    behaviour_set: BehaviourSettingOption = None,
+    behaviour_cmd: BehaviourCommandOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Resume an interrupted long run; it ends as if it had not been interrupted.
 
-    Exit codes as of ``run``.
+    A run that is driven by a program, a module or a file resumes when that is named again: what
+    a folder says is never executed by itself. Exit codes as of ``run``.
     """
     from odscen.app.running import resumed_runs
     from odscen.maps.store import Workspace
@@ -322,7 +326,12 @@ def resume(
             step(_words(run.name, message), message.time / message.until)
 
         result = resumed_runs.resume(
-            Workspace.open(workspace), run, time_limit=time_limit, progress=follow, tell=log
+            Workspace.open(workspace),
+            run,
+            time_limit=time_limit,
+            progress=follow,
+            tell=log,
+            behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, 60.0),
         )
     show_results([result], as_json=as_json, several=False)
     raise typer.Exit(result.exit_code)

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
 import signal
 from dataclasses import replace
@@ -12,9 +14,17 @@ import pytest
 
 from bench.kills import traffic
 from odscen.app.running.runs import check_file, prepare_run
-from odscen.base.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
+from odscen.base.errors import (
+    ConflictError,
+    DamagedError,
+    InputError,
+    NotFoundError,
+    SimulationError,
+    WorkspaceError,
+)
 from odscen.figures.judging.expectations import parse_expectation
 from odscen.figures.measures.summary import actors_from_json
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.maps.store import Workspace
 from odscen.records.run_events import EventKind, events_from_json
 from odscen.runs import checkpoint, layout, run_status
@@ -450,3 +460,48 @@ def test_the_allocator_makes_no_difference_to_results(
     monkeypatch.setenv("LD_PRELOAD", "")
     run_prepared(long, tmp_path / "run")
     assert results(tmp_path / "run") == whole
+
+
+def test_whatever_of_its_start_is_changed_deleted_or_added_an_interrupted_run_is_not_resumed(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=1)
+    started = [*run.glob("sumo/*"), run / layout.PLAN_FILE, run / layout.SETTINGS_FILE]
+    assert {"net.net.xml", "routes.rou.xml", "scenario.sumocfg"} <= {one.name for one in started}
+    for file in started:
+        content = file.read_bytes()
+        for changed in (content[:-2] + b" " + content[-1:], content + b" ", None):
+            file.unlink() if changed is None else file.write_bytes(changed)
+            with pytest.raises(DamagedError, match=re.escape(file.name)):
+                resume(run)
+        file.write_bytes(content)
+    for name in ("closures.add.xml", "stops.add.xml", "behaviour.json"):
+        (run / "sumo" / name).write_text("{}", encoding="utf-8")
+        with pytest.raises(DamagedError, match=name):
+            resume(run)
+        (run / "sumo" / name).unlink()
+    assert resume(run).status == "completed"
+
+
+@pytest.mark.parametrize("stored", ["command", "name"])
+def test_code_that_only_the_folder_names_is_not_executed(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stored: str
+) -> None:
+    """Not even where whoever wrote it has written the checksums, too."""
+    run, mark = tmp_path / "run", tmp_path / "executed"
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=1)
+    source = f"from pathlib import Path\nPath({str(mark)!r}).touch()\nModel = 1\n"
+    (tmp_path / "model.py").write_text(source, encoding="utf-8")
+    door = (
+        {"command": f"touch {mark}"}
+        if stored == "command"
+        else {"name": f"{tmp_path}/model.py:Model"}
+    )
+    (run / "sumo" / "behaviour.json").write_text(json.dumps(door), encoding="utf-8")
+    seal_start(run)
+    with pytest.raises(InputError, match="name it again"):
+        resume(run)
+    with pytest.raises(InputError, match="not what drives this run"):
+        resume(run, behaviour=BehaviourDoor(name="idm"))
+    assert not mark.exists()

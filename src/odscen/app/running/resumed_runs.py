@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
     from odscen.sumo.runner.worker_process import Companion
@@ -29,6 +30,7 @@ def resume(
     progress: OnProgress | None = None,
     tell: Callable[[str], None] | None = None,
     live: Companion | None = None,
+    behaviour: BehaviourDoor | None = None,
 ) -> Run:
     """Resume an interrupted run and write its report.
 
@@ -46,6 +48,8 @@ def resume(
         Called with where it goes on, and what is damaged.
     live
         Makes it a run that can be watched and steered.
+    behaviour
+        What drives instead of SUMO, named again where it is a program, a module or a file.
 
     Returns
     -------
@@ -58,6 +62,8 @@ def resume(
         If there is no such run.
     ConflictError
         If it has ended, or is going on.
+    InputError
+        If it is driven by code that only its folder names.
     """
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
@@ -69,5 +75,11 @@ def resume(
 
     folder = run if run.is_dir() else workspace.runs / run
     return long_runs.resume(
-        folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish, live=live
+        folder,
+        progress=progress,
+        tell=tell,
+        time_limit=time_limit,
+        finish=finish,
+        live=live,
+        behaviour=behaviour,
     )

@@ -38,6 +38,7 @@ from odscen.runs.run_status import (
 )
 from odscen.runs.run_sums import (
     check_run_files,
+    refuse_additions,
     seal_interrupted,
     seal_run,
     seal_start,
@@ -50,12 +51,14 @@ from odscen.sumo.runner.run_folder import (
     write_run_folder,
 )
 from odscen.sumo.runner.worker_process import run_worker
+from odscen.sumo.worker.behaviour.behaviour_doors import is_installed, read_behaviour
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
     from pathlib import Path
 
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.sumo.runner.run_folder import Finish
     from odscen.sumo.runner.worker_process import Companion
     from odscen.sumo.worker.protocol import OnProgress
@@ -99,6 +102,7 @@ def resume(
     time_limit: float | None = None,
     finish: Finish | None = None,
     live: Companion | None = None,
+    behaviour: BehaviourDoor | None = None,
 ) -> Run:
     """Go on with an interrupted run from its last complete slice.
 
@@ -106,6 +110,9 @@ def resume(
 
     Parameters
     ----------
+    behaviour
+        What drives instead of SUMO, named again where the run has a program, a socket or a file:
+        what a folder says is data, and is not executed for that.
     tell
         Called with what the user should know: where it goes on, and which slices are damaged.
     time_limit
@@ -119,6 +126,8 @@ def resume(
         If it has ended already, or is going on.
     DamagedError
         If what it starts from is not as it was written.
+    InputError
+        If it is driven by code that is named in its folder alone, or by another than is named now.
     """
     _refuse_absent(folder)
     with disk_errors(f"run folder {folder}", advice=_again(folder)), run_lock(folder) as lock:
@@ -127,6 +136,7 @@ def resume(
         check_run_files(folder)
         unsealed(folder / layout.STATUS_FILE)
         prepared = _restore(folder, time_limit)
+        _refuse_unnamed_code(folder, behaviour)
         number, problems = survey(folder)
         if tell is not None:
             for problem in problems:
@@ -262,6 +272,7 @@ def _write_settings(prepared: PreparedRun, folder: Path) -> None:
     settings = {
         "format": FORMAT,
         "version": VERSION,
+        "sealed": "whole",
         "problems": list(prepared.problems),
         "notes": list(prepared.notes),
         "about": dict(prepared.about),
@@ -269,6 +280,31 @@ def _write_settings(prepared: PreparedRun, folder: Path) -> None:
     }
     text = json.dumps(settings, indent=2, ensure_ascii=False) + "\n"
     (folder / layout.SETTINGS_FILE).write_text(text, encoding="utf-8")
+
+
+def _refuse_unnamed_code(folder: Path, named: BehaviourDoor | None) -> None:
+    """Refuse to execute what only the folder names: it may come from anybody."""
+    path = folder / layout.SUMO_FOLDER / layout.BEHAVIOUR_FILE
+    if not path.is_file():
+        if named is not None:
+            raise InputError("SUMO drives this run; no behaviour model is resumed in it")
+        return
+    stored = read_behaviour(path.read_text(encoding="utf-8"))
+    if named is not None and (
+        (named.name, named.command, named.socket) != (stored.name, stored.command, stored.socket)
+        or (named.options and dict(named.options) != dict(stored.options))
+    ):
+        raise InputError(
+            f"it is not what drives this run, which is {stored.shown!r} with "
+            f"{dict(stored.options) or 'no options'}",
+            element=named.shown,
+        )
+    if named is None and not is_installed(stored):
+        option = "--behaviour-cmd" if stored.command is not None else "--behaviour"
+        raise InputError(
+            f"this run is driven by code that its folder names; name it again if you trust it: "
+            f"odscen resume {folder} {option} {stored.name or stored.command or stored.socket!r}"
+        )
 
 
 def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
@@ -281,6 +317,8 @@ def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
                 f"format {data['format']!r} version {data['version']!r} is not a run to resume",
                 file=str(path),
             )
+        if data.get("sealed") == "whole":  # earlier versions left some files without checksums
+            refuse_additions(folder)
         expectations = tuple(parse_expectation(text) for text in data["expectations"])
         return PreparedRun(
             plan=Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8")),
