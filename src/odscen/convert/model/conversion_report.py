@@ -36,8 +36,12 @@ class ReportEntry(NamedTuple):
 
     Attributes
     ----------
+    outcome
+        What became of the element.
     element
         Its path, as in ``road 7 > laneSection 0 > lane -1``.
+    reason
+        Why, in words.
     confidence
         How sure an importer of another format is, 0 to 1; ``None`` if nothing is said of it.
     source_id

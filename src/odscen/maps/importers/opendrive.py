@@ -31,7 +31,13 @@ class OpenDriveImporter(MapImporter):
         return file.lower().endswith(self.suffixes) or root_element(content) == "OpenDRIVE"
 
     def to_opendrive(self, content: bytes, options: Mapping[str, OptionValue]) -> ImportedMap:  # noqa: ARG002 - it has none
-        """Give the file as it is; its report is that of the conversion to SUMO."""
+        """Give the file as it is; its report is that of the conversion to SUMO.
+
+        Raises
+        ------
+        OpenDriveError
+            If it is packed.
+        """
         if is_packed(content):
             kind = file_kind(content, "map.xodr")
             raise OpenDriveError(f"this is {kind.what}: {kind.advice}")

@@ -15,7 +15,8 @@ from odscen.maps.importers.file_kinds import file_kind
 from odscen.maps.importers.opendrive import OpenDriveImporter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Container
+    from importlib.metadata import EntryPoint
 
     from odscen.maps.importers.base import ImportSettings
 
@@ -42,20 +43,24 @@ def map_importers() -> Importers:
     broken = {}
     for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
         try:
-            kind = point.load()
-            if not (isinstance(kind, type) and issubclass(kind, MapImporter)):
-                raise TypeError(f"{point.value} is no subclass of MapImporter")
-            importer = kind()
-            if importer.name != point.name:
-                raise ValueError(f"{point.value} calls itself {importer.name!r}")
-            if importer.name in usable:
-                raise ValueError("there is an importer of that name already")
-            options_of(kind)
+            usable[point.name] = _load_importer(point, taken=usable)
         except Exception as error:  # whatever an import may raise
             broken[point.name] = str(error) or repr(error)
-        else:
-            usable[importer.name] = importer
     return Importers(usable, broken)
+
+
+def _load_importer(point: EntryPoint, *, taken: Container[str]) -> MapImporter:
+    """Make the importer of an entry point; raises whatever its package raises."""
+    kind = point.load()
+    if not (isinstance(kind, type) and issubclass(kind, MapImporter)):
+        raise TypeError(f"{point.value} is no subclass of MapImporter")
+    importer = kind()
+    if importer.name != point.name:
+        raise ValueError(f"{point.value} calls itself {importer.name!r}")
+    if importer.name in taken:
+        raise ValueError("there is an importer of that name already")
+    options_of(kind)
+    return importer
 
 
 def importer_named(name: str) -> MapImporter:
