@@ -9,8 +9,8 @@ import numpy as np
 
 from odscen.base.markup import Markup, element, join, number
 from odscen.experiments.table import column_units
+from odscen.reports.charts import Axis, ChartFrame, chart, legend, nice_ticks, text_at
 from odscen.reports.page_templates import html_page, html_table, page_head, report_section
-from odscen.reports.plots import Axis, ChartFrame, chart, legend, nice_ticks, text_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
