@@ -12,6 +12,7 @@ from PIL import Image
 
 import odscen
 from odscen.app import generators
+from odscen.maps.importers import registry
 from odscen.scenario.story import own_kinds
 from odscen.sumo.worker.behaviour import behaviour_doors
 from tools.docs_site import switched_pictures
