@@ -14,6 +14,7 @@ import odscen
 from odscen.app import generators
 from odscen.maps.importers import registry
 from odscen.scenario.story import own_kinds
+from odscen.simulators import assets
 from odscen.sumo.worker.behaviour import behaviour_doors
 from tools.docs_site import switched_pictures
 
@@ -106,6 +107,8 @@ def test_modules_that_a_document_names_are_there(path: Path) -> None:
         own_kinds.ACTION_GROUP,
         generators.GROUP,
         behaviour_doors.GROUP,
+        assets.GROUP,
+        registry.GROUP,
     }  # entry points
     assert sorted(module for module in named if not exists(module)) == []
 
