@@ -12,6 +12,7 @@ from PIL import Image
 
 import odscen
 from odscen.app import generators
+from odscen.maps.importers import registry
 from odscen.scenario.story import own_kinds
 from odscen.simulators import assets
 from odscen.sumo.worker.behaviour import behaviour_doors
@@ -107,6 +108,7 @@ def test_modules_that_a_document_names_are_there(path: Path) -> None:
         generators.GROUP,
         behaviour_doors.GROUP,
         assets.GROUP,
+        registry.GROUP,
     }  # entry points
     assert sorted(module for module in named if not exists(module)) == []
 

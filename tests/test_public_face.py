@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from dataclasses import is_dataclass
+from enum import Enum
 from pathlib import Path
 
 import pytest
@@ -86,6 +87,7 @@ def test_whatever_is_not_a_main_noun_is_keyword_only(name: str) -> None:
 def test_every_class_tells_its_fields(name: str) -> None:
     found = getattr(odscen, name)
     fields = is_dataclass(found) or hasattr(found, "model_fields") or hasattr(found, "_fields")
+    fields = fields or inspect.isabstract(found) or issubclass(found, Enum)
     assert ("Attributes" if fields else "Parameters") in sections(name)
     told = inspect.getdoc(found) or ""
     names = found.model_fields if hasattr(found, "model_fields") else getattr(found, "_fields", ())

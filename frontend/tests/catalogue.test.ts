@@ -67,7 +67,13 @@ test("only maps that have all that is wished for are shown", () => {
 });
 
 test("a conversion report says the same of many places once, what was lost first", () => {
-  const entry = (fate: Entry["fate"], element: string, reason: string): Entry => ({ fate, element, reason });
+  const entry = (fate: Entry["fate"], element: string, reason: string): Entry => ({
+    fate,
+    element,
+    reason,
+    confidence: null,
+    source_id: null,
+  });
   const report = {
     counts: {},
     figures: {
@@ -108,4 +114,16 @@ test("steps of a job are reported in plain words, with the map's name if there a
   expect(stepWords("making the SUMO network")).toBe("Step 3 of 4: preparing the simulation");
   expect(stepWords("town: drawing the map")).toBe("town, step 4 of 4: drawing the map");
   expect(stepWords("waiting")).toBe("Waiting");
+});
+
+test("a place in a map of another format has its id there, and how sure the importer is", () => {
+  const entry = { fate: "guessed", element: "road 1", reason: "a width of 3.5 m" } as const;
+  const entries = [
+    { ...entry, confidence: 0.456, source_id: "way/7" },
+    { ...entry, confidence: null, source_id: "way/8" },
+  ];
+  expect(grouped({ counts: {}, figures: {}, entries })[0]?.findings[0]?.places).toEqual([
+    "road 1, way/7, 46 % sure",
+    "road 1, way/8",
+  ]);
 });

@@ -161,6 +161,7 @@ export const mapInfo = (name: string, junctions: number): MapInfo => ({
   name,
   sha256: "",
   source: "",
+  importer: "opendrive",
   opendrive: { version: "1.7", rule: "RHT" },
   report_counts: {},
   network: { converter: "odscen", source: null },

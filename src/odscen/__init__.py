@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         ToolError,
         WorkspaceError,
     )
+    from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.experiments.compare import RunComparison, compare
     from odscen.experiments.gates import run_suite
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from odscen.figures.judging.expectations import parse_expectation
     from odscen.formats.base import Format
     from odscen.learning.hetero_data import read_arrays
+    from odscen.maps.importers.base import ImportedMap, ImportSettings, MapImporter
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.shipped import shipped_maps
     from odscen.maps.store import Workspace
@@ -78,6 +80,11 @@ _HOMES = {
     "Workspace": "odscen.maps.store",
     "MapEntry": "odscen.maps.map_entry",
     "shipped_maps": "odscen.maps.shipped",
+    "MapImporter": "odscen.maps.importers.base",
+    "ImportedMap": "odscen.maps.importers.base",
+    "ImportSettings": "odscen.maps.importers.base",
+    "ReportEntry": "odscen.convert.model.conversion_report",
+    "ElementOutcome": "odscen.convert.model.conversion_report",
     "ConversionSettings": "odscen.convert.model.conversion_settings",
     "Scenario": "odscen.scenario.document.scenario_document",
     "GenerationSettings": "odscen.scenario.sampling.generation_settings",
@@ -152,19 +159,24 @@ __all__ = [
     "ConflictError",
     "ConversionSettings",
     "Editing",
+    "ElementOutcome",
     "ExperimentPlan",
     "ExperimentResults",
     "Format",
     "GenerationSettings",
+    "ImportSettings",
     "ImportedFile",
+    "ImportedMap",
     "InputError",
     "LimitError",
     "MapEntry",
+    "MapImporter",
     "NotFoundError",
     "OdscenError",
     "Problem",
     "Reading",
     "Recording",
+    "ReportEntry",
     "Run",
     "RunComparison",
     "RunSettings",

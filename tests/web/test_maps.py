@@ -14,7 +14,9 @@ from odscen.app.removal import remove
 from odscen.lanegraph.query import node_ids
 from odscen.maps.store import Workspace
 from odscen.web.application import create_app
+from tests import own_importer
 from tests.opendrive.snippets import document, lane, road, section
+from tests.own_importer import PLACE
 from tests.web.conftest import CROSSING, SHIPPED, job, wait_for
 
 _ENTITIES = "".join(f'<!ENTITY b{i} "{f"&b{i - 1};" * 10}">' for i in range(1, 10))
@@ -74,7 +76,10 @@ def test_maps_are_listed_with_what_the_catalogue_knows(
     assert row["statistics"] == json.loads(json.dumps(info["statistics"]))
     assert row["report_counts"] == info["report"]["counts"]
     assert client.get(row["preview"]).headers["content-type"] == "image/svg+xml"
-    assert client.get(f"/api/maps/{CROSSING}/report").json() == info["report"]
+    unknown = {"confidence": None, "source_id": None}  # only importers of other formats say it
+    entries = [{**entry, **unknown} for entry in info["report"]["entries"]]
+    sent = client.get(f"/api/maps/{CROSSING}/report").json()
+    assert sent == {**info["report"], "entries": entries}
     assert client.get(f"/api/maps/{CROSSING}/drawing").content == (
         workspace.map(CROSSING).path("drawing").read_bytes()
     )
@@ -276,3 +281,35 @@ def test_maps_of_an_older_odscen_are_listed_and_previewed_as_they_are_and_built_
         about.write_text(json.dumps(older))
         assert client.get("/api/maps").json() == [row | {"outdated": False}]
         assert json.loads(about.read_text())["builder"] != "1"
+
+
+def test_a_map_of_another_format_is_taken_by_the_importer_of_an_installed_package(
+    client: TestClient, workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = tmp_path / "site"
+    site.mkdir()
+    own_importer.install(site, monkeypatch)
+    formats = client.get("/api/map-importers").json()
+    assert [(one["name"], one["suffixes"]) for one in formats] == [
+        ("opendrive", [".xodr"]),
+        ("road", [".road"]),
+    ]
+    assert formats[1]["options"][0]["name"] == "lane_width"
+    started = upload(client, PLACE, "My place.road", options='{"lane_width": 4}')
+    assert job(client, started)["result"] == "My_place"  # type: ignore[arg-type]
+    assert workspace.map("My_place").read("original") == PLACE
+    row = next(row for row in client.get("/api/maps").json() if row["name"] == "My_place")
+    assert (row["importer"], row["source"]) == ("road", "My_place.road")
+    report = client.get("/api/maps/My_place/report").json()
+    assert (report["entries"][0]["confidence"], report["entries"][0]["source_id"]) == (
+        0.5,
+        "line 3",
+    )
+    refused = upload(client, PLACE, "place.road", options="[]")
+    assert refused.json()["error"]["message"] == "options are no JSON object"  # type: ignore[attr-defined]
+    own_importer.forget()
+
+
+def test_a_file_of_no_known_format_is_refused_with_what_it_seems_to_be(client: TestClient) -> None:
+    ended = job(client, upload(client, b"<osm/>", "town.osm"))  # type: ignore[arg-type]
+    assert "it seems to be OpenStreetMap" in ended["error"]["message"]

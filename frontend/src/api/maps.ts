@@ -9,6 +9,9 @@ export const reportUrl = (name: string): string => address("/api/maps/{name}/rep
 export const conversionReport = (name: string): Promise<ConversionReport> =>
   call("get", "/api/maps/{name}/report", { path: { name } });
 
+/** Formats that maps can have. */
+export const mapImporters = () => call("get", "/api/map-importers");
+
 /** The maps that come along; the server's job. */
 export const addShipped = () => call("post", "/api/maps/shipped");
 

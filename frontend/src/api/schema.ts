@@ -172,6 +172,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/map-importers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Map Importers
+         * @description Formats that maps can have: OpenDRIVE, and those of installed packages that can be used.
+         */
+        get: operations["list_map_importers_api_map_importers_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/maps/shipped": {
         parameters: {
             query?: never;
@@ -2335,13 +2355,23 @@ export interface components {
         Body_add_map_api_maps_post: {
             /**
              * File
-             * @description An OpenDRIVE map.
+             * @description A map of any format of `/map-importers`.
              */
             file: string;
             /** Name */
             name?: string | null;
             /** Converter */
             converter?: ("odscen" | "netconvert") | null;
+            /**
+             * Importer
+             * @description If several recognise the file.
+             */
+            importer?: string | null;
+            /**
+             * Options
+             * @description Of the importer, a JSON object.
+             */
+            options?: string | null;
         };
         /** Body_import_files_api_imports__of__post */
         Body_import_files_api_imports__of__post: {
@@ -2805,6 +2835,8 @@ export interface components {
         /**
          * ConversionEntry
          * @description What became of one element, and why.
+         *
+         *     An importer of another format says how sure it is, 0 to 1, and the element's id in its file.
          */
         ConversionEntry: {
             fate: components["schemas"]["ElementOutcome"];
@@ -2812,6 +2844,10 @@ export interface components {
             element: string;
             /** Reason */
             reason: string;
+            /** Confidence */
+            confidence: number | null;
+            /** Source Id */
+            source_id: string | null;
         };
         /**
          * ConversionInfo
@@ -3555,6 +3591,17 @@ export interface components {
         /**
          * ElementOutcome
          * @description What happened to an element.
+         *
+         *     Attributes
+         *     ----------
+         *     KEPT
+         *         It is there as it was.
+         *     REPAIRED
+         *         It was wrong, and is read as it must have been meant.
+         *     GUESSED
+         *         Something that the file does not say was completed.
+         *     LOST
+         *         It is not there any more.
          * @enum {string}
          */
         ElementOutcome: "kept" | "repaired" | "guessed" | "lost";
@@ -4172,6 +4219,20 @@ export interface components {
             y: number | null;
         };
         /**
+         * ImporterInfo
+         * @description A format that maps can have, with what can be chosen when one is added.
+         */
+        ImporterInfo: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: string;
+            /** Suffixes */
+            suffixes: string[];
+            /** Options */
+            options: components["schemas"]["OptionInfo"][];
+        };
+        /**
          * Incident
          * @description Vehicles gridlocked, teleported or not inserted at a place.
          *
@@ -4628,6 +4689,8 @@ export interface components {
             sha256: string;
             /** Source */
             source: string;
+            /** Importer */
+            importer: string;
             opendrive: components["schemas"]["MapHeader"];
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
@@ -4661,6 +4724,8 @@ export interface components {
          * MapInfo
          * @description A map of the catalogue; ``report_counts`` says how many elements had which outcome.
          *
+         *     ``importer`` has read its file ``source``: ``opendrive``, or that of another format.
+         *
          *     An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
          */
         MapInfo: {
@@ -4670,6 +4735,8 @@ export interface components {
             sha256: string;
             /** Source */
             source: string;
+            /** Importer */
+            importer: string;
             opendrive: components["schemas"]["MapHeader"];
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
@@ -12496,6 +12563,116 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ConversionInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    list_map_importers_api_map_importers_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImporterInfo"][];
                 };
             };
             /** @description The request cannot be read. */

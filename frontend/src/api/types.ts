@@ -27,6 +27,7 @@ export type WalkColumns = Schemas["WalkColumns"];
 export type PackedLines = Schemas["PackedLines"];
 export type PackedDrawing = Schemas["DrawingColumns"];
 export type ConversionReport = Schemas["ConversionInfo"];
+export type MapImporter = Schemas["ImporterInfo"];
 /** What became of an element of the map. */
 export type ElementOutcome = ConversionReport["entries"][number]["fate"];
 

@@ -1,14 +1,15 @@
 import { Alert, Button, FileButton, NativeSelect, Progress, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { type DragEvent, useRef, useState } from "react";
+import { type DragEvent, useCallback, useRef, useState } from "react";
 
 import { api } from "../api/client";
-import { addShipped, followJob } from "../api/maps";
-import type { Converter, Job } from "../api/types";
+import { addShipped, followJob, mapImporters } from "../api/maps";
+import type { Converter, Job, MapImporter } from "../api/types";
 import { isXosc } from "../exchange/useImport";
 import { tell } from "../ui/notices";
 import { reasonOf } from "../ui/reason";
+import { useLoaded } from "../ui/useLoaded";
 import { stepWords } from "./steps";
 
 interface Work {
@@ -26,6 +27,8 @@ interface Refusal {
   file: string;
   reason: string;
 }
+
+const formatWords = ({ label, suffixes }: MapImporter): string => `${label} (${suffixes.join(", ")})`;
 
 /** Scrolls to what has just been shown. */
 const intoSight = (shown: HTMLElement | null): void => shown?.scrollIntoView({ block: "nearest" });
@@ -46,6 +49,9 @@ export function AddMap({
   const [work, setWork] = useState<Work | null>(null);
   const [refusals, setRefusals] = useState<Refusal[]>([]);
   const [added, setAdded] = useState<string[]>([]);
+  const { value: importers } = useLoaded(useCallback(() => mapImporters(), []));
+  const others = (importers ?? []).filter(({ name }) => name !== "opendrive");
+  const endings = [".xodr", ".xml", ...others.flatMap(({ suffixes }) => suffixes)];
   const queue = useRef<File[]>([]);
   const busy = useRef(false);
 
@@ -172,6 +178,11 @@ export function AddMap({
                   ? t`Begin with the example maps, or drop an OpenDRIVE file (.xodr) of your own here.`
                   : t`Drop one or more OpenDRIVE files (.xodr) here, or choose them.`}
               </Text>
+              {others.length > 0 && (
+                <Text size="sm" c="dimmed">
+                  <Trans>Also taken: {others.map(formatWords).join("; ")}</Trans>
+                </Text>
+              )}
             </div>
             <div style={{ display: "flex", gap: 10, flexWrap: "wrap", alignItems: "flex-end" }}>
               <NativeSelect
@@ -186,7 +197,7 @@ export function AddMap({
               <Button variant={empty ? "filled" : "default"} onClick={() => void addThose()}>
                 <Trans>Add the example maps</Trans>
               </Button>
-              <FileButton multiple accept=".xodr,.xml" onChange={(files) => void add(files)}>
+              <FileButton multiple accept={endings.join(",")} onChange={(files) => void add(files)}>
                 {(props) => (
                   <Button variant="default" {...props}>
                     <Trans>Choose a file</Trans>

@@ -70,6 +70,12 @@ export function plainFinding(reason: string): string {
   return sentence(said === reason ? reason.replace(/\bSUMO('s)?( network)?/g, "the simulation$1") : said);
 }
 
+/** An element; of a map of another format with its id there, and how sure its importer is. */
+function placeWords({ element, source_id, confidence }: ConversionReport["entries"][number]): string {
+  const place = source_id ? `${element}, ${source_id}` : element;
+  return confidence == null ? place : t`${place}, ${Math.round(100 * confidence)} % sure`;
+}
+
 /** What became of a map, what matters most first; elements of which the same is said are together. */
 export function grouped(report: ConversionReport): Group[] {
   return TITLES().flatMap(([outcome, title]) => {
@@ -77,7 +83,7 @@ export function grouped(report: ConversionReport): Group[] {
     for (const entry of report.entries) {
       if (entry.fate !== outcome) continue;
       const text = plainFinding(entry.reason);
-      found.set(text, [...(found.get(text) ?? []), entry.element]);
+      found.set(text, [...(found.get(text) ?? []), placeWords(entry)]);
     }
     const findings = [...found].map(([text, places]) => ({ text, places }));
     findings.sort((a, b) => b.places.length - a.places.length);

@@ -113,26 +113,42 @@ def _rebuild_map(workspace: Workspace, folder: Path, step: RepairStep) -> Repair
         place = set_aside(folder, workspace.root)
         return replace(step, action="set aside", words=f"{step.words}; {error}", place=str(place))
     how = "; with the usual settings, as its own are lost" if usual else ""
-    words = f"{step.words}; built from {entry.path('xodr').name}{how}"
+    words = f"{step.words}; built from {entry.path(entry.source_key).name}{how}"
     return replace(step, action="rebuilt", words=words)
 
 
 def _built_anew(workspace: Workspace, folder: Path) -> tuple[MapEntry, bool]:
     """Build a map anew; also whether with the usual settings, for want of its own."""
-    xodr = folder / XODR_FILE
-    if not xodr.is_file() or file_digest(xodr) not in _said_of_xodr(folder):
-        raise InputError(f"its {XODR_FILE} is not as it was written, either")
+    xodr, said = folder / XODR_FILE, _said_of_sources(folder)
+
+    def is_intact(file: Path) -> bool:
+        return file.is_file() and file_digest(file) in said
+
     try:
-        settings = read_entry(folder).conversion
+        entry = read_entry(folder)
     except DamagedError:
-        return workspace.add_map(xodr, name=folder.name), True
-    if settings.converter == "file":
+        entry = None
+    if entry is not None and entry.converter == "file" and is_intact(xodr):
         raise InputError("its network was brought in: add the map, then the network again")
-    return workspace.add_map(xodr, name=folder.name, settings=settings), False
+    # A map of another format is imported again, if its original file is as it was written.
+    if entry is not None and "import" in entry.info and is_intact(entry.path("original")):
+        rebuilt = workspace.add_map_content(
+            entry.path("original").read_bytes(),
+            file=str(entry.info["source"]),
+            name=folder.name,
+            settings=entry.conversion,
+            importing=entry.importing,
+        )
+        return rebuilt, False
+    if not is_intact(xodr):
+        raise InputError(f"its {XODR_FILE} is not as it was written, either")
+    if entry is None:
+        return workspace.add_map(xodr, name=folder.name), True
+    return workspace.add_map(xodr, name=folder.name, settings=entry.conversion), False
 
 
-def _said_of_xodr(folder: Path) -> set[str]:
-    """SHA-256 of a map's .xodr, wherever its folder says it.
+def _said_of_sources(folder: Path) -> set[str]:
+    """SHA-256 of the files that a map is built from, wherever its folder says it.
 
     A damaged list or ``map.json`` may be asked, too: no damage makes it name the file's own.
     """

@@ -21,6 +21,7 @@ from odscen.cli.console import (
     WorkspaceOption,
     error_fields,
     log,
+    option_settings,
     print_json,
     print_table,
     progress,
@@ -52,7 +53,12 @@ app = typer.Typer(help="Add maps, look at them, remove them.", no_args_is_help=T
 
 @app.command()
 def add(
-    files: Annotated[list[Path], typer.Argument(help="OpenDRIVE files.", metavar="FILE.xodr...")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            help="OpenDRIVE files, or of a format of `maps importers`.", metavar="FILE..."
+        ),
+    ],
     name: Annotated[
         str | None, typer.Option(help="Name in the catalogue. (default: the file's name)")
     ] = None,
@@ -63,6 +69,13 @@ def add(
             help="Who writes the SUMO network. (default: as the map has it, odscen for a new one)"
         ),
     ] = None,
+    importer: Annotated[
+        str | None, typer.Option(help="Who reads the files. (default: who recognises each)")
+    ] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(help="A setting of the importer; repeatable.", metavar="NAME=VALUE"),
+    ] = None,
     memory: BuildMemoryOption = None,
     minutes: BuildMinutesOption = None,
     workspace: WorkspaceOption = None,
@@ -70,17 +83,20 @@ def add(
 ) -> None:
     """Add maps: build lane graph, SUMO network, statistics and drawing, once.
 
-    A map of the same name is replaced if its content differs, and kept as it is otherwise. Files
-    that cannot be used are refused with their reason; the others are added all the same. One that
-    needs more memory or time than it may have is refused too, with exit code 3.
+    A map of the same name is replaced if its content differs, and kept as it is otherwise. A file
+    of another format is converted to OpenDRIVE, and kept beside the map. Files that cannot be used
+    are refused with their reason; the others are added all the same. One that needs more memory or
+    time than it may have is refused too, with exit code 3.
     """
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.maps.allowances import BuildLimits
+    from odscen.maps.importers.base import ImportSettings
     from odscen.maps.store import Workspace
 
     if name is not None and len(files) > 1:
         raise InputError(f"--name takes one file, {len(files)} are given")
     limits = BuildLimits(memory, minutes)
+    importing = ImportSettings(importer, option_settings(option or (), element="--option"))
     store = Workspace.open(workspace)
     rows: list[dict[str, Any]] = []
     worst = 0
@@ -93,6 +109,7 @@ def add(
                     settings=ConversionSettings(
                         spacing=spacing, converter=converter.value if converter else None
                     ),
+                    importing=importing,
                     limits=limits,
                     progress=step,
                 )
@@ -162,6 +179,36 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
 
 
 @app.command()
+def importers(as_json: JsonOption = False) -> None:
+    """List the formats that maps can have, with the options of their importers."""
+    from odscen.learning.offered_options import options_of
+    from odscen.maps.importers.registry import map_importers
+
+    usable, broken = map_importers()
+    rows: list[dict[str, Any]] = [
+        {
+            "name": importer.name,
+            "label": importer.label,
+            "suffixes": list(importer.suffixes),
+            "version": importer.version,
+            "options": [option._asdict() for option in options_of(type(importer))],
+        }
+        for importer in usable.values()
+    ]
+    if as_json:
+        print_json({"importers": rows, "broken": broken})
+        return
+    table = [
+        (row["name"], row["label"], " ".join(row["suffixes"]),
+         ", ".join(f"{option['name']}={option['usual']}" for option in row["options"]))
+        for row in rows
+    ]  # fmt: skip
+    print_table("", ("name", "format", "files", "options"), table)
+    for name, reason in broken.items():
+        log(f"importer {name!r} cannot be used: {reason}")
+
+
+@app.command()
 def show(
     name: Annotated[str, typer.Argument(metavar="NAME")],
     workspace: WorkspaceOption = None,
@@ -175,7 +222,8 @@ def show(
         files = {key: str(entry.path(key)) for key in entry.info["files"]}
         print_json({**entry.info, "files": files})
         return
-    for part in ("opendrive", "statistics", "graph", "network", "sumo", "report"):
+    parts = ("import", "opendrive", "statistics", "graph", "network", "sumo", "report")
+    for part in (part for part in parts if part in entry.info):
         values = entry.info[part]
         if part == "report":
             values = values["counts"]

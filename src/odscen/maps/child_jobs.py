@@ -8,10 +8,15 @@ from typing import Any
 
 # Imported before there is work, for a child that waits for some.
 import odscen.convert.building.network  # noqa: F401
+from odscen.base.checksums import digest
+from odscen.base.errors import OpenDriveError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.lanegraph.centrelines import MOST_LANES
 from odscen.maps.converters import GivenNetwork
+from odscen.maps.importers.base import ImportSettings
+from odscen.maps.importers.registry import import_map
 from odscen.maps.map_build import build_map
+from odscen.maps.map_entry import XODR_FILE
 
 Progress = Callable[[str, float], None]
 
@@ -21,28 +26,44 @@ def _map(
     folder: str,
     name: str,
     file: str,
-    sha256: str,
     builder: str,
     spacing: float,
     converter: Any,
     given: str | None,
     source: str,
+    importer: str | None,
+    options: Mapping[str, Any],
     times_usual: float,
     progress: Progress,
 ) -> Mapping[str, Any]:
-    """Build the map whose .xodr lies in ``folder`` there."""
-    build_map(
-        Path(folder),
-        name=name,
-        file=file,
-        sha256=sha256,
-        settings=ConversionSettings(spacing=spacing, converter=converter),
-        builder=builder,
-        given=None if given is None else GivenNetwork(Path(given).read_bytes(), source),
-        most_lanes=MOST_LANES * times_usual,
-        progress=progress,
-    )
-    return {}
+    """Build the map whose file lies in ``folder`` as its .xodr; tells where that file is then."""
+    place = Path(folder)
+    xodr = place / XODR_FILE
+    content = xodr.read_bytes()
+    wish = ImportSettings(importer, options)
+    opendrive, imported = import_map(content, file, wish, progress=progress)
+    if imported is not None:
+        xodr.rename(place / imported.original)
+        xodr.write_bytes(opendrive)
+    try:
+        build_map(
+            place,
+            name=name,
+            file=file,
+            sha256=digest(opendrive),
+            settings=ConversionSettings(spacing=spacing, converter=converter),
+            builder=builder,
+            given=None if given is None else GivenNetwork(Path(given).read_bytes(), source),
+            imported=imported,
+            most_lanes=MOST_LANES * times_usual,
+            progress=progress,
+        )
+    except OpenDriveError as error:
+        if imported is not None:
+            words = f"importer {imported.importer!r} made OpenDRIVE that cannot be used"
+            error.problem = f"{words}: {error.problem}"
+        raise
+    return {"content": imported.original if imported else XODR_FILE}
 
 
 def _scenario(*, path: str, file: str | None, progress: Progress) -> Mapping[str, Any]:

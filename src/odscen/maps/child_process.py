@@ -226,7 +226,8 @@ def _give_back(child: _Child) -> None:
 
 
 @atexit.register
-def _end_waiting() -> None:
+def end_waiting() -> None:
+    """End the child that waits for work."""
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, signal.SIGINT):  # it is ending, whoever asks for it now
             signal.signal(number, signal.SIG_IGN)

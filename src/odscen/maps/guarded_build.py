@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.maps.allowances import BuildLimits
     from odscen.maps.converters import GivenNetwork
+    from odscen.maps.importers.base import ImportSettings
     from odscen.scenario.document.scenario_document import Scenario
 
 _SCRATCH = "odscen-child-"
@@ -32,10 +32,15 @@ def build_in_child(
     settings: ConversionSettings,
     builder: str,
     given: GivenNetwork | None,
+    importing: ImportSettings,
     limits: BuildLimits,
     progress: Callable[[str, float], None] | None,
-) -> None:
+) -> str:
     """Fill ``folder`` with the files of a map, see :func:`odscen.maps.map_build.build_map`.
+
+    Returns
+    -------
+    Name of the file in the folder that has ``content``.
 
     Raises
     ------
@@ -53,25 +58,27 @@ def build_in_child(
         if given is not None:
             network = scratch / "given.net.xml"
             network.write_bytes(given.net_xml)
-        work_in_child(
+        done = work_in_child(
             "map",
             what="building the map",
             arguments={
                 "folder": str(folder),
                 "name": name,
                 "file": file,
-                "sha256": hashlib.sha256(content).hexdigest(),
                 "builder": builder,
                 "spacing": settings.spacing,
                 "converter": settings.converter,
                 "given": None if network is None else str(network),
                 "source": given.source if given else "",
+                "importer": importing.importer,
+                "options": dict(importing.options),
                 "times_usual": allowance.times_usual,
             },
             folders=(scratch, folder),
             allowance=allowance,
             progress=progress,
         )
+        return str(done["content"])
 
 
 def read_scenario_in_child(content: bytes, *, file: str | None = None) -> Scenario:

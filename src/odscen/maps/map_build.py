@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.convert.lane_table.table_json import table_to_json
+from odscen.convert.model.conversion_report import ConversionReport
 from odscen.drawing.map_shapes import map_drawing
 from odscen.drawing.map_sheet import render_drawing
 from odscen.lanegraph.build_graphs import build_map_graph
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table.table import SumoLight
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.maps.converters import GivenNetwork
+    from odscen.maps.importers.base import ImportRecord
 
 
 FORMAT = "odscen-map"
@@ -53,6 +55,7 @@ def build_map(
     settings: ConversionSettings,
     builder: str,
     given: GivenNetwork | None,
+    imported: ImportRecord | None,
     most_lanes: float,
     progress: Callable[[str, float], None],
 ) -> None:
@@ -61,13 +64,15 @@ def build_map(
     Parameters
     ----------
     folder
-        Holds nothing but the .xodr; ``file`` is its name for messages and ``sha256`` its hash.
+        Holds the .xodr; ``file`` is its name for messages and ``sha256`` its hash.
     settings
         How it is converted; with a converter.
     builder
         Version of the folder's content.
     given
         A network that was brought in for the map.
+    imported
+        How the .xodr was made from a file of another format, which is in the folder, too.
     most_lanes
         Metres that all drivable lanes, or all walks, may have together.
     progress
@@ -108,7 +113,9 @@ def build_map(
     (folder / FILES["preview"]).write_text(preview, encoding="utf-8")
     (folder / FILES["net"]).write_bytes(network.net_xml)
     (folder / FILES["lane_table"]).write_text(table_to_json(network.table), encoding="utf-8")
-    header = odr.header
+    header, report = odr.header, network.report
+    if imported is not None:
+        report = ConversionReport.of((*imported.entries, *report.entries), report.figures)
     info: dict[str, Any] = {
         "format": FORMAT,
         "builder": builder,
@@ -126,9 +133,10 @@ def build_map(
         },
         "sumo": {"net_file": FILES["net"], **network.table.counts},
         "lights": [_light(light) for light in network.table.lights],
-        "files": FILES,
+        "files": FILES if imported is None else {**FILES, "original": imported.original},
         "semantics": map_semantics(odr, table),
-        "report": network.report.to_dict(),
+        "report": report.to_dict(),
+        **({} if imported is None else {"import": imported.to_dict()}),
         "build_seconds": round(time.perf_counter() - start, 3),
     }
     text = json.dumps(info, indent=1, ensure_ascii=False, allow_nan=False)

@@ -16,6 +16,7 @@ from odscen.base.checksums import (
 )
 from odscen.base.errors import DamagedError, DamagedFile, in_file
 from odscen.convert.model.conversion_settings import ConversionSettings
+from odscen.maps.importers.base import ImportSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -80,6 +81,26 @@ class MapEntry:
         """Who wrote its SUMO network."""
         name: ConverterName = self.info.get("network", {}).get("converter", "odscen")
         return name
+
+    @property
+    def source_sha256(self) -> str:
+        """SHA-256 of the file that the map was added from, hexadecimal: .xodr or another format."""
+        return str(self.info.get("import", {}).get("sha256", self.sha256))
+
+    @property
+    def source_key(self) -> str:
+        """Key of that file in ``files`` of ``map.json``."""
+        return "original" if "import" in self.info else "xodr"
+
+    @property
+    def importer(self) -> str:
+        """Name of the importer that has read that file."""
+        return str(self.info.get("import", {}).get("importer", "opendrive"))
+
+    @property
+    def importing(self) -> ImportSettings:
+        """How it was imported."""
+        return ImportSettings(self.importer, self.info.get("import", {}).get("options", {}))
 
     @property
     def net_sha256(self) -> str:

@@ -24,6 +24,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.maps.allowances import BY_SIZE
 from odscen.maps.folder_names import check_name, is_name, name_from_file
+from odscen.maps.importers.base import DETECTED
 from odscen.maps.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.maps.map_files import read_map_file
 from odscen.simulators.assets import assets_in
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
     from odscen.maps.allowances import BuildLimits
     from odscen.maps.converters import GivenNetwork
+    from odscen.maps.importers.base import ImportSettings
     from odscen.simulators.assets import Assets
 
 BUILDER = "12"
@@ -49,8 +51,18 @@ too. What it raises ends the work, and nothing is left of it."""
 
 
 def is_outdated(entry: MapEntry) -> bool:
-    """Whether an older odscen has built a map, so that it is rebuilt when it is opened."""
-    return bool(entry.info["builder"] != BUILDER)
+    """Whether an older odscen or importer has built a map, so that it is rebuilt when opened.
+
+    The map of an importer that is not installed any more is used as it is.
+    """
+    if entry.info["builder"] != BUILDER:
+        return True
+    if "import" not in entry.info:
+        return False
+    from odscen.maps.importers.registry import map_importers
+
+    importer = map_importers().usable.get(entry.info["import"]["importer"])
+    return importer is not None and importer.version != entry.info["import"]["version"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,8 +206,13 @@ class Workspace:
         entry = self.stored(name)
         if not is_outdated(entry):
             return entry
-        content, file = entry.read("xodr"), str(entry.info["source"])
-        return self.add_map_content(content, file=file, name=name, settings=entry.conversion)
+        return self.add_map_content(
+            entry.read(entry.source_key),
+            file=str(entry.info["source"]),
+            name=name,
+            settings=entry.conversion,
+            importing=entry.importing,
+        )
 
     def map_for(self, name: str, sha256: str) -> MapEntry:
         """Map that a scenario refers to: of the same content, and of the same name if it can be.
@@ -235,10 +252,14 @@ class Workspace:
         *,
         name: str | None = None,
         settings: ConversionSettings = USUAL,
+        importing: ImportSettings = DETECTED,
         limits: BuildLimits = BY_SIZE,
         progress: ProgressCallback | None = None,
     ) -> MapEntry:
-        """Build everything that later steps need from an OpenDRIVE file, once.
+        """Build everything that later steps need from a file of a map, once.
+
+        Whatever an importer recognises is taken: OpenDRIVE, and the formats of installed packages.
+        The original of another format stays in the map's folder.
 
         A map of the same name is replaced if the file, the settings or the builder differ, and left
         as it is otherwise. A network that was brought in for it stays, unless the file is another
@@ -247,18 +268,21 @@ class Workspace:
         Parameters
         ----------
         source
-            The .xodr file.
+            The file, ``.xodr`` or another that an importer recognises.
         name
             Name in the catalogue; the file's stem if not given.
         settings
             How it is converted.
+        importing
+            Which importer reads it, and with what options.
         limits
-            What that may use.
+            What all of that may use.
 
         Raises
         ------
         InputError
-            If the name, the spacing or the file cannot be used; names file, element and value.
+            If the name, the spacing or the file cannot be used; names file, element and value. It
+            says what a file seems to be that no importer takes.
         LimitError
             If the map needs more memory or time than it may have.
         ToolError
@@ -272,6 +296,7 @@ class Workspace:
             file=source.name,
             name=name,
             settings=settings,
+            importing=importing,
             limits=limits,
             progress=progress,
         )
@@ -283,6 +308,7 @@ class Workspace:
         file: str,
         name: str,
         settings: ConversionSettings = USUAL,
+        importing: ImportSettings = DETECTED,
         limits: BuildLimits = BY_SIZE,
         progress: ProgressCallback | None = None,
     ) -> MapEntry:
@@ -291,14 +317,17 @@ class Workspace:
         final = self.root / "maps" / name
         with _workspace_errors(self.root), self._lock(name):
             built = _whole(final)
-            same = built if built and built.sha256 == digest(content) else None
+            same = built if built and built.source_sha256 == digest(content) else None
             if settings.converter is None:
                 settings = replace(settings, converter=same.converter if same else "odscen")
-            if same and same.conversion == settings and not is_outdated(same):
-                return same
+            if same:
+                importing = importing.completed_from(same.importing)
+                unchanged = same.conversion == settings and same.importing == importing
+                if unchanged and not is_outdated(same):
+                    return same
             kept = same is not None and same.converter == settings.converter == "file"
             given = same.given() if same and kept else None
-            return self._built(name, content, file, settings, given, limits, progress)
+            return self._built(name, content, file, settings, importing, given, limits, progress)
 
     def set_network(
         self,
@@ -335,9 +364,11 @@ class Workspace:
         entry = self.map(name)
         given = GivenNetwork(read_given(source), source.name)
         settings = replace(entry.conversion, converter="file")
-        content, file = entry.read("xodr"), str(entry.info["source"])
+        content, file = entry.read(entry.source_key), str(entry.info["source"])
         with _workspace_errors(self.root), self._lock(name):
-            return self._built(name, content, file, settings, given, limits, progress)
+            return self._built(
+                name, content, file, settings, entry.importing, given, limits, progress
+            )
 
     def _lock(self, name: str) -> AbstractContextManager[int]:
         """Hold the lock of a map; another process that builds it is waited for."""
@@ -349,15 +380,16 @@ class Workspace:
         content: bytes,
         file: str,
         settings: ConversionSettings,
+        importing: ImportSettings,
         given: GivenNetwork | None,
         limits: BuildLimits,
         progress: ProgressCallback | None,
     ) -> MapEntry:
         from odscen.maps.guarded_build import build_in_child
 
-        final, sha256 = self.root / "maps" / name, digest(content)
+        final = self.root / "maps" / name
         with in_file(file), new_folder(final) as folder:
-            build_in_child(
+            source = build_in_child(
                 content,
                 folder,
                 name=name,
@@ -365,10 +397,11 @@ class Workspace:
                 settings=settings,
                 builder=BUILDER,
                 given=given,
+                importing=importing,
                 limits=limits,
                 progress=progress,
             )
-            write_sums(folder, sums_of(folder, known={XODR_FILE: sha256}))
+            write_sums(folder, sums_of(folder, known={source: digest(content)}))
             info = read_entry(folder).info
         return MapEntry(name, final, info)
 

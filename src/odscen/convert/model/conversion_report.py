@@ -11,7 +11,19 @@ if TYPE_CHECKING:
 
 
 class ElementOutcome(StrEnum):
-    """What happened to an element."""
+    """What happened to an element.
+
+    Attributes
+    ----------
+    KEPT
+        It is there as it was.
+    REPAIRED
+        It was wrong, and is read as it must have been meant.
+    GUESSED
+        Something that the file does not say was completed.
+    LOST
+        It is not there any more.
+    """
 
     KEPT = "kept"
     REPAIRED = "repaired"
@@ -20,11 +32,33 @@ class ElementOutcome(StrEnum):
 
 
 class ReportEntry(NamedTuple):
-    """One line of the report; ``element`` is a path as in ``road 7 > laneSection 0 > lane -1``."""
+    """One line of the report.
+
+    Attributes
+    ----------
+    outcome
+        What became of the element.
+    element
+        Its path, as in ``road 7 > laneSection 0 > lane -1``.
+    reason
+        Why, in words.
+    confidence
+        How sure an importer of another format is, 0 to 1; ``None`` if nothing is said of it.
+    source_id
+        Of the element of the imported file that it comes from.
+    """
 
     outcome: ElementOutcome
     element: str
     reason: str
+    confidence: float | None = None
+    source_id: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Form for JSON; what is not known is left out."""
+        row = {"fate": self.outcome.value, "element": self.element, "reason": self.reason}
+        known = {"confidence": self.confidence, "source_id": self.source_id}
+        return {**row, **{key: value for key, value in known.items() if value is not None}}
 
 
 def parser_entries(notes: Iterable[str]) -> list[ReportEntry]:
@@ -69,10 +103,7 @@ class ConversionReport:
         return {
             "counts": self.counts(),
             "figures": dict(self.figures),
-            "entries": [
-                {"fate": entry.outcome.value, "element": entry.element, "reason": entry.reason}
-                for entry in self.entries
-            ],
+            "entries": [entry.to_dict() for entry in self.entries],
         }
 
     @classmethod
@@ -80,7 +111,13 @@ class ConversionReport:
         """Inverse of :meth:`to_dict`."""
         return cls(
             tuple(
-                ReportEntry(ElementOutcome(entry["fate"]), entry["element"], entry["reason"])
+                ReportEntry(
+                    ElementOutcome(entry["fate"]),
+                    entry["element"],
+                    entry["reason"],
+                    entry.get("confidence"),
+                    entry.get("source_id"),
+                )
                 for entry in data["entries"]
             ),
             dict(data["figures"]),

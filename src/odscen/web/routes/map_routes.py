@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -13,9 +15,13 @@ from starlette.responses import Response
 
 from odscen.app.maps import load_map
 from odscen.base.categories import DEFAULT_BODY
-from odscen.base.errors import ConflictError, DamagedError, OdscenError
+from odscen.base.checksums import digest
+from odscen.base.errors import ConflictError, DamagedError, InputError, OdscenError
 from odscen.convert.model.conversion_settings import ConversionSettings
+from odscen.learning.offered_options import OptionValue, options_of
 from odscen.maps.folder_names import check_name, name_from_file
+from odscen.maps.importers.base import ImportSettings
+from odscen.maps.importers.registry import map_importers
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import is_outdated
 from odscen.scenario.demand.day_profiles import BUILT_IN
@@ -26,6 +32,7 @@ from odscen.web.messages import (
     CategoryInfo,
     JobInfo,
     JobStarted,
+    OptionInfo,
     WeatherInfo,
 )
 from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph
@@ -36,6 +43,7 @@ from odscen.web.wire.map_messages import (
     DrawingColumns,
     GraphColumns,
     GraphCounts,
+    ImporterInfo,
     LightInfo,
     MapDetails,
     MapHeader,
@@ -119,13 +127,17 @@ def report(name: str, shared: Shared) -> ConversionInfo:
 @router.post("/maps", status_code=202)
 def add_map(
     shared: Shared,
-    file: Annotated[UploadFile, File(description="An OpenDRIVE map.")],
+    file: Annotated[UploadFile, File(description="A map of any format of `/map-importers`.")],
     name: Annotated[str | None, Form()] = None,
     converter: Annotated[Literal["odscen", "netconvert"] | None, Form()] = None,
+    importer: Annotated[str | None, Form(description="If several recognise the file.")] = None,
+    options: Annotated[str | None, Form(description="Of the importer, a JSON object.")] = None,
 ) -> JobStarted:
     """Add a map; it is built in the background, with a network by the converter of that name."""
     given = Path(file.filename or "map.xodr")
     name = name_from_file(given) if name is None else check_name(name)
+    importing = ImportSettings(importer, _options(options))
+    suffix = given.suffix if re.fullmatch(r"\.[A-Za-z0-9]{1,16}", given.suffix) else ""
     # Without a name on disk: nothing is left of it, however the server ends.
     kept = tempfile.TemporaryFile()  # noqa: SIM115 - closed by the work
     try:
@@ -139,9 +151,10 @@ def add_map(
                 settings = ConversionSettings(converter=converter)
                 added = shared.workspace.add_map_content(
                     kept.read(),
-                    file=f"{name_from_file(given)}.xodr",
+                    file=f"{name_from_file(given)}{suffix}",
                     name=name,
                     settings=settings,
+                    importing=importing,
                     progress=progress,
                 )
                 return JobResult(added.name)
@@ -150,6 +163,23 @@ def add_map(
     except BaseException:
         kept.close()
         raise
+
+
+@router.get("/map-importers")
+def list_map_importers() -> list[ImporterInfo]:
+    """Formats that maps can have: OpenDRIVE, and those of installed packages that can be used."""
+    return [
+        ImporterInfo(
+            name=importer.name,
+            label=importer.label,
+            suffixes=list(importer.suffixes),
+            options=[
+                OptionInfo(**{**option._asdict(), "choices": [*option.choices]})
+                for option in options_of(type(importer))
+            ],
+        )
+        for importer in map_importers().usable.values()
+    ]
 
 
 @router.post("/maps/shipped", status_code=202)
@@ -214,10 +244,21 @@ def assets(shared: Shared) -> AssetsInfo:
     )
 
 
+def _options(text: str | None) -> dict[str, OptionValue]:
+    """Options of an importer, as a form has them."""
+    if not text:
+        return {}
+    try:
+        values = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"options are no JSON: {error}") from error
+    if not isinstance(values, dict):
+        raise InputError("options are no JSON object")
+    return values
+
+
 def _refuse_other(shared: Shared, name: str, content: IO[bytes]) -> None:
     """Refuse to put another map in the place of one that scenarios may be made on."""
-    import hashlib
-
     if name not in shared.workspace.map_names():
         return
     try:
@@ -225,7 +266,7 @@ def _refuse_other(shared: Shared, name: str, content: IO[bytes]) -> None:
     except DamagedError:
         return  # adding it builds it anew
     content.seek(0)
-    if there.sha256 != hashlib.sha256(content.read()).hexdigest():
+    if there.source_sha256 != digest(content.read()):
         raise ConflictError(
             f"there is another map named {name!r}; give this one another name, or remove that one"
         )
@@ -259,6 +300,7 @@ def _map_info(entry: MapEntry) -> MapInfo:
         name=entry.name,
         sha256=entry.sha256,
         source=info["source"],
+        importer=entry.importer,
         opendrive=MapHeader.model_validate(info["opendrive"]),
         statistics=info["statistics"],
         graph=GraphCounts.model_validate(info["graph"]),

@@ -14,7 +14,7 @@ from odscen.convert.model.conversion_report import ElementOutcome
 from odscen.convert.model.conversion_settings import ConverterName
 from odscen.lanegraph.map_statistics import MapStatistics
 from odscen.opendrive.objects import SignalKind
-from odscen.web.messages import Answer
+from odscen.web.messages import Answer, OptionInfo
 
 Point = tuple[float, float]
 """x and y, metres."""
@@ -59,8 +59,19 @@ class NetworkOrigin(Answer):
     source: str | None
 
 
+class ImporterInfo(Answer):
+    """A format that maps can have, with what can be chosen when one is added."""
+
+    name: str
+    label: str
+    suffixes: list[str]
+    options: list[OptionInfo]
+
+
 class MapInfo(Answer):
     """A map of the catalogue; ``report_counts`` says how many elements had which outcome.
+
+    ``importer`` has read its file ``source``: ``opendrive``, or that of another format.
 
     An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
     """
@@ -68,6 +79,7 @@ class MapInfo(Answer):
     name: str
     sha256: str
     source: str
+    importer: str
     opendrive: MapHeader
     statistics: MapStatistics
     graph: GraphCounts
@@ -156,11 +168,16 @@ class MapDetails(MapInfo):
 
 
 class ConversionEntry(Answer):
-    """What became of one element, and why."""
+    """What became of one element, and why.
+
+    An importer of another format says how sure it is, 0 to 1, and the element's id in its file.
+    """
 
     fate: ElementOutcome
     element: str
     reason: str
+    confidence: float | None = None
+    source_id: str | None = None
 
 
 class ConversionInfo(Answer):

@@ -1,0 +1,1 @@
+"""What maps are read from: each importer makes OpenDRIVE of a file in one format."""
