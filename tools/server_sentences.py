@@ -56,6 +56,7 @@ HIDDEN = (
     "app/demand/transit_feeds",
     "app/differences",
     "app/doctor",
+    "app/editing",
     "app/environments",
     "app/learned/",
     "app/map_comparison",

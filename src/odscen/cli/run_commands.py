@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
     from odscen.runs.run_settings import RunSettings, SliceLength
-    from odscen.scenario.sampling.redrawn_traffic import Redraw
+    from odscen.scenario.sampling.sampler import Redraw
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
 

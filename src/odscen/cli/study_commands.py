@@ -144,7 +144,7 @@ def extend(
     from odscen.experiments.studies.study_plan import StudyPlan, read_study_plan
     from odscen.experiments.studies.study_runs import extend_study
     from odscen.maps.store import Workspace
-    from odscen.scenario.document.validation import validated
+    from odscen.scenario.document.problems import validated
 
     if (plan is None) == (seeds is None):
         raise InputError("give --plan or --seeds, one of them")

@@ -17,7 +17,7 @@ from odscen.experiments.studies.executors import LocalExecutor
 from odscen.experiments.studies.study_work import Outcome
 from odscen.formats.recordings.tfrecord import tfrecord
 from odscen.formats.scenarionet_export import pickled
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 from tests.experiments.studies.study_case import place
 from tests.sumo.story_case import entry
 

@@ -9,7 +9,7 @@ import pytest
 from odscen.base.errors import ConflictError, InputError, ScenarioError
 from odscen.experiments.studies.study_grid import found_sources, grid_of, refuse_other
 from odscen.experiments.studies.study_plan import StudyPlan, read_study_plan
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 from tests.experiments.studies.study_case import WARM, place, plan_file
 
 if TYPE_CHECKING:

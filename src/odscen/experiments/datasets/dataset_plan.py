@@ -12,7 +12,7 @@ from odscen.experiments.cases.sweep_rows import limit_from_text
 from odscen.experiments.studies.study_plan import StudyPlan, read_plan_data
 from odscen.experiments.studies.study_rows import FIGURE_COLUMNS
 from odscen.scenario.document.document_parts import Label, Part
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

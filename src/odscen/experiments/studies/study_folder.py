@@ -18,7 +18,7 @@ from odscen.experiments.studies.study_grid import ScenarioSource, grid_of
 from odscen.experiments.studies.study_plan import StudyPlan
 from odscen.experiments.studies.study_rows import study_table
 from odscen.experiments.studies.study_work import versions
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

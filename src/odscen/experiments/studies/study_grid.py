@@ -11,8 +11,8 @@ from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import ConflictError, InputError
 from odscen.experiments.studies.study_plan import MOST_RUNS
 from odscen.scenario.document.json_form import content_sha256, dumps, loads
+from odscen.scenario.document.problems import validated
 from odscen.scenario.document.sampling_config import SamplingConfig
-from odscen.scenario.document.validation import validated
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 
 if TYPE_CHECKING:

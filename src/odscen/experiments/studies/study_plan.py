@@ -19,8 +19,8 @@ from odscen.base.given_files import read_given_text
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.document_parts import Label, Part
-from odscen.scenario.document.validation import validated
-from odscen.scenario.sampling.redrawn_traffic import Redraw  # noqa: TC001 (pydantic)
+from odscen.scenario.document.problems import validated
+from odscen.scenario.sampling.sampler import Redraw  # noqa: TC001 (pydantic)
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
 
 if TYPE_CHECKING:

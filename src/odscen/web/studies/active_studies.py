@@ -17,7 +17,7 @@ from odscen.experiments.studies.study_plan import StudyPlan
 from odscen.experiments.studies.study_report import SHOWN_FIGURES, write_study_page
 from odscen.experiments.studies.study_runs import begin_study_of, carry_out_study, study_state
 from odscen.maps.folder_names import check_name, plain_name
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 from odscen.web.studies.study_messages import MOST_PAGE_RUNS, StudyInfo, StudyProblem
 from odscen.web.studies.under_way import OneAtATime, UnderWay
 
