@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -30,11 +30,11 @@ from odscen.cli.scenario_commands import ScenarioArgument
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from odscen.experiments.sweeps.critical_search import SearchResult
-    from odscen.experiments.sweeps.sweep_table import Sweep
+    from odscen.experiments.search import SearchResult
+    from odscen.experiments.sweeps import Sweep
     from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.scenario.sweeps.sweep_plan import Method, SweepPlan
+    from odscen.scenario.sweeps.sweep_plan import SweepPlan
 
 _SHOWN = 20
 """Cases that are listed on a terminal."""
@@ -112,8 +112,8 @@ def sweep(
     0, whether cases are safe or not; 2: bad input; 3: a run failed.
     """
     from odscen.app import scenarios
-    from odscen.experiments.sweeps.sweep_folder import SweepSettings
-    from odscen.experiments.sweeps.sweep_runs import sweep as run_sweep
+    from odscen.experiments.sweeps import SweepSettings
+    from odscen.experiments.sweeps import sweep as run_sweep
     from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
@@ -158,10 +158,8 @@ def _plan(
         with in_file(str(file)):
             return plan_from_data(_read(file))
     how = method or ("grid" if samples is None else "sobol")
-    if how not in ("grid", "latin", "sobol", "random"):
-        raise InputError(f"method {how!r} is not one of sobol, latin, random")
     axes = tuple(map(axis_from_text, vary or ())) or _bounds(scenario)
-    return SweepPlan(axes, cast("Method", how), samples, seed)
+    return SweepPlan(axes, how, samples, seed)
 
 
 def _bounds(scenario: Scenario) -> tuple[Any, ...]:
@@ -191,7 +189,7 @@ def _read(file: Path) -> dict[str, Any]:
 def _figures(
     given: Sequence[str],
 ) -> tuple[dict[str, Callable[[Run], float | None]], tuple[str, ...]]:
-    from odscen.experiments.regression.own_figures import own_column
+    from odscen.experiments.own_figures import own_column
 
     own = {}
     for text in given:
@@ -250,7 +248,7 @@ def search(
         str,
         typer.Option(
             help="How cases are proposed; tpe learns from those before and needs odscen\\[search].",
-            metavar="[tpe|latin|random]",
+            metavar="[tpe|latin|sobol|random]",
         ),
     ] = "tpe",
     batch: Annotated[
@@ -287,9 +285,9 @@ def search(
     whether there are critical cases or not; 2: bad input; 3: a run failed.
     """
     from odscen.app import scenarios
-    from odscen.experiments.sweeps.critical_search import SearchSettings
-    from odscen.experiments.sweeps.critical_search import search as find
-    from odscen.experiments.sweeps.sweep_folder import SweepSettings
+    from odscen.experiments.search import SearchSettings
+    from odscen.experiments.search import search as find
+    from odscen.experiments.sweeps import SweepSettings
     from odscen.maps.store import Workspace
     from odscen.scenario.sweeps.sweep_plan import axis_from_text
 

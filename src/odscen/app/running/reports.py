@@ -25,13 +25,14 @@ from odscen.records.outcomes import RunStatus
 from odscen.records.row_text import rounded
 from odscen.records.run_events import events_from_json
 from odscen.records.run_plan import Plan
-from odscen.reports.place_shapes import place_shapes
+from odscen.reports.report_maps import place_shapes
+from odscen.reports.report_signals import LightsOfRun
 from odscen.reports.run_report import render_report
-from odscen.reports.signals.report_signals import LightsOfRun
 from odscen.runs import layout
 from odscen.runs.deferred_figures import whole_summary
 from odscen.runs.finished_run import Run
 from odscen.runs.measured import read_parking, read_run_data
+from odscen.runs.new_run import run_lock
 from odscen.runs.recorded import (
     read_conflicts,
     read_light_states,
@@ -41,7 +42,6 @@ from odscen.runs.recorded import (
 from odscen.runs.run_status import unfinished
 from odscen.runs.run_sums import damaged_in, seal_again
 from odscen.sumo.outputs.corridor_traces import corridor_traces
-from odscen.sumo.runner.long_runs import run_lock
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.checksums import unsealed
 from odscen.base.errors import ConflictError, InputError, NotFoundError
-from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.to_disk import write_whole
 from odscen.figures.judging.expectations import parse_expectation
@@ -29,10 +28,11 @@ from odscen.runs.checkpoint import (
 )
 from odscen.runs.finished_run import Run
 from odscen.runs.found_files import found_files
+from odscen.runs.new_run import make_summary, run_lock
+from odscen.runs.reporter import SILENT
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_status import (
     going,
-    read_status,
     unfinished,
     write_status,
 )
@@ -45,34 +45,28 @@ from odscen.runs.run_sums import (
     unseal_interrupted,
 )
 from odscen.sumo.runner.forked_worker import is_ready
-from odscen.sumo.runner.run_folder import (
-    PreparedRun,
-    make_summary,
-    write_run_folder,
-)
+from odscen.sumo.runner.run_folder import SumoPreparedRun
 from odscen.sumo.runner.worker_process import run_worker
 from odscen.sumo.worker.behaviour.behaviour_doors import is_installed, read_behaviour
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from odscen.learning.behaviour.behaviour_model import BehaviourDoor
-    from odscen.sumo.runner.run_folder import Finish
+    from odscen.runs.new_run import Finish
+    from odscen.runs.reporter import Reporter
     from odscen.sumo.runner.worker_process import Companion
-    from odscen.sumo.worker.protocol import OnProgress
 
 FORMAT = "odscen-run-settings"
 VERSION = 1
 
 
 def run_long(
-    prepared: PreparedRun,
+    prepared: SumoPreparedRun,
     out: Path,
     lock: int,
     *,
-    progress: OnProgress | None = None,
+    reporter: Reporter = SILENT,
     finish: Finish | None = None,
     live: Companion | None = None,
 ) -> Run:
@@ -86,19 +80,18 @@ def run_long(
         If the folder cannot be written.
     """
     with new_folder(out) as folder:
-        write_run_folder(prepared, folder)
+        prepared.write(folder)
         _write_settings(prepared, folder)
         write_status(folder, prepared.plan, None)
         seal_start(folder)
     with disk_errors(f"run folder {out}", advice=_again(out)):
-        return _resume_from(prepared, out, lock, progress, finish, live)
+        return _resume_from(prepared, out, lock, reporter, finish, live)
 
 
 def resume(
     folder: Path,
     *,
-    progress: OnProgress | None = None,
-    tell: Callable[[str], None] | None = None,
+    reporter: Reporter = SILENT,
     time_limit: float | None = None,
     finish: Finish | None = None,
     live: Companion | None = None,
@@ -110,11 +103,11 @@ def resume(
 
     Parameters
     ----------
+    reporter
+        Hears where it goes on, and which slices are damaged, too.
     behaviour
         What drives instead of SUMO, named again where the run has a program, a socket or a file:
         what a folder says is data, and is not executed for that.
-    tell
-        Called with what the user should know: where it goes on, and which slices are damaged.
     time_limit
         Wall seconds after which it is interrupted again.
 
@@ -138,42 +131,13 @@ def resume(
         prepared = _restore(folder, time_limit)
         _refuse_unnamed_code(folder, behaviour)
         number, problems = survey(folder)
-        if tell is not None:
-            for problem in problems:
-                tell(problem)
-            begin = read_checkpoint(folder, number).time if number else 0.0
-            tell(f"resumes at {begin:g} s, after slice {number}" if number else "begins anew")
+        for problem in problems:
+            reporter.said(problem)
+        begin = read_checkpoint(folder, number).time if number else 0.0
+        reporter.said(f"resumes at {begin:g} s, after slice {number}" if number else "begins anew")
         unseal_interrupted(folder)  # first: it may be killed in between
         (folder / layout.SUMMARY_FILE).unlink(missing_ok=True)
-        return _resume_from(prepared, folder, lock, progress, finish, live)
-
-
-def run_lock(folder: Path) -> AbstractContextManager[int]:
-    """Hold the lock of a run folder, which need not be there.
-
-    Raises
-    ------
-    ConflictError
-        If another process works on it; says which, and since when.
-    """
-    return locked(folder, what=f"run {folder.name!r}")
-
-
-def refuse_interrupted(out: Path) -> None:
-    """Refuse to replace a run that can be resumed: hours may be in it.
-
-    Raises
-    ------
-    ConflictError
-        If there is one in ``out``, or one that is going on.
-    """
-    status = read_status(out)
-    if status is not None:
-        at = f"it is at {status['time']:g} s" if status else "its status.json is damaged"
-        raise ConflictError(
-            f"run {out.name!r} has not ended ({at}); "
-            f"odscen resume {out} resumes it; delete the folder to begin anew"
-        )
+        return _resume_from(prepared, folder, lock, reporter, finish, live)
 
 
 def interrupted(runs: Path) -> list[str]:
@@ -193,17 +157,18 @@ def about(folder: Path) -> dict[str, Any]:
 
 
 def _resume_from(
-    prepared: PreparedRun,
+    prepared: SumoPreparedRun,
     folder: Path,
     lock: int,
-    progress: OnProgress | None,
+    reporter: Reporter,
     finish: Finish | None,
     live: Companion | None,
 ) -> Run:
     limit = prepared.settings.time_limit
+    reporter.started()
     ended = run_worker(
         folder,
-        progress=progress,
+        progress=reporter.advanced,
         time_limit=limit,
         live=live,
         keep=(lock,),
@@ -212,7 +177,7 @@ def _resume_from(
     clear_parts(folder)  # a torn one takes room that what follows may need
     summary = make_summary(prepared, folder, ended)
     summary["slices"] = _slices(folder)
-    if ended.done is None:
+    if ended.sim_seconds is None:
         kept = summary["slices"]["time"]
         summary["error"] = (
             f"{summary['error']}\nWhat happened up to {kept:g} s is kept; "
@@ -222,7 +187,7 @@ def _resume_from(
         finish(folder, summary)
     summary["files"] = found_files(folder)
     write_whole(folder / layout.SUMMARY_FILE, summary_to_json(summary))
-    if ended.done is None:
+    if ended.sim_seconds is None:
         seal_interrupted(folder)
     else:
         seal_run(folder)
@@ -268,7 +233,7 @@ def _clear(folder: Path) -> None:
     shutil.rmtree(folder / layout.SLICES_FOLDER, ignore_errors=True)
 
 
-def _write_settings(prepared: PreparedRun, folder: Path) -> None:
+def _write_settings(prepared: SumoPreparedRun, folder: Path) -> None:
     settings = {
         "format": FORMAT,
         "version": VERSION,
@@ -307,7 +272,7 @@ def _refuse_unnamed_code(folder: Path, named: BehaviourDoor | None) -> None:
         )
 
 
-def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
+def _restore(folder: Path, time_limit: float | None) -> SumoPreparedRun:
     """Read what is left to know of the run; all else is in its files."""
     path = folder / layout.SETTINGS_FILE
     try:
@@ -320,7 +285,7 @@ def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
         if data.get("sealed") == "whole":  # earlier versions left some files without checksums
             refuse_additions(folder)
         expectations = tuple(parse_expectation(text) for text in data["expectations"])
-        return PreparedRun(
+        return SumoPreparedRun(
             plan=Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8")),
             sumo_files={},
             net=folder / layout.SUMO_FOLDER / layout.NET_FILE,

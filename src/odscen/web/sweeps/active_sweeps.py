@@ -11,18 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.atomic_folders import discard
 from odscen.base.errors import ConflictError, InputError, NotFoundError
-from odscen.experiments.sweeps.sweep_cases import opened_case
-from odscen.experiments.sweeps.sweep_estimate import PATIENCE, estimate
-from odscen.experiments.sweeps.sweep_folder import (
+from odscen.experiments.sweeps import (
+    PAGE_FILE,
+    PATIENCE,
     SWEEP_FILE,
+    TABLE_FILE,
+    CaseRuns,
     SweepSettings,
     begin_sweep,
+    estimate,
+    opened_case,
     read_plan,
     read_sweep,
+    read_table,
+    refuse_unknown,
     settings_from_dict,
+    sweep,
 )
-from odscen.experiments.sweeps.sweep_runs import refuse_unknown, sweep
-from odscen.experiments.sweeps.sweep_table import PAGE_FILE, TABLE_FILE, limits_of, read_table
 from odscen.maps.folder_names import check_name
 from odscen.runs import layout
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
@@ -32,7 +37,7 @@ from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.experiments.sweeps.sweep_table import Sweep
+    from odscen.experiments.sweeps import Sweep
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
@@ -89,7 +94,7 @@ class Sweeps:
         """
         plan, settings = plan_from_data(wish.plan), _settings(wish)
         refuse_unknown(plan.names, scenario)
-        limits_of(settings)
+        CaseRuns(scenario, self._folder, settings)  # an unknown figure or limit is refused
         plan.cases()
         with self._work.lock:
             self._work.refuse_more()
@@ -222,7 +227,6 @@ class Sweeps:
         def work(known: UnderWay) -> None:
             def done(ended: int, _count: int) -> None:
                 known.ended = ended
-                known.check()
 
             sweep(
                 self._workspace,
@@ -231,8 +235,7 @@ class Sweeps:
                 folder,
                 settings=settings,
                 processes=processes,
-                tell=lambda _words: known.check(),
-                progress=lambda _job, _message: known.check(),
+                check=known.check,
                 done=done,
             )
 
