@@ -31,8 +31,8 @@ from odscen.scenario.document.scenario_document import (
     MapReference,
     Scenario,
     Simulation,
+    Transit,
 )
-from odscen.scenario.document.transit_document import Transit
 from odscen.sumo.realize.sumo_lane_places import lane_segments
 from odscen.sumo.runner.run_jobs import run_prepared
 

@@ -28,7 +28,7 @@ from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.scenario.templates.no_place import NoPlaceError
+from odscen.scenario.templates.scene_sites import NoPlaceError
 from odscen.scenario.templates.template_registry import TEMPLATES
 
 if TYPE_CHECKING:

@@ -37,7 +37,7 @@ from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.document.signals_document import Signals
-from odscen.scenario.edits.edited_parts import changed_part, with_fields
+from odscen.scenario.edits.edit_registry import changed_part, with_fields
 from odscen.scenario.signals.webster import LONGEST_CYCLE, whole_seconds
 
 if TYPE_CHECKING:

@@ -64,6 +64,7 @@ HIDDEN = (
     "app/demand/transit_feeds",
     "app/differences",
     "app/doctor",
+    "app/editing",
     "app/environments",
     "app/learned/",
     "app/map_comparison",

@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from odscen.scenario.sampling.generation_settings import GenerationSettings
     from odscen.scenario.story.action_kinds import ActionKind
     from odscen.scenario.story.condition_kinds import ConditionKind, Reading
-    from odscen.scenario.story.speed_laws import SpeedLaw
+    from odscen.scenario.story.motion_laws import SpeedLaw
     from odscen.scenario.templates.scene_template import SceneTemplate
     from odscen.sumo.runner.in_step import Step
 
@@ -118,7 +118,7 @@ _HOMES = {
     "ConditionKind": "odscen.scenario.story.condition_kinds",
     "Reading": "odscen.scenario.story.condition_kinds",
     "ActionKind": "odscen.scenario.story.action_kinds",
-    "SpeedLaw": "odscen.scenario.story.speed_laws",
+    "SpeedLaw": "odscen.scenario.story.motion_laws",
     "RunSettings": "odscen.runs.run_settings",
     "Recording": "odscen.runs.recording",
     "parse_expectation": "odscen.figures.judging.expectations",

@@ -12,7 +12,7 @@ import pytest
 from odscen.app.generators import GeneratorDoor
 from odscen.app.running.batches import run_many
 from odscen.app.scenarios import generate, read_scenario
-from odscen.learning.fill_check import CheckedFill
+from odscen.learning.fill import CheckedFill
 from odscen.maps.store import Workspace
 from odscen.runs.recorded import trajectory_files
 from odscen.runs.run_settings import RunSettings

@@ -17,8 +17,7 @@ from odscen.app.maps import load_map
 from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import generate, read_scenario
 from odscen.base.errors import InputError
-from odscen.learning.fill import Fill, FillRequest, fill_from_bytes
-from odscen.learning.fill_check import CheckedFill
+from odscen.learning.fill import CheckedFill, Fill, FillRequest, fill_from_bytes
 from odscen.maps.store import Workspace
 from odscen.runs.recorded import trajectory_files
 from odscen.scenario.document.sampling_config import SamplingConfig

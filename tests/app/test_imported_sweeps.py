@@ -18,7 +18,7 @@ from odscen.experiments.sweeps import sweep
 from odscen.formats.openscenario_import.traced_numbers import TracedNumber
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
-from odscen.scenario.document.expressions import evaluate
+from odscen.scenario.document.formulas import evaluate
 from odscen.scenario.document.json_form import dumps, with_values
 from odscen.scenario.sweeps.sweep_plan import Range, Table, plan_from_data
 from tests.app.test_scenario_imports import FILE, SPEED, given

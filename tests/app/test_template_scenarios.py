@@ -10,7 +10,7 @@ from odscen.app.scenarios import check_scenario, read_scenario
 from odscen.app.template_scenarios import template_scenario, write_template
 from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.maps.store import Workspace
-from odscen.scenario.templates.no_place import NoPlaceError
+from odscen.scenario.templates.scene_sites import NoPlaceError
 from odscen.scenario.templates.template_registry import TEMPLATES
 
 MAPS = Path(__file__).parents[2] / "maps"

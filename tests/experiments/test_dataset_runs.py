@@ -15,7 +15,7 @@ from odscen.experiments.datasets import DatasetPlan, make_dataset, read_dataset_
 from odscen.experiments.work import LocalExecutor, Outcome
 from odscen.formats.recordings.tfrecord import tfrecord
 from odscen.formats.scenarionet_format import pickled
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 from tests.experiments.study_case import place
 from tests.sumo.story_case import entry
 

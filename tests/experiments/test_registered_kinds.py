@@ -18,7 +18,7 @@ from odscen.experiments.table import COLUMNS, Column, register_column
 from odscen.experiments.work import LocalExecutor
 from odscen.figures.measures.figure import Figure
 from odscen.scenario.document.json_form import loads
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 from odscen.scenario.sweeps.sweep_plan import (
     PROPOSALS,
     ProposalKind,

@@ -8,7 +8,7 @@ import pytest
 
 from odscen.base.errors import ConflictError, InputError, ScenarioError
 from odscen.experiments.plan import StudyPlan, found_sources, grid_of, read_study_plan, refuse_other
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 from tests.experiments.study_case import WARM, place, plan_file
 
 if TYPE_CHECKING:

@@ -13,14 +13,12 @@ from hypothesis import strategies as st
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import node_id
-from odscen.learning.fill import FillRequest, fill_from_arrays
-from odscen.learning.fill_check import CheckedFill, checked_fill
+from odscen.learning.fill import CheckedFill, FillRequest, checked_fill, fill_from_arrays
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.scenario_document import MapReference, Scenario, Simulation
 from odscen.scenario.placing.bodies import box_at, overlap
-from odscen.scenario.placing.region import Region
-from odscen.scenario.placing.usable_nodes import Usable
+from odscen.scenario.placing.region import Region, Usable
 from odscen.scenario.sampling.sampler import wanted_crew
 from tests.graphs import fork, ring, two_lane_road
 

@@ -19,12 +19,18 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.errors import InputError, NotFoundError, OdscenError
-from odscen.learning.fill import Fill, FillRequest, fill_from_arrays, fill_from_bytes, request_bytes
-from odscen.learning.fill_check import CheckedFill, checked_fill
-from odscen.learning.named_objects import named_object
-from odscen.learning.offered_models import installed_names, offered_models
+from odscen.learning.fill import (
+    CheckedFill,
+    Fill,
+    FillRequest,
+    checked_fill,
+    fill_from_arrays,
+    fill_from_bytes,
+    request_bytes,
+)
+from odscen.learning.offered_models import installed_names, named_object, offered_models
 from odscen.learning.offered_options import OptionValue, values_for
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

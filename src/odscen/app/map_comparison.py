@@ -18,7 +18,7 @@ from odscen.lanegraph.query import largest_part, node_id
 from odscen.maps.store import Workspace
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.scenario_document import Flow, MapReference, Scenario, Simulation
 from odscen.scenario.placing.region import Region
 from odscen.sumo.runner.network_fit import route_fit

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.placing.region import Usable
     from odscen.scenario.signals.light import Light
 
 

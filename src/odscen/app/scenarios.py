@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from odscen.app.generators import GeneratorDoor
-    from odscen.learning.fill_check import CheckedFill
+    from odscen.learning.fill import CheckedFill
     from odscen.maps.store import Workspace
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario

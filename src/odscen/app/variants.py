@@ -14,7 +14,7 @@ from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import InputError, ScenarioError, in_file
 from odscen.base.given_files import read_given_text
 from odscen.scenario.document.json_form import content_sha256
-from odscen.scenario.document.variants_document import Variant
+from odscen.scenario.document.scenario_document import Variant
 from odscen.scenario.edits.edit_messages import read_edit
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from odscen.runs.finished_run import Run
     from odscen.runs.reporter import Progress
     from odscen.runs.run_settings import RunSettings, SliceLength
-    from odscen.scenario.sampling.redrawn_traffic import Redraw
+    from odscen.scenario.sampling.sampler import Redraw
 
 
 @contextmanager

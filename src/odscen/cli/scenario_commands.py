@@ -20,7 +20,7 @@ from odscen.cli.console import (
 )
 
 if TYPE_CHECKING:
-    from odscen.learning.fill_check import CheckedFill
+    from odscen.learning.fill import CheckedFill
     from odscen.maps.store import Workspace
 
 _MOST_REMARKS = 10

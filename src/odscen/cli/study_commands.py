@@ -142,7 +142,7 @@ def extend(
     from odscen.experiments.plan import StudyPlan, read_study_plan
     from odscen.experiments.studies import extend_study, read_study
     from odscen.maps.store import Workspace
-    from odscen.scenario.document.validation import validated
+    from odscen.scenario.document.problems import validated
 
     if (plan is None) == (seeds is None):
         raise InputError("give --plan or --seeds, one of them")

@@ -32,7 +32,7 @@ from odscen.figures.measures.usability import UsabilityLevel
 from odscen.formats.scenarionet_format import pickled
 from odscen.records.outcomes import RunStatus
 from odscen.scenario.document.document_parts import Label, Part
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

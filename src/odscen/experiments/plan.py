@@ -26,10 +26,10 @@ from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.json_form import content_sha256, dumps, loads
+from odscen.scenario.document.problems import validated
 from odscen.scenario.document.sampling_config import SamplingConfig
-from odscen.scenario.document.validation import validated
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from odscen.scenario.sampling.redrawn_traffic import Redraw  # noqa: TC001 (pydantic)
+from odscen.scenario.sampling.sampler import Redraw  # noqa: TC001 (pydantic)
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
 
 if TYPE_CHECKING:

@@ -38,7 +38,7 @@ from odscen.experiments.plan import (
 from odscen.experiments.table import REFUSED, refuse_taken_names, study_table
 from odscen.experiments.work import LocalExecutor, WorkOrder, carry_out, unpacked, versions
 from odscen.records.outcomes import RunStatus
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

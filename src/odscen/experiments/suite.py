@@ -31,8 +31,8 @@ from odscen.experiments.tolerance import (
 from odscen.figures.judging.expectations import CRITERIA, USABLE, parse_expectation
 from odscen.figures.measures.registry import ALL_FIGURES
 from odscen.scenario.document.document_parts import Label, Part
-from odscen.scenario.document.validation import validation_problems
-from odscen.scenario.sampling.redrawn_traffic import Redraw  # noqa: TC001 (pydantic)
+from odscen.scenario.document.problems import validation_problems
+from odscen.scenario.sampling.sampler import Redraw  # noqa: TC001 (pydantic)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

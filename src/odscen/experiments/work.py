@@ -34,8 +34,8 @@ from odscen.experiments.table import REFUSED, outcome_row, row_of
 from odscen.records.outcomes import RunStatus
 from odscen.runs.reporter import SILENT, Reporter
 from odscen.scenario.document.json_form import loads
+from odscen.scenario.document.problems import validated
 from odscen.scenario.document.sampling_config import SamplingConfig
-from odscen.scenario.document.validation import validated
 from odscen.scenario.edits.edit_messages import read_edit
 from odscen.scenario.sampling.sampler import sample_scenario
 from odscen.scenario.sweeps.sweep_plan import concrete

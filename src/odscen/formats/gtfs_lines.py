@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.lanegraph.query import node_id
-from odscen.scenario.demand.entries import entries
-from odscen.scenario.document.transit_document import (
+from odscen.scenario.demand.inflow import entries
+from odscen.scenario.document.scenario_document import (
     ServedStop,
     Transit,
     TransitLine,

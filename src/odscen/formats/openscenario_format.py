@@ -152,7 +152,7 @@ def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) ->
     """Say what only SUMO knows: drivers, traffic, signals and measures do not travel."""
     from odscen.lanegraph.query import largest_part
     from odscen.scenario.document.scenario_document import STEP_WITH_RULES, Simulation
-    from odscen.scenario.templates.scene_actors import STEADY_DRIVER
+    from odscen.scenario.templates.scene_template import STEADY_DRIVER
 
     scenario = source.scenario
     if scenario.environment.model_dump(exclude_defaults=True):

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.errors import InputError
 from odscen.formats.tll_loops import taken_detectors
 from odscen.formats.tll_stages import GAP, STAGE_NAME, main_phases
+from odscen.scenario.document.problems import validated
 from odscen.scenario.document.signals_document import JunctionTiming
-from odscen.scenario.document.validation import validated
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -21,11 +21,11 @@ from odscen.formats.tll_stages import (
     refuse_repeated,
     shown_need,
 )
+from odscen.scenario.document.problems import validated
 from odscen.scenario.document.signals_document import JunctionTiming
-from odscen.scenario.document.validation import validated
-from odscen.scenario.signals.movement_names import find_movements, shortest_names
-from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.scenario.signals.stage_sequence import (
+from odscen.scenario.signals.light import find_movements, shortest_names
+from odscen.scenario.signals.program_design import (
+    DesignedProgram,
     beginning_groups,
     change_steps,
     stage_state,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.formats.base import ImportSource
-    from odscen.scenario.document.actions_document import TrajectoryRow
+    from odscen.scenario.document.rules_document import TrajectoryRow
 
 MOST_ROWS = 100_000
 _NEEDED = ("time", "x", "y")

@@ -12,14 +12,14 @@ from odscen.figures.judging.criteria import criteria_of
 from odscen.figures.judging.expectations import Expectation, needs_criticality, parse_expectation
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.runs.recording import Recording
-from odscen.scenario.sampling.redrawn_traffic import REDRAWS
+from odscen.scenario.sampling.sampler import REDRAWS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.learning.offered_options import OptionValue
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.scenario.sampling.redrawn_traffic import Redraw
+    from odscen.scenario.sampling.sampler import Redraw
 
 SliceLength = float | Literal["auto"] | None
 """Seconds of the slices of a long run; ``auto`` what suits it, ``None`` none."""
@@ -46,7 +46,7 @@ class RunSettings:
     redraw
         What the seed draws: ``open`` what the scenario leaves open; ``drivers`` also departures,
         desired speeds and styles of placed actors; ``traffic`` also their goals
-        (:func:`odscen.scenario.sampling.redrawn_traffic.redrawn`).
+        (:func:`odscen.scenario.sampling.sampler.redrawn`).
     until
         Simulated time at which the run ends at the latest, above 0; the scenario's own duration if
         ``None``.

@@ -7,8 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
-from odscen.learning.named_objects import named_object
-from odscen.learning.offered_models import installed_names, offered_models
+from odscen.learning.offered_models import installed_names, named_object, offered_models
 from odscen.learning.offered_options import values_for
 from odscen.simulators.base import Simulator
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from odscen.app.learned.learned_maps import whole_map
-from odscen.learning.fill_check import checked_fill
+from odscen.learning.fill import checked_fill
 from odscen.learning.reference.reference_generator import ReferenceGenerator
 from odscen.learning.traffic_snapshots import no_lights
 from odscen.maps.store import Workspace

@@ -16,8 +16,7 @@ from odscen.runs.recorded import read_calls, read_light_states
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.scenario.signals.light import find_light
-from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.scenario.signals.stage_sequence import beginning_groups, cycle_length
+from odscen.scenario.signals.program_design import DesignedProgram, beginning_groups, cycle_length
 from tests.signal_case import JUNCTION, carried_out, light, one_plan, scenario
 
 if TYPE_CHECKING:

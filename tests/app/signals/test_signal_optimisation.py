@@ -15,7 +15,7 @@ from odscen.base.errors import InputError, NotFoundError
 from odscen.maps.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import MapReference
-from odscen.scenario.edits.edited_parts import changed_part
+from odscen.scenario.edits.edit_registry import changed_part
 from odscen.sumo.calibrate.light_timing import with_timings
 from odscen.sumo.realize.realization import realize
 from tests.signal_case import MAP, ROOT, crossing, one_plan, program, scenario

@@ -24,9 +24,8 @@ from odscen.carla.native.native_run import NativeOptions, left_out
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.measures_document import SpeedLimit
-from odscen.scenario.document.parking_document import TripParking
 from odscen.scenario.document.rules_document import StoryRule
-from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.document.scenario_document import Scenario, TripParking
 from odscen.sumo.runner.prepare import prepare
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.learning.behaviour.behaviour_model import DrivingAction, DrivingKind
-from odscen.learning.behaviour.checked_action import CheckedAction
+from odscen.learning.behaviour.behaviour_model import CheckedAction, DrivingAction, DrivingKind
 
 BOTH = np.array([True, True])
 

@@ -7,9 +7,9 @@ import pytest
 
 from odscen.base.errors import InputError
 from odscen.learning.behaviour.behaviour_model import LightAhead
-from odscen.learning.behaviour.driving_recorder import DrivingRecorder
 from odscen.learning.behaviour.imitation_driver import (
     FEATURES,
+    DrivingRecorder,
     ImitationDriver,
     learned_driver,
     network_bytes,

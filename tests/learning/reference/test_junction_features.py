@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 
 from odscen.lanegraph.graphs import LaneGraph, MapGraph, WalkKind
-from odscen.learning.reference.beyond_junctions import beyond_columns
-from odscen.learning.reference.gap_states import gap_states
-from odscen.learning.reference.junction_approaches import approaches
+from odscen.learning.reference.gap_states import beyond_columns, gap_states
 from odscen.learning.reference.road_strips import road_strips
-from odscen.learning.reference.site_features import site_of
-from odscen.learning.reference.stop_lines import setbacks
+from odscen.learning.reference.site_features import approaches, setbacks, site_of
 from tests.graphs import ToyLane, fork, key, map_graph, two_lane_road
 
 CAR = 0

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.learning.reference.onward_goals import NO_GOAL, onward_goals
+from odscen.learning.reference.reference_generator import NO_GOAL, onward_goals
 from tests.graphs import fork, ring, two_lane_road
 
 if TYPE_CHECKING:

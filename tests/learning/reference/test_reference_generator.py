@@ -10,8 +10,7 @@ import pytest
 
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import InputError
-from odscen.learning.fill import VEHICLES, FillRequest
-from odscen.learning.fill_check import checked_fill
+from odscen.learning.fill import VEHICLES, FillRequest, checked_fill
 from odscen.learning.reference.reference_generator import (
     WEIGHTS,
     ReferenceGenerator,
@@ -25,8 +24,7 @@ from odscen.learning.reference.traffic_model import (
 )
 from odscen.learning.traffic_snapshots import LightView, SignalAhead, no_lights
 from odscen.scenario.document.sampling_config import SamplingConfig
-from odscen.scenario.placing.region import Region
-from odscen.scenario.placing.usable_nodes import Usable
+from odscen.scenario.placing.region import Region, Usable
 from odscen.scenario.sampling.sampler import wanted_crew
 from tests.graphs import fork, two_lane_road
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from odscen.lanegraph.graphs import LaneGraph
-from odscen.learning.reference.expected_flow import expected_flows
 from odscen.learning.reference.gap_states import FREE, gap_states
 from odscen.learning.reference.road_strips import road_strips
-from odscen.learning.reference.site_features import site_of
+from odscen.learning.reference.site_features import expected_flows, site_of
 from tests.graphs import ToyLane, fork, key, map_graph, ring, two_lane_road
 
 CAR, STANDING = 0, 0.0

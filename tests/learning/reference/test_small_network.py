@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from odscen.learning.reference.small_network import logistic, new_network, softmax, trained
+from odscen.learning.reference.traffic_model import logistic, new_network, softmax, trained
 
 
 def test_gradients_are_those_of_finite_differences() -> None:

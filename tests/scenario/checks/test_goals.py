@@ -4,9 +4,9 @@ import pytest
 from odscen.base.errors import ScenarioError
 from odscen.lanegraph.query import node_index, walk_node_index
 from odscen.scenario import edits
-from odscen.scenario.checks.goals import flow_goals, resolve_goals, with_goals
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.sampling.actor_goals import flow_goals, resolve_goals, with_goals
 from tests.graphs import fork, ring
 
 GRAPH = fork()

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from odscen.base.errors import ScenarioError
-from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import Problem
 from odscen.scenario.document.signals_document import Signals
 from odscen.sumo.realize.realization import realize

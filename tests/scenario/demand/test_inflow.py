@@ -12,14 +12,12 @@ from odscen.base.errors import InputError, ScenarioError
 from odscen.scenario import edits
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.demand.demand_tables import InputRow, read_counts, read_inputs, read_matrix
-from odscen.scenario.demand.entries import entries
-from odscen.scenario.demand.inflow import LEAST_HEADWAY, input_trips
+from odscen.scenario.demand.inflow import LEAST_HEADWAY, entries, input_trips
 from odscen.scenario.demand.trips import Trips
 from odscen.scenario.demand.zones import TripEnds
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Scenario, VehicleInput
-from odscen.scenario.placing.region import Region
-from odscen.scenario.placing.usable_nodes import Usable
+from odscen.scenario.placing.region import Region, Usable
 from tests.graphs import ToyLane, fork, key, map_graph
 
 FORK = fork()

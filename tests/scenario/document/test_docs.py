@@ -7,9 +7,8 @@ from pydantic import TypeAdapter
 from odscen.scenario.document.json_form import loads
 from odscen.scenario.document.measures_document import Measure
 from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
-from odscen.scenario.document.scenario_document import Demand
+from odscen.scenario.document.scenario_document import Demand, Transit
 from odscen.scenario.document.signals_document import JunctionTiming
-from odscen.scenario.document.transit_document import Transit
 
 ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.base.errors import InputError
-from odscen.scenario.document.expressions import evaluate, names_in
+from odscen.scenario.document.formulas import evaluate, names_in
 
 VALUES = {"gap": 3.0, "speed": -20.0, "_x1": 0.25}
 numbers = st.floats(-1e6, 1e6, allow_nan=False)

@@ -13,8 +13,7 @@ from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.edits.edit_messages import read_edit
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
-from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.scenario.signals.stage_sequence import cycle_length
+from odscen.scenario.signals.program_design import DesignedProgram, cycle_length
 from tests.scenario.edits.test_signal_edits import TWO, empty, timing
 from tests.signal_case import JUNCTION, ROOT, light, one_plan, program
 

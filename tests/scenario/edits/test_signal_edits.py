@@ -9,8 +9,7 @@ import pytest
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
 from odscen.scenario import edits
 from odscen.scenario.edits.turn_treatment import crossing_turns
-from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.scenario.signals.stage_sequence import cycle_length, stage_state
+from odscen.scenario.signals.program_design import DesignedProgram, cycle_length, stage_state
 from tests.signal_case import JUNCTION, light, one_plan, program, scenario
 
 if TYPE_CHECKING:

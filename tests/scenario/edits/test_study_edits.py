@@ -4,8 +4,7 @@ import pytest
 
 from odscen.base.errors import ScenarioError
 from odscen.scenario import edits
-from odscen.scenario.document.scenario_document import Scenario
-from odscen.scenario.document.study_document import Study
+from odscen.scenario.document.scenario_document import Scenario, Study
 from tests.graphs import fork
 
 GRAPH = fork()

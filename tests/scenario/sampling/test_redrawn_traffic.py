@@ -4,7 +4,7 @@ from collections import Counter
 import pytest
 
 from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
-from odscen.scenario.sampling.redrawn_traffic import redrawn
+from odscen.scenario.sampling.sampler import redrawn
 
 
 def placed(count=200, **fields):

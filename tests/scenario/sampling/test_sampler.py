@@ -13,18 +13,16 @@ from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import is_connected, node_index
 from odscen.opendrive.parse import parse
 from odscen.scenario.checks.scenario_checks import check
-from odscen.scenario.document.distributions import Choice, Constant, Normal, Uniform
+from odscen.scenario.document.distributions import Choice, Constant, Normal, Uniform, stream
 from odscen.scenario.document.json_form import dumps
-from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.sampling_config import (
     MapFilter,
     SamplingConfig,
     loads_config,
     overridden,
 )
-from odscen.scenario.placing.region import Region
-from odscen.scenario.placing.supply import vehicle_supply
-from odscen.scenario.placing.usable_nodes import Usable
+from odscen.scenario.placing.region import Region, Usable
+from odscen.scenario.placing.sampled_places import vehicle_supply
 from odscen.scenario.sampling.sampler import (
     choose_map,
     numbers_to_place,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from odscen.scenario.signals.movement_names import find_movements, shortest_names
+from odscen.scenario.signals.light import find_movements, shortest_names
 from tests.signal_case import light
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.scenario.signals.stage_sequence import (
+from odscen.scenario.signals.program_design import (
+    DesignedProgram,
     change_length,
     change_steps,
     cycle_length,

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from odscen.scenario.document.conditions_document import Condition
+from odscen.scenario.document.rules_document import Condition
 from odscen.scenario.story.condition_kinds import CONDITIONS
 from tests.scenario.story.straight_road import CAR, rule, started, story
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from odscen.figures.measures.figure_docs import between_markers
-from odscen.scenario.document.actions_document import Action
-from odscen.scenario.document.rules_document import StoryRule
+from odscen.scenario.document.rules_document import Action, StoryRule
 from odscen.scenario.story.action_kinds import ACTIONS
 from odscen.scenario.story.rule_docs import action_table, condition_table
 

@@ -12,9 +12,8 @@ from odscen.lanegraph.graphs import MapGraph, Relation
 from odscen.lanegraph.query import node_id, node_index
 from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.demand.zones import TripEnds
-from odscen.scenario.placing.region import Region
+from odscen.scenario.placing.region import Region, Usable
 from odscen.scenario.placing.spawn_room import LANE_CHANGE, late_for_changes
-from odscen.scenario.placing.usable_nodes import Usable
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
 from tests.graphs import ToyLane, key, map_graph

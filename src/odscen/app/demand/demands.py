@@ -16,7 +16,7 @@ from odscen.base.given_files import read_given_text
 from odscen.runs.layout import SCENARIO_FILE
 from odscen.runs.recorded import trajectory_files
 from odscen.scenario import edits
-from odscen.scenario.checks.parking_checks import parking_problems
+from odscen.scenario.checks.demand_checks import parking_problems
 from odscen.scenario.demand.day_profiles import DAY
 from odscen.scenario.demand.demand_tables import (
     COLUMNS,
@@ -26,7 +26,7 @@ from odscen.scenario.demand.demand_tables import (
     read_profile,
     read_zones,
 )
-from odscen.scenario.demand.entries import entries
+from odscen.scenario.demand.inflow import entries
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
     from odscen.lanegraph.graphs import MapGraph
     from odscen.maps.store import Workspace
-    from odscen.scenario.demand.entries import Entry
+    from odscen.scenario.demand.inflow import Entry
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.count_fit import CountFits
     from odscen.sumo.calibrate.town_day import Load

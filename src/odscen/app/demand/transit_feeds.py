@@ -13,7 +13,7 @@ from odscen.base.given_files import MOST, read_given, read_given_text
 from odscen.formats.gtfs_feed import CALENDARS, NEEDED, read_feed
 from odscen.formats.gtfs_lines import place_feed
 from odscen.opendrive.parse import parse
-from odscen.scenario.checks.transit_checks import transit_problems
+from odscen.scenario.checks.demand_checks import transit_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.placing.region import Region
 

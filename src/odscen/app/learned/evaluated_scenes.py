@@ -13,8 +13,8 @@ from odscen.learning.fill import Fill
 from odscen.learning.reference.model_training import placed
 from odscen.learning.traffic_metrics import TrafficScene
 from odscen.scenario.document.scenario_document import MapReference, Scenario, Simulation
-from odscen.scenario.placing.random_places import place_at_random
 from odscen.scenario.placing.region import place_of
+from odscen.scenario.placing.sampled_places import place_at_random
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

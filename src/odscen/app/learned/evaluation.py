@@ -18,21 +18,21 @@ from odscen.app.learned.first_seconds import HARD, first_seconds
 from odscen.app.learned.learned_maps import examples_of, whole_map
 from odscen.app.scenarios import read_scenario, scenario_files
 from odscen.base.errors import InputError
-from odscen.learning.binned_baseline import binned_statistics, place_binned
-from odscen.learning.fill import VEHICLES, Fill
-from odscen.learning.fill_check import checked_fill
+from odscen.learning.fill import VEHICLES, Fill, checked_fill
 from odscen.learning.reference.model_training import placed
 from odscen.learning.reference.reference_generator import ReferenceGenerator, names_of
 from odscen.learning.traffic_metrics import (
     MEASURES,
     TrafficScene,
+    binned_statistics,
     interval,
     novelty,
+    place_binned,
     scene_features,
     together,
 )
 from odscen.learning.traffic_snapshots import no_lights
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.sumo.realize.signals_ahead import lights_at_start
 
 if TYPE_CHECKING:

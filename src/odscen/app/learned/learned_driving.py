@@ -17,11 +17,11 @@ from odscen.base.text_files import write_file
 from odscen.base.version import __version__
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.learning.behaviour.imitation_driver import BINS, learned_driver, network_bytes
-from odscen.learning.reference.small_network import softmax
+from odscen.learning.reference.traffic_model import softmax
 from odscen.records.outcomes import RunStatus
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from odscen.learning.fill import Array
     from odscen.maps.store import Workspace
 
-RECORDER = "odscen.learning.behaviour.driving_recorder:DrivingRecorder"
+RECORDER = "odscen.learning.behaviour.imitation_driver:DrivingRecorder"
 _DENSITY = (4.0, 14.0)
 """Vehicles per kilometre of lane."""
 

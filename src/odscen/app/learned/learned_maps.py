@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from odscen.learning.traffic_snapshots import LightView, Shard
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
-    from odscen.scenario.placing.supply import Supply
+    from odscen.scenario.placing.sampled_places import Supply
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,7 +33,7 @@ from odscen.learning.traffic_snapshots import (
 )
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.scenario_document import (
     Background,

@@ -8,8 +8,8 @@ from odscen.base.errors import ScenarioError, in_file
 from odscen.base.given_files import read_given
 from odscen.formats.trajectories_format import read_trajectories_table, trajectory_rows
 from odscen.runs.finished_run import Run
+from odscen.scenario.document.problems import validated
 from odscen.scenario.document.rules_document import StoryRule
-from odscen.scenario.document.validation import validated
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,9 +16,8 @@ from odscen.app.running.runs import carry_out, check_given, prepare_run
 from odscen.base.errors import ConflictError
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.checks.rule_checks import rule_problems
-from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.problems import refuse_errors, validated
 from odscen.scenario.document.rules_document import StoryRule
-from odscen.scenario.document.validation import validated
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.rules.story_files import story_plan
 from odscen.sumo.runner.elevation import ElevationLookup

@@ -10,7 +10,7 @@ from odscen.app.scenarios import given_scenario
 from odscen.app.signals.signal_optimisation import chosen_lights
 from odscen.base.errors import InputError, NotFoundError
 from odscen.drawing.time_space import DiagramBand, DiagramLight, time_space_svg
-from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.signals.green_wave import Band, WaveLight, green_bands, widest_offsets
 from odscen.sumo.calibrate.corridor_lights import CorridorFinder, wave_lights

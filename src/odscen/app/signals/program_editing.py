@@ -14,7 +14,7 @@ from odscen.app.scenarios import given_scenario
 from odscen.app.signals.signal_optimisation import chosen_lights
 from odscen.base.errors import InputError, NotFoundError
 from odscen.records.light_programs import stage_spans
-from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.signals_document import JunctionTiming, ProgramGroup, ProgramStage
 from odscen.sumo.calibrate.light_timing import retimed, stretched, timing_of, with_timings

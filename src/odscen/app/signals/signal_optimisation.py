@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
 from odscen.base.errors import InputError, NotFoundError
-from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.signals.webster import LONGEST_CYCLE, SATURATION_FLOW, SHORTEST_CYCLE
 from odscen.sumo.calibrate.light_timing import (

@@ -8,9 +8,9 @@ from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.given_files import read_given
-from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
-from odscen.scenario.edits.edited_parts import changed_part, with_fields
+from odscen.scenario.edits.edit_registry import changed_part, with_fields
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,9 +20,9 @@ from odscen.app.signals.program_editing import take_over_program
 from odscen.app.signals.signal_optimisation import chosen_lights, refuse_interval
 from odscen.convert.model.net import CROSSED
 from odscen.convert.signals.shared_green import MOST_STAGES
-from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
-from odscen.scenario.edits.edited_parts import changed_part
+from odscen.scenario.edits.edit_registry import changed_part
 from odscen.scenario.edits.turn_treatment import crossing_turns, with_turn
 from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.sumo.calibrate.light_timing import timing_of, with_timings

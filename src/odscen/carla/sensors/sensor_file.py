@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from odscen.base.errors import InputError
-from odscen.scenario.document.validation import validation_problems
+from odscen.scenario.document.problems import validation_problems
 
 _Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,39}$")]
 _Type = Annotated[str, Field(pattern=r"^sensor\.(camera\.[a-z_]+|lidar\.ray_cast|other\.radar)$")]

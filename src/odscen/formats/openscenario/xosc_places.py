@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from odscen.base.categories import Body
     from odscen.formats.base import ExportSource
     from odscen.lanegraph.graphs import MapGraph
-    from odscen.scenario.document.conditions_document import RulePlace
+    from odscen.scenario.document.rules_document import RulePlace
     from odscen.scenario.document.scenario_document import Actor
 
 REAR_AXLE: Final = 0.28

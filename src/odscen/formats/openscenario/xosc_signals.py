@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from odscen.convert.lane_table.light_heads import Heads
 from odscen.formats.openscenario.dialect import xml
-from odscen.scenario.signals.light import find_light
-from odscen.scenario.signals.movement_names import find_movements
+from odscen.scenario.signals.light import find_light, find_movements
 from odscen.sumo.realize.lights.light_realization import realized_lights
 from odscen.sumo.realize.lights.light_views import scenario_lights
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from odscen.formats.base import ExportNotes
     from odscen.formats.openscenario.dialect import Dialect
     from odscen.formats.openscenario.xosc_places import Places
-    from odscen.scenario.document.conditions_document import Condition
+    from odscen.scenario.document.rules_document import Condition
 
 _SAME: Final = 1e-6
 MOST_GROUPS: Final = 64

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, Self
 
-from odscen.scenario.document.expressions import LONGEST
+from odscen.scenario.document.formulas import LONGEST
 
 if TYPE_CHECKING:
     from lxml.etree import _Element

@@ -22,7 +22,7 @@ from odscen.formats.openscenario_import.world.read_entities import read_entities
 from odscen.formats.openscenario_import.world.read_environment import read_environment
 from odscen.lanegraph.query import largest_part
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.scenario.templates.scene_actors import STEADY, STEADY_DRIVER
+from odscen.scenario.templates.scene_template import STEADY, STEADY_DRIVER
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

@@ -1,4 +1,4 @@
-"""A driver that has learned from SUMO's how to accelerate: a small network, with numpy alone.
+"""A driver that has learned from SUMO's how to accelerate, and the recorder of its examples.
 
 From what each vehicle sees (:func:`sight`) two hidden layers give the shares of accelerations in
 bins of 0.5 m/s^2; it takes their mean, and with ``sampled`` one drawn by these shares. Lane changes
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,17 +21,13 @@ from odscen.base.errors import InputError
 from odscen.learning.behaviour.behaviour_model import DrivingAction, LightAhead
 from odscen.learning.behaviour.intelligent_driver import desired_speeds
 from odscen.learning.offered_options import offered
-from odscen.learning.reference.small_network import (
-    SmallNetwork,
-    new_network,
-    softmax,
-    trained,
-)
+from odscen.learning.reference.traffic_model import SmallNetwork, new_network, softmax, trained
 
 if TYPE_CHECKING:
-    from odscen.base.arrays import BoolArray, FloatArray
+    from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.learning.behaviour.behaviour_model import BehaviourScene, RoadObservation
     from odscen.learning.fill import Array
+
 
 BINS = np.arange(-6.0, 4.01, 0.5)
 """Middles of the bins of accelerations, m/s^2."""
@@ -154,3 +150,52 @@ def network_from_bytes(data: bytes, *, file: str) -> SmallNetwork:
 def shipped_weights() -> bytes:
     """Weights that ship."""
     return files("odscen.learning.behaviour").joinpath(_SHIPPED).read_bytes()
+
+
+@dataclass
+class DrivingRecorder:
+    """The model; writes ``x`` (what was seen), ``acceleration`` and ``speed`` when the run is over.
+
+    Attributes
+    ----------
+    file
+        ``.npz`` file to write.
+    every
+        Of so many steps one is recorded.
+    """
+
+    file: str
+    every: float = 4.0
+    _steps: int = 0
+    _before: tuple[Int32Array, FloatArray, Array] | None = None
+    _rows: list[tuple[Array, FloatArray, FloatArray]] = field(default_factory=list)
+
+    def init(self, rng: np.random.Generator, scene: BehaviourScene) -> BehaviourScene:
+        """Begin."""
+        del rng
+        return scene
+
+    def act(
+        self, observation: RoadObservation, state: BehaviourScene
+    ) -> tuple[DrivingAction, BoolArray]:
+        """Remember what is seen, and in the next step what came of it."""
+        seen = observation
+        if self._before is not None:
+            index, speed, x = self._before
+            _, old, new = np.intersect1d(index, seen.index, return_indices=True)
+            faster = (seen.speed[new] - speed[old]) / state.step_length
+            self._rows.append((x[old], faster, speed[old]))
+        due = self._steps % max(int(self.every), 1) == 0
+        self._before = (seen.index, seen.speed, sight(seen, state)) if due else None
+        self._steps += 1
+        return DrivingAction(speed=seen.speed), np.zeros(len(seen), dtype=np.bool_)
+
+    def close(self) -> None:
+        """Write it, if there is any."""
+        if not self._rows:
+            return
+        names = ("x", "acceleration", "speed")
+        columns = [np.concatenate([row[k] for row in self._rows]) for k in range(3)]
+        with Path(self.file).open("wb") as stream:
+            arrays: dict[str, Any] = dict(zip(names, columns, strict=True))
+            np.savez(stream, **arrays)

@@ -1,4 +1,4 @@
-"""What a driver sees of the traffic ahead on the strip: the gap, the leader, the queue.
+"""What a driver sees of the traffic ahead on the strip, and behind the junction ahead.
 
 The states of a row of nodes follow from those of the nodes ahead of them and from what is on these,
 so that traffic can be described, and placed, row after row from the stop lines backwards.
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from odscen.lanegraph.graphs import ByteArray, LaneGraph
     from odscen.learning.reference.road_strips import Strips
     from odscen.learning.traffic_snapshots import Snapshot
+
 
 FREE = 150.0
 """Metres; a longer gap counts as none ahead."""
@@ -121,3 +122,69 @@ def seen_ahead(lanes: LaneGraph, strips: Strips, snapshot: Snapshot) -> tuple[In
         states.queue[snapshot.node].astype(np.int64),
         snapshot.lights.state[lanes.lane[root]],
     )
+
+
+COLUMNS = 8
+_ROOM = (15.0, 35.0, 80.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ways:
+    """Ways through junctions, from strip to strip; arrays have shape ``(W,)``.
+
+    Attributes
+    ----------
+    root
+        Last node before the junction.
+    entry
+        First node behind it.
+    metres
+        Between them.
+    """
+
+    root: IntArray
+    entry: IntArray
+    metres: FloatArray
+
+
+def beyond_columns(ways: Ways, states: GapStates) -> FloatArray:
+    """Features of the last nodes of strips, ``(N, 8)``; 0 elsewhere.
+
+    Least and mean room to the next vehicle, how many of the ways have a stopped one near, the
+    slowest speed near, queues and vehicles near, as the mean over the ways.
+    """
+    entry = ways.entry
+    taken = ~np.isnan(states.speed[entry])
+    gap = np.where(taken, -states.half[entry], states.gap[entry]) + ways.metres
+    speed = np.where(taken, states.speed[entry], states.leader[entry])
+    seen = speed >= 0.0
+    room = np.where(seen, np.clip(gap, 0.0, FREE), FREE)
+    stands = (seen & (speed < STOPPED)).astype(np.float64)
+    near: FloatArray = np.minimum(states.near[entry] + taken, 4.0) / 4.0
+    behind = states.queue[entry]
+    queue = np.where(taken, np.where(speed < STOPPED, behind + 1.0, 0.0), behind)
+    count = len(states.gap)
+    least = np.full(count, FREE)
+    np.minimum.at(least, ways.root, room)
+    pace = np.where(room < _ROOM[-1], np.maximum(speed, 0.0) / 15.0, 1.0)
+    slowest = np.ones(count)
+    np.minimum.at(slowest, ways.root, pace)
+    means = (
+        np.exp(-room / 30.0),
+        stands * np.exp(-room / 20.0),
+        near,
+        np.minimum(queue, 8.0) / 8.0,
+    )
+    columns = [
+        *(1.0 - np.minimum(least, bend) / bend for bend in _ROOM),
+        1.0 - slowest,
+        *(_mean(ways.root, one, count) for one in means),
+    ]
+    found: FloatArray = np.column_stack(columns)
+    return found
+
+
+def _mean(root: IntArray, values: FloatArray, count: int) -> FloatArray:
+    total = np.bincount(root, weights=values, minlength=count)
+    found: FloatArray = total / np.maximum(np.bincount(root, minlength=count), 1)
+    return found

@@ -15,13 +15,14 @@ from odscen.learning.reference.site_features import (
     light_columns,
     traffic_columns,
 )
-from odscen.learning.reference.small_network import new_network, trained
 from odscen.learning.reference.traffic_model import (
     CLASSES,
     TrafficModel,
     context,
     density_column,
+    new_network,
     speed_class,
+    trained,
     with_category,
 )
 
@@ -85,7 +86,7 @@ class TrainingSettings:
     empty
         Empty nodes for each vehicle; they count for all the others.
     decay
-        Of weights, see :func:`~odscen.learning.reference.small_network.trained`.
+        Of weights, see :func:`~odscen.learning.reference.traffic_model.trained`.
     balance
         0 counts every vehicle of all maps alike, 1 every map.
     """

@@ -2,28 +2,363 @@
 
 Columns are numbers of about the size of one. A feature with bends is a row of ``min(value, c) / c``
 for several ``c``, of which a small network makes any smooth curve.
+
+A lane graph has no rules of right of way. Mostly the larger road goes first: of two approaches
+opposite each other the fastest, then those of most lanes, then the straightest. Who comes by
+another one waits for their traffic; of two who go first, or two who wait, the one who turns more.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
-from odscen.lanegraph.graphs import Relation
-from odscen.learning.reference.beyond_junctions import Ways, beyond_columns
-from odscen.learning.reference.expected_flow import expected_flows
-from odscen.learning.reference.junction_approaches import approaches
+from odscen.lanegraph.graphs import Relation, WalkKind
+from odscen.learning.reference.gap_states import Ways, beyond_columns
 from odscen.learning.reference.road_strips import Strips, road_strips
-from odscen.learning.reference.stop_lines import setbacks
 from odscen.learning.traffic_snapshots import SignalAhead
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
     from odscen.lanegraph.graphs import LaneGraph, PedestrianGraph
     from odscen.learning.reference.gap_states import GapStates
     from odscen.learning.traffic_snapshots import LightView
+
+
+MEET = 2.2
+"""Metres between the centre lines of lanes whose traffic meets."""
+OPPOSITE = 2.4
+"""Radians between the headings of approaches that are one road, at least."""
+LONGEST = 120.0
+"""Metres through a junction that are followed."""
+BRANCHES = 12
+"""Ways through a junction from one lane, at most."""
+COLUMNS = 7
+_TURNS_MORE = 0.3
+"""Radians."""
+_MOST_POINTS = 1500
+
+_Approach = tuple[str, int, bool]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _WayThrough:
+    """A way through a junction; ``turn`` in radians, ``flow`` is its share of its lane's.
+
+    ``entry`` is the node that it comes out on.
+    """
+
+    root: int
+    entry: int
+    approach: _Approach
+    points: FloatArray
+    turn: float
+    metres: float
+    flow: float
+
+
+class _Standing(NamedTuple):
+    """What makes an approach go first: m/s, number of lanes; its heading in radians."""
+
+    limit: float
+    lanes: int
+    heading: float
+
+
+def approaches(
+    lanes: LaneGraph, on_road: BoolArray, *, limit: FloatArray, flow: FloatArray
+) -> tuple[Ways, list[FloatArray]]:
+    """Ways through all junctions, and features of the last nodes of strips, 0 elsewhere.
+
+    Features have shape ``(N,)``: whether the approach is of the road that goes first, the share of
+    its ways on which one waits, the traffic that is waited for (mean and most), all that is met,
+    metres through the junction, and by how much the limit is above that of the fastest other
+    approach.
+
+    Parameters
+    ----------
+    on_road
+        Shape ``(N,)``: nodes outside junctions.
+    limit, flow
+        Shape ``(N,)``: m/s, and relative numbers of trips.
+    """
+    found = [np.zeros(len(lanes.x)) for _ in range(COLUMNS)]
+    junctions = _movements(lanes, on_road, flow)
+    for movements in junctions.values():
+        _describe(movements, _standings(movements, lanes, limit), found)
+    every = [one for some in junctions.values() for one in some if on_road[one.entry]]
+    ways = Ways(
+        np.array([one.root for one in every], dtype=np.int64),
+        np.array([one.entry for one in every], dtype=np.int64),
+        np.array([one.metres for one in every], dtype=np.float64),
+    )
+    return ways, found
+
+
+def _movements(
+    lanes: LaneGraph, on_road: BoolArray, flow: FloatArray
+) -> dict[str, list[_WayThrough]]:
+    """Ways through each junction."""
+    onwards = _InsideJunctions(lanes, on_road)
+    found: dict[str, list[_WayThrough]] = {}
+    for root in onwards.roots:
+        lane = int(lanes.lane[root])
+        key = lanes.lanes.keys[lane]
+        approach = (str(key.road), key.section, bool(lanes.lanes.forward[lane]))
+        ways = onwards.ways(root)
+        for nodes, metres in ways:
+            turn = float(np.angle(np.exp(1j * (lanes.hdg[nodes[-1]] - lanes.hdg[root]))))
+            points = np.column_stack([lanes.x[nodes], lanes.y[nodes]])
+            name = str(lanes.lanes.junctions[lanes.lane[nodes[0]]])
+            share = float(flow[root]) / len(ways)
+            one = _WayThrough(root, nodes[-1], approach, points, turn, metres, share)
+            found.setdefault(name, []).append(one)
+    return found
+
+
+class _InsideJunctions:
+    """Where nodes lead, inside junctions."""
+
+    def __init__(self, lanes: LaneGraph, on_road: BoolArray) -> None:
+        follows = np.flatnonzero(lanes.relation == Relation.SUCCESSOR)
+        order = follows[np.argsort(lanes.source[follows], kind="stable")]
+        source, self._target = lanes.source[order], lanes.target[order].tolist()
+        self._length = lanes.length[order].tolist()
+        self._first = np.searchsorted(source, np.arange(len(lanes.x) + 1)).tolist()
+        self._on_road = on_road.tolist()
+        enters = on_road[source] & ~on_road[lanes.target[order]]
+        self.roots: list[int] = np.unique(source[enters]).tolist()
+
+    def ways(self, root: int) -> list[tuple[list[int], float]]:
+        """Nodes of each way from the first in the junction to the first behind it, and metres."""
+        found: list[tuple[list[int], float]] = []
+        open_ = [([there], far) for there, far in self._next(root) if not self._on_road[there]]
+        while open_ and len(found) < BRANCHES:
+            nodes, metres = open_.pop()
+            onwards = self._next(nodes[-1]) if metres < LONGEST else []
+            if self._on_road[nodes[-1]] or not onwards:
+                found.append((nodes, metres))
+            else:
+                open_ += [([*nodes, there], metres + far) for there, far in reversed(onwards)]
+        return found
+
+    def _next(self, node: int) -> list[tuple[int, float]]:
+        edges = slice(self._first[node], self._first[node + 1])
+        return list(zip(self._target[edges], self._length[edges], strict=True))
+
+
+def _standings(
+    movements: Sequence[_WayThrough], lanes: LaneGraph, limit: FloatArray
+) -> dict[_Approach, _Standing]:
+    roots: dict[_Approach, set[int]] = {}
+    for one in movements:
+        roots.setdefault(one.approach, set()).add(one.root)
+    return {
+        approach: _Standing(
+            max(float(limit[root]) for root in some),
+            len(some),
+            float(lanes.hdg[min(some)]),
+        )
+        for approach, some in roots.items()
+    }
+
+
+def _first_road(standings: dict[_Approach, _Standing]) -> frozenset[_Approach]:
+    """Approaches of the road that goes first; none where no two are opposite."""
+    best: tuple[tuple[float, int, float], frozenset[_Approach]] | None = None
+    for (one, a), (other, b) in combinations(standings.items(), 2):
+        apart = abs(float(np.angle(np.exp(1j * (a.heading - b.heading)))))
+        if apart > OPPOSITE:
+            rank = (round(min(a.limit, b.limit), 1), min(a.lanes, b.lanes), round(apart, 3))
+            if best is None or rank > best[0]:
+                best = (rank, frozenset({one, other}))
+    return best[1] if best else frozenset()
+
+
+def _describe(
+    movements: Sequence[_WayThrough],
+    standings: dict[_Approach, _Standing],
+    found: list[FloatArray],
+) -> None:
+    """Write the features of the approaches of one junction."""
+    first = _first_road(standings)
+    ahead = np.array([one.approach in first for one in movements])
+    turn = np.array([abs(one.turn) for one in movements])
+    flow = np.array([one.flow for one in movements])
+    meets = _meeting(movements)
+    more = turn[:, None] > turn[None, :] + _TURNS_MORE
+    level = ahead[:, None] == ahead[None, :]
+    equal = level & ~more & ~more.T & ~ahead[:, None]
+    waits = (~ahead[:, None] & ahead[None, :]) + level * more + 0.5 * equal
+    waited = (meets * waits) @ flow
+    met = meets @ flow
+    root = np.array([one.root for one in movements])
+    for node in np.unique(root).tolist():
+        own = root == node
+        approach = movements[int(np.argmax(own))].approach
+        limits = [one.limit for key, one in standings.items() if key != approach]
+        values = (
+            float(approach in first),
+            float(np.mean(waited[own] > 0)),
+            np.log(0.1 + waited[own].mean()) / 2.0,
+            np.log(0.1 + waited[own].max()) / 2.0,
+            np.log(0.1 + met[own].mean()) / 2.0,
+            min(max(one.metres for one in movements if one.root == node), 60.0) / 30.0,
+            (standings[approach].limit - max(limits, default=standings[approach].limit)) / 15.0,
+        )
+        for column, value in zip(found, values, strict=True):
+            column[node] = value
+
+
+def _meeting(movements: Sequence[_WayThrough]) -> FloatArray:
+    """Whether the ways of two movements of different approaches cross or merge, ``(M, M)``."""
+    from scipy.spatial.distance import cdist
+
+    step = -(-sum(len(one.points) for one in movements) // _MOST_POINTS)
+    points = [one.points[::-step] for one in movements]  # the place behind the junction first
+    first = np.concatenate([[0], np.cumsum([len(one) for one in points])[:-1]])
+    every = np.concatenate(points)
+    near = cdist(every, every)
+    least = np.minimum.reduceat(np.minimum.reduceat(near, first, axis=0), first, axis=1)
+    approach = [one.approach for one in movements]
+    apart = np.array([[a != b for b in approach] for a in approach], dtype=np.bool_)
+    return ((least < MEET * step) & apart).astype(np.float64)
+
+
+ORIGINS = 160
+"""Lanes that trips begin on, at most."""
+TO_KERB, FROM_KERB = 1.0, 15.0
+"""Metres that a lane change counts as: one keeps to the kerb where there is a choice."""
+CHANGE = 30.0
+"""Length of a road, metres, of which one who changes lanes spends half on the old lane."""
+
+
+class Flows(NamedTuple):
+    """Relative numbers of trips; shapes ``(L,)``, of both the mean over all roads is 1.
+
+    ``road`` is the mean over the lanes of one direction, ``lane`` that of the lane itself.
+    """
+
+    road: FloatArray
+    lane: FloatArray
+
+
+def expected_flows(lanes: LaneGraph) -> Flows:
+    """Trips that lead by the shortest path from everywhere on the roads to everywhere else on them.
+
+    Both by length. Lanes count apart, as the lane that most leave a road by has a queue, while
+    those beside it are empty.
+    """
+    count = len(lanes.lanes.keys)
+    lengths = np.maximum(lanes.lanes.lengths, 0.1)
+    one, other = lanes.lane[lanes.source], lanes.lane[lanes.target]
+    follows = (lanes.relation == Relation.SUCCESSOR) & (one != other)
+    beside = lanes.relation != Relation.SUCCESSOR
+    number = np.abs([key.lane for key in lanes.lanes.keys])
+    directions = _directions(lanes)
+    gone = lengths / (lengths + CHANGE)
+    source = np.concatenate([one[follows], one[beside]])
+    target = np.concatenate([other[follows], other[beside]])
+    outwards = number[other[beside]] > number[one[beside]]
+    cost = np.concatenate([lengths[other[follows]], np.where(outwards, TO_KERB, FROM_KERB)])
+    pairs, first = np.unique(source.astype(np.int64) * count + target, return_index=True)
+    graph = csr_array((cost[first], (pairs // count, pairs % count)), shape=(count, count))
+    on_road = np.array([name is None for name in lanes.lanes.junctions], dtype=np.bool_)
+    weight = lengths * on_road
+    origins = _spread(weight)
+    far, before = dijkstra(graph, indices=origins, return_predecessors=True)
+    total = np.zeros(count)
+    for row, origin in enumerate(origins):
+        trips = _trips(far[row], before[row], weight)
+        came = np.flatnonzero(before[row] >= 0)
+        changed = came[directions[before[row][came]] == directions[came]]
+        left = np.bincount(before[row][changed], weights=trips[changed], minlength=count)
+        total += (trips - gone * left) * _share(weight, origin, origins)
+    by_road = np.bincount(directions, weights=total) / np.maximum(np.bincount(directions), 1)
+    return Flows(_relative(by_road[directions], on_road), _relative(total, on_road))
+
+
+def _relative(total: FloatArray, on_road: BoolArray) -> FloatArray:
+    mean = float(total[on_road].mean()) if on_road.any() else 0.0
+    return np.asarray(total / mean) if mean > 0 else np.ones(len(total))
+
+
+def _directions(lanes: LaneGraph) -> IntArray:
+    """Row of the direction of its road that each lane is one of, ``(L,)``."""
+    ids = [
+        (key.road, key.section, forward)
+        for key, forward in zip(lanes.lanes.keys, lanes.lanes.forward.tolist(), strict=True)
+    ]
+    rows = {one: row for row, one in enumerate(dict.fromkeys(ids))}
+    return np.array([rows[one] for one in ids], dtype=np.int64)
+
+
+def _spread(weight: FloatArray) -> list[int]:
+    """Lanes at equal steps of the total length of roads: no chance is needed."""
+    ends = np.cumsum(weight)
+    wanted = (np.arange(ORIGINS) + 0.5) / ORIGINS * ends[-1]
+    found: list[int] = np.unique(
+        np.minimum(np.searchsorted(ends, wanted), len(weight) - 1)
+    ).tolist()
+    return found
+
+
+def _share(weight: FloatArray, origin: int, origins: list[int]) -> float:
+    return float(weight[origin] / sum(weight[one] for one in origins))
+
+
+def _trips(far: FloatArray, before: FloatArray, weight: FloatArray) -> FloatArray:
+    """Trips over each lane from one origin, if they end on lanes by ``weight``."""
+    found: list[float] = np.where(np.isfinite(far), weight, 0.0).tolist()
+    came = before.tolist()
+    for lane in np.argsort(-np.where(np.isfinite(far), far, -1.0), kind="stable").tolist():
+        if came[lane] >= 0:
+            found[came[lane]] += found[lane]
+    total = max(float(weight[np.isfinite(far)].sum()), 1.0)
+    trips: FloatArray = np.array(found) / total
+    return trips
+
+
+BEFORE_END = 14.0
+"""Metres before the end of a strip in which a crosswalk belongs to its junction."""
+_NEAR = 1.3
+"""Metres from a crosswalk to the nodes that it lies on."""
+
+
+def setbacks(lanes: LaneGraph, strips: Strips, walks: PedestrianGraph | None) -> FloatArray:
+    """Metres from the end of its strip to where its last crosswalk begins, for each node, ``(N,)``.
+
+    0 without a crosswalk near the end.
+    """
+    from scipy.spatial import cKDTree
+
+    count = len(strips.ahead)
+    near = np.flatnonzero(strips.on_road & (strips.to_end < BEFORE_END))
+    if walks is None or not len(near):
+        return np.zeros(count)
+    crossing = np.flatnonzero(walks.kind == WalkKind.CROSSWALK)
+    if not len(crossing):
+        return np.zeros(count)
+    share = np.linspace(0.0, 1.0, 13)
+    one, other = walks.source[crossing], walks.target[crossing]
+    places = [
+        (along[one][:, None] * (1.0 - share) + along[other][:, None] * share).ravel()
+        for along in (walks.x, walks.y)
+    ]
+    far, _ = cKDTree(np.column_stack(places)).query(np.column_stack([lanes.x[near], lanes.y[near]]))
+    crossed = near[far < _NEAR]
+    found = np.zeros(count)
+    np.maximum.at(found, strips.root[crossed], strips.to_end[crossed] + 1.0)
+    at_root: FloatArray = found[strips.root]
+    return at_root
+
 
 UNKNOWN_LIMIT = 13.89
 """m/s, where the map gives no speed limit."""

@@ -8,6 +8,11 @@ traffic already placed ahead:
     P(speed class | x, category) = softmax(speed(x, category))
 
 Speed classes are: stopped, then equal steps of the ratio of speed to limit.
+
+    h1 = tanh(x W0 + b0),  h2 = tanh(h1 W1 + b1),  y = h2 W2 + b2
+
+Trained with Adam (Kingma and Ba, 2015) on the cross-entropy of classes; two classes with one
+output are a logistic regression on ``h2``.
 """
 
 from __future__ import annotations
@@ -17,17 +22,138 @@ import json
 import zipfile
 import zlib
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.base.errors import InputError
 from odscen.learning.fill import VEHICLES
-from odscen.learning.reference.small_network import SmallNetwork
 from odscen.learning.traffic_snapshots import STOPPED
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
+    from odscen.learning.fill import Array
+
+
+_BATCH = 1024
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmallNetwork:
+    """Weights of the three layers: matrices ``(in, out)`` and vectors ``(out,)`` in turn."""
+
+    weights: tuple[Array, ...]
+
+    def __call__(self, x: Array) -> Array:
+        """Outputs ``(rows, classes)`` of inputs ``(rows, features)``, float32."""
+        return self.layers(np.asarray(x, dtype=np.float32))[-1]
+
+    def layers(self, x: Array) -> tuple[Array, ...]:
+        """Input, both hidden layers and outputs."""
+        first, a, second, b, third, c = self.weights
+        one = np.tanh(x @ first + a)
+        two = np.tanh(one @ second + b)
+        return x, one, two, two @ third + c
+
+    def gradients(self, layers: tuple[Array, ...], error: Array) -> list[Array]:
+        """Gradients of the weights for the gradient of the outputs, in the order of the weights."""
+        x, one, two, _ = layers
+        _, _, second, _, third, _ = self.weights
+        at_two = (error @ third.T) * (1.0 - two**2)
+        at_one = (at_two @ second.T) * (1.0 - one**2)
+        return [
+            x.T @ at_one, at_one.sum(axis=0),
+            one.T @ at_two, at_two.sum(axis=0),
+            two.T @ error, error.sum(axis=0),
+        ]  # fmt: skip
+
+
+def new_network(features: int, hidden: int, outputs: int, rng: np.random.Generator) -> SmallNetwork:
+    """Network with random weights, of variance 1 / inputs."""
+    sizes = (features, hidden, hidden, outputs)
+    weights: list[Array] = []
+    for inputs, outs in pairwise(sizes):
+        matrix = rng.normal(size=(inputs, outs)) / np.sqrt(inputs)
+        weights += [matrix.astype(np.float32), np.zeros(outs, dtype=np.float32)]
+    return SmallNetwork(tuple(weights))
+
+
+def trained(
+    network: SmallNetwork,
+    x: Array,
+    target: IntArray,
+    rng: np.random.Generator,
+    *,
+    epochs: int,
+    weight: FloatArray | None = None,
+    decay: float = 0.0,
+    rate: float = 3e-3,
+) -> SmallNetwork:
+    """Train a network on rows; the step length falls to nothing along a half cosine.
+
+    Parameters
+    ----------
+    x
+        Shape ``(rows, features)``.
+    target
+        Class of each row; of a network with one output 0 or 1.
+    weight
+        How much each row counts; 1 in the mean.
+    decay
+        Of the matrices, for each step and unit of the rate (Loshchilov and Hutter, 2019).
+    """
+    weights = [one.copy() for one in network.weights]
+    first = [np.zeros_like(one) for one in weights]
+    second = [np.zeros_like(one) for one in weights]
+    steps = epochs * -(-len(x) // _BATCH)
+    for step, rows in enumerate(_batches(len(x), epochs, rng), start=1):
+        current = SmallNetwork(tuple(weights))
+        layers = current.layers(np.asarray(x[rows], dtype=np.float32))
+        error = _error(layers[-1], target[rows]) / np.float32(len(rows))
+        if weight is not None:
+            error *= weight[rows, None].astype(np.float32)
+        now = rate * 0.5 * (1.0 + np.cos(np.pi * step / steps)) + 1e-5
+        for k, gradient in enumerate(current.gradients(layers, error)):
+            first[k] = 0.9 * first[k] + 0.1 * gradient
+            second[k] = 0.999 * second[k] + 0.001 * gradient**2
+            mean = first[k] / (1.0 - 0.9**step)
+            spread = np.sqrt(second[k] / (1.0 - 0.999**step)) + 1e-8
+            shrunk = decay * weights[k] if k % 2 == 0 else 0.0
+            weights[k] -= (now * (mean / spread + shrunk)).astype(np.float32)
+    return SmallNetwork(tuple(weights))
+
+
+def logistic(values: Array) -> Array:
+    """``1 / (1 + exp(-v))`` without overflow."""
+    found: Array = 0.5 * (1.0 + np.tanh(0.5 * values))
+    return found
+
+
+def softmax(values: Array) -> Array:
+    """Shares of classes, each row of which adds up to one."""
+    raised = np.exp(values - values.max(axis=1, keepdims=True))
+    found: Array = raised / raised.sum(axis=1, keepdims=True)
+    return found
+
+
+def _error(outputs: Array, target: IntArray) -> Array:
+    """Gradient of the cross-entropy of each row."""
+    if outputs.shape[1] == 1:
+        return (logistic(outputs) - target[:, None]).astype(np.float32)
+    error = softmax(outputs)
+    error[np.arange(len(target)), target] -= 1.0
+    return error.astype(np.float32)
+
+
+def _batches(count: int, epochs: int, rng: np.random.Generator) -> Iterator[IntArray]:
+    for _ in range(epochs):
+        order = rng.permutation(count)
+        for start in range(0, count, _BATCH):
+            yield order[start : start + _BATCH]
+
 
 VERSION = 4
 STEP = 0.05

@@ -1,4 +1,4 @@
-"""The rules for demand: zones, profiles, matrices, counts and background traffic on their map."""
+"""The rules for demand: zones, profiles, matrices, counts, inputs, routes, parking and transit."""
 
 from __future__ import annotations
 
@@ -6,23 +6,320 @@ from collections import Counter, defaultdict
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from odscen.base.categories import DEFAULT_BODY
 from odscen.base.shown import some_of
-from odscen.scenario.checks.demand_route_checks import route_problems
-from odscen.scenario.checks.input_checks import input_problems
-from odscen.scenario.checks.window_checks import foot_problems, window_problems
 from odscen.scenario.demand.count_stations import contradictions, transitions
 from odscen.scenario.demand.day_profiles import BUILT_IN, known_profiles
+from odscen.scenario.demand.inflow import entries, entries_of, entry_lanes
 from odscen.scenario.demand.zones import PLACE_SEPARATOR, place_segments, segments_of
 from odscen.scenario.document.problems import Problem, error, warning
+from odscen.scenario.placing.region import on_foot
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from odscen.scenario.document.scenario_document import Counts, Demand, Matrix, Scenario
-    from odscen.scenario.placing.region import Region
+    from odscen.base.categories import Category
+    from odscen.lanegraph.parking_areas import MapParking
+    from odscen.scenario.demand.inflow import Entry
+    from odscen.scenario.document.scenario_document import (
+        Counts,
+        Demand,
+        Matrix,
+        Scenario,
+        SharedRoutes,
+        TransitLine,
+        VehicleInput,
+        Window,
+    )
+    from odscen.scenario.placing.region import NodePlace, Region
+
+
+def transit_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
+    """Yield everything wrong with stops and lines of a scenario."""
+    places: dict[str, NodePlace] = {}
+    for index, stop in enumerate(scenario.transit.stops):
+        where = f"transit.stops[{index}]"
+        if stop.id in places:
+            message = f"two stops are called {stop.id!r}; give one of them another id"
+            yield error("duplicate_id", f"{where}.id", message)
+        place, found = _road_place(region, stop.node, f"{where}.node", f"stop {stop.id!r}")
+        yield from found
+        if place is not None:
+            places[stop.id] = place
+    known = {stop.id for stop in scenario.transit.stops}
+    for index, line in enumerate(scenario.transit.lines):
+        where = f"transit.lines[{index}]"
+        yield from _line_problems(scenario, line, where)
+        unknown = [(row, one.stop) for row, one in enumerate(line.stops) if one.stop not in known]
+        for row, name in unknown:
+            message = f"line {line.id!r} serves stop {name!r}; there are {_list_names(known)}"
+            yield error("unknown_stop", f"{where}.stops[{row}].stop", message)
+        if not unknown:
+            yield from _route_problems(line, places, region, where)
+
+
+def _line_problems(scenario: Scenario, line: TransitLine, where: str) -> Iterator[Problem]:
+    if on_foot(line.category):
+        message = f"line {line.id!r} has pedestrians; its trips are made by vehicles"
+        yield error("wrong_graph", f"{where}.category", message)
+    first = line.departures[0] if line.departures else line.begin
+    if first >= scenario.simulation.duration:
+        message = (
+            f"line {line.id!r} departs first at {first:g} s, but the run ends at "
+            f"{scenario.simulation.duration:g} s; depart earlier or run longer"
+        )
+        yield warning("departs_too_late", where, message)
+
+
+def _route_problems(
+    line: TransitLine, places: Mapping[str, NodePlace], region: Region, where: str
+) -> Iterator[Problem]:
+    start, found = _road_place(region, line.start, f"{where}.start", f"line {line.id!r}")
+    yield from found
+    goal = None
+    if line.goal is not None:
+        goal, found = _road_place(region, line.goal, f"{where}.goal", f"line {line.id!r}")
+        yield from found
+    if start is None or any(one.stop not in places for one in line.stops):
+        return
+    named = [(line.start, start), *((one.stop, places[one.stop]) for one in line.stops)]
+    if goal is not None:
+        named.append((str(line.goal), goal))
+    for (one, place), (other, further) in pairwise(named):
+        if not region.leads(place, further):
+            nodes = [line.start, *([line.goal] if line.goal else [])]
+            message = f"line {line.id!r}: no way leads from {one!r} to {other!r} inside the region"
+            yield error("no_path", f"{where}.stops", message, nodes=nodes)
+            return
+    if goal is None and not len(region.candidates(named[-1][1])):
+        message = f"line {line.id!r} has no end of the region to go to after its last stop"
+        yield error("no_goal", f"{where}.goal", message)
+
+
+def _road_place(
+    region: Region, node: str, where: str, name: str
+) -> tuple[NodePlace | None, list[Problem]]:
+    place = region.place(node)
+    if place is None or place.walk:
+        what = "is on a walk, not on a lane" if place else "is not on the map"
+        return None, [error("unknown_node", where, f"{name}: node {node!r} {what}", nodes=[node])]
+    lanes = region.graph.lanes
+    if not region.holds(place):
+        message = f"{name}: node {node!r} is outside the region of interest"
+        return None, [error("outside_roi", where, message, nodes=[node])]
+    if lanes.lanes.junctions[int(lanes.lane[place.node])] is not None:
+        message = f"{name}: node {node!r} is inside a junction; move it onto a road"
+        return None, [error("in_junction", where, message, nodes=[node])]
+    if float(lanes.width[place.node]) < min(body.width for body in DEFAULT_BODY.values()):
+        message = f"{name}: the lane is too narrow at node {node!r}"
+        return None, [error("lane_too_narrow", where, message, nodes=[node])]
+    return place, []
+
+
+def _list_names(known: set[str]) -> str:
+    return ", ".join(sorted(known)) or "none"
+
+
+_PARKING = "demand.parking"
+
+
+def parking_problems(
+    scenario: Scenario, region: Region, parking: MapParking | None
+) -> Iterator[Problem]:
+    """Yield why trips cannot park as the demand wants; ``parking`` ``None`` is not known."""
+    how = scenario.demand.parking
+    if not how.used:
+        return
+    demand = scenario.demand
+    if not (demand.inputs or demand.matrices or demand.background):
+        message = "no trips park: there are no inputs, matrices and background; add some or drop it"
+        yield warning("nothing_parks", _PARKING, message)
+    if parking is None:
+        return
+    if not parking.areas:
+        beside = (
+            f" within reach of a lane; {parking.unreached} are not" if parking.unreached else ""
+        )
+        message = (
+            "the map has no parking places (objects of type parkingSpace, lanes of type parking)"
+            f"{beside}; drop parking from the demand"
+        )
+        yield error("no_parking", _PARKING, message)
+    elif not any(region.lanes[area.node] for area in parking.areas):
+        message = (
+            f"none of the {len(parking.areas)} parking areas of the map is in the region of "
+            "interest; add their segments or drop parking from the demand"
+        )
+        segments = region.graph.lanes.segment
+        names = {str(region.graph.segments.ids[segments[area.node]]) for area in parking.areas}
+        yield error("parking_outside_roi", _PARKING, message, segments=sorted(names))
+
+
+def route_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
+    """Yield what is wrong with the routes of the demand."""
+    demand = scenario.demand
+    for index, one in enumerate(demand.routes.shares):
+        where = f"demand.routes.shares[{index}]"
+        yield from _end_problems(demand, one, region, where)
+        yield from _via_problems(one, region, where)
+    generated = any(one.use == "generate" for one in demand.counts)
+    if demand.routes.by == "travel_time" and generated:
+        message = (
+            "traffic generated from counts is made beside trips on their quickest routes in free "
+            "flow; with other routes by travel time the counts are met less well"
+        )
+        yield warning("counts_by_travel_time", "demand.routes.by", message)
+
+
+def _end_problems(
+    demand: Demand, one: SharedRoutes, region: Region, where: str
+) -> Iterator[Problem]:
+    known = {str(name) for name in region.graph.segments.ids}
+    inside = {str(name) for name in region.segments}
+    zones = {zone.id for zone in demand.zones}
+    for field, name in (("origin", one.origin), ("destination", one.destination)):
+        if name not in zones and name not in known:
+            message = f"{name!r} is neither a zone nor a segment of the map"
+            yield error("unknown_zone", f"{where}.{field}", message)
+        elif not inside.intersection(segments_of(demand, name)):
+            message = f"{name!r} is outside the region of interest"
+            yield error("zone_outside_roi", f"{where}.{field}", message)
+
+
+def _via_problems(one: SharedRoutes, region: Region, where: str) -> Iterator[Problem]:
+    known = {str(name) for name in region.graph.segments.ids}
+    inside = {str(name) for name in region.segments}
+    for row, (via, _) in enumerate(one.routes):
+        here = f"{where}.routes[{row}]"
+        for name in via:
+            if name not in known:
+                message = f"the route leads over {name!r}, which the map does not have"
+                yield error("unknown_segment", here, message, segments=[name])
+            elif name not in inside:
+                message = f"the route leads over {name!r}, outside the region of interest"
+                yield error("zone_outside_roi", here, message, segments=[name])
+
+
+def window_problems(scenario: Scenario, part: Window, where: str) -> Iterator[Problem]:
+    """Yield what is wrong with begin and end of a part of the demand."""
+    duration = scenario.simulation.duration
+    if part.end is not None and part.end <= part.begin:
+        message = f"{part.id!r} ends at {part.end:g} s, not after it begins ({part.begin:g} s)"
+        yield error("flow_window_empty", f"{where}.end", message)
+    elif part.begin >= duration:
+        message = (
+            f"{part.id!r} begins at {part.begin:g} s, but the run ends at {duration:g} s; begin "
+            "earlier or run longer"
+        )
+        severity = error if part.end is None else warning
+        yield severity("departs_too_late", f"{where}.begin", message)
+
+
+def foot_problems(mix: Iterable[Category], name: str, where: str, what: str) -> Iterator[Problem]:
+    """Yield an error if a mix of vehicles has pedestrians."""
+    if any(on_foot(category) for category in mix):
+        message = f"{name!r} has pedestrians; {what} are of vehicles: use a matrix for them"
+        yield error("wrong_graph", f"{where}.mix", message)
+
 
 MOST = 20
 """Rows of a table that are named one by one; the rest are counted."""
+
+
+NAMED = 8
+"""Entries that a message lists."""
+
+
+def input_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
+    """Yield everything wrong with the vehicle inputs of a scenario."""
+    if not scenario.demand.inputs:
+        return
+    every = entries(region)
+    for index, part in enumerate(scenario.demand.inputs):
+        where = f"demand.inputs[{index}]"
+        yield from window_problems(scenario, part, where)
+        yield from foot_problems(part.mix, part.id, where, "inputs")
+        yield from _length_problems(scenario, part, where)
+        found = [*_entry_problems(part, every, where, region)]
+        yield from found
+        yield from _goal_problems(scenario, part, region, where, found=not found)
+
+
+def _length_problems(scenario: Scenario, part: VehicleInput, where: str) -> Iterator[Problem]:
+    end = scenario.simulation.duration if part.end is None else part.end
+    last = part.begin + len(part.volumes) * part.interval
+    if part.volumes and last < end:
+        message = (
+            f"the {len(part.volumes)} volumes of {part.id!r} end at {last:g} s, the input at "
+            f"{end:g} s: none come in between"
+        )
+        yield warning("volumes_too_short", f"{where}.volumes", message)
+
+
+def _entry_problems(
+    part: VehicleInput, every: Sequence[Entry], where: str, region: Region
+) -> Iterator[Problem]:
+    mine = entries_of(part, every)
+    here = f"{where}.segment"
+    if part.segment not in {str(name) for name in region.graph.segments.ids}:
+        message = (
+            f"the map has no segment {part.segment!r}; vehicles can enter on {_list_entries(every)}"
+        )
+        yield error("unknown_segment", here, message, segments=[part.segment])
+    elif not mine:
+        way = f" {part.direction}" if part.direction else ""
+        message = (
+            f"no lane leads{way} into the region of interest on {part.segment!r}; vehicles can "
+            f"enter on {_list_entries(every)}"
+        )
+        yield error("no_entry", here, message, segments=[part.segment])
+    elif len(mine) > 1:
+        message = f"vehicles can enter {part.segment!r} both ways; give its direction"
+        yield error("entry_ambiguous", here, message, segments=[part.segment])
+    else:
+        known = [one.lane for one in mine[0].lanes]
+        for row, lane in enumerate(part.lanes):
+            if lane not in known:
+                message = f"lane {lane} is not among those that enter on {part.segment!r}: {known}"
+                yield error("unknown_lane", f"{where}.lanes[{row}]", message)
+
+
+def _goal_problems(
+    scenario: Scenario, part: VehicleInput, region: Region, where: str, *, found: bool
+) -> Iterator[Problem]:
+    zones = {zone.id for zone in scenario.demand.zones}
+    ids = [str(name) for name in region.graph.segments.ids]
+    inside = {str(name) for name in region.segments}
+    reached = _reached_segments(part, region) if found else None
+    for row, (name, _) in enumerate(part.to):
+        here, segments = f"{where}.to[{row}]", segments_of(scenario.demand, name)
+        if name not in zones and name not in ids:
+            message = f"{name!r} is neither a zone nor a segment of the map"
+            yield error("unknown_zone", here, message)
+        elif not inside.intersection(segments):
+            message = f"{name!r} is outside the region of interest"
+            yield error("zone_outside_roi", here, message, segments=segments)
+        elif reached is not None and not reached.intersection(segments):
+            message = f"no way leads from {part.segment!r} to {name!r} inside the region"
+            yield error("no_path", here, message, segments=(part.segment, *segments))
+
+
+def _reached_segments(part: VehicleInput, region: Region) -> set[str]:
+    """Segments that can be reached from any lane of an input."""
+    lanes, ids = region.graph.lanes, region.graph.segments.ids
+    rows = {
+        int(row)
+        for entry in entries_of(part, entries(region))
+        for one in entry_lanes(part, entry)
+        for row in set(lanes.segment[region.router.reachable(one.node)].tolist())
+    }
+    return {str(ids[row]) for row in rows}
+
+
+def _list_entries(every: Sequence[Entry]) -> str:
+    names = [f"{one.segment} ({one.direction})" for one in every[:NAMED]]
+    more = len(every) - len(names)
+    return ", ".join(names) + (f" and {more} more" if more else "") or "no segment"
 
 
 def demand_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:

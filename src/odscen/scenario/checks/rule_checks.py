@@ -10,8 +10,7 @@ from odscen.base.categories import Category
 from odscen.base.errors import OdscenError
 from odscen.scenario.document.problems import Problem, error, warning
 from odscen.scenario.document.rules_document import actors_of, places_of, rule_parts
-from odscen.scenario.signals.light import find_light
-from odscen.scenario.signals.movement_names import find_movements, known_names
+from odscen.scenario.signals.light import find_light, find_movements, known_names
 from odscen.scenario.story.action_kinds import ACTIONS
 from odscen.scenario.story.own_kinds import (
     own_action,

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.scenario.document.scenario_document import Demand
-    from odscen.scenario.placing.region import NodePlace, Region
-    from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.placing.region import NodePlace, Region, Usable
 
 PLACE_SEPARATOR = ">"
 """Between the segments of a place where vehicles are counted."""

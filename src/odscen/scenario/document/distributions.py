@@ -7,6 +7,7 @@ number stands for one. ``weights`` and ``shares`` are relative everywhere: they 
 from __future__ import annotations
 
 import math
+import zlib
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
@@ -16,6 +17,13 @@ from odscen.scenario.document.document_parts import Part
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+
+
+def stream(seed: int, *names: str) -> np.random.Generator:
+    """Random numbers of one name, independent of what else is drawn, and of the order."""
+    words = [zlib.crc32(name.encode()) for name in names]
+    return np.random.default_rng(np.random.SeedSequence([seed, *words]))
+
 
 _Key = TypeVar("_Key")
 

@@ -11,8 +11,8 @@ from pydantic_core import from_json
 
 from odscen.base.errors import ScenarioError
 from odscen.scenario.document.formulas import computed, put_back
+from odscen.scenario.document.problems import validation_problems
 from odscen.scenario.document.scenario_document import FORMAT, VERSION, Scenario
-from odscen.scenario.document.validation import validation_problems
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

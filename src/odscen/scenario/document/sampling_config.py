@@ -22,7 +22,7 @@ from odscen.scenario.document.distributions import (
 )
 from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.drivers_document import DrivingStyle
-from odscen.scenario.document.validation import validated, validation_problems
+from odscen.scenario.document.problems import validated, validation_problems
 
 Share = Annotated[float, Field(ge=0)]
 Probability = Annotated[float, Field(ge=0, le=1)]

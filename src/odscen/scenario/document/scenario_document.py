@@ -4,29 +4,286 @@ Units are SI: metres, seconds, m/s; flows count per hour, as traffic engineers d
 name. Times are seconds after the start of the run. Node, segment and map names refer to the lane
 graph of one map, named with its content hash.
 Rules that need the graph live in :mod:`odscen.scenario.checks.scenario_checks`, not here.
+
+Placed actors and flows take the shortest route whatever is said here; so does traffic that is
+generated from counts, for its routes are chosen to pass the count stations.
+
+Times are seconds after the start of the run. Stations lie on nodes of the lane graph: a line across
+a road is a list of nodes, one for each lane.
+
+Words are those of GTFS and Transmodel: a line has trips, which serve stops; a trip stays at a stop
+for its dwell time, and no shorter than to its scheduled departure.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 
 from odscen.base.categories import Category
+from odscen.scenario.document.distributions import Constant, WrittenDistribution
 from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label, Part, Seconds
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.measures_document import Measure
-from odscen.scenario.document.parameters_document import Parameter, ParameterName
-from odscen.scenario.document.parking_document import TripParking
-from odscen.scenario.document.routes_document import RouteChoice
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
-from odscen.scenario.document.study_document import Study
-from odscen.scenario.document.transit_document import Transit
-from odscen.scenario.document.variants_document import Variant
 
 if TYPE_CHECKING:
     from pydantic.config import JsonDict
+
+
+USUAL_DWELL = Constant(value=20.0)
+
+
+class TransitStop(Part):
+    """A place where vehicles of lines stop; ``node`` is in the middle of its ``length`` (metres).
+
+    In a ``bay`` they stand beside the lane and hold up no other vehicle.
+    """
+
+    id: Identifier
+    name: Annotated[str, Field(max_length=200)] = ""
+    node: Label
+    length: Annotated[float, Field(ge=5, le=200)] = 15.0
+    bay: bool = False
+
+
+class ServedStop(Part):
+    """A stop on a line.
+
+    ``after`` is the scheduled departure there, seconds after the departure of the trip; without it
+    the vehicle goes on after its dwell time. ``dwell`` ``None`` is that of the line.
+    """
+
+    stop: Identifier
+    after: Seconds | None = None
+    dwell: WrittenDistribution | None = None
+
+
+class TransitLine(Part):
+    """A line: trips from the node ``start`` by its stops to the node ``goal``.
+
+    Trips depart every ``headway`` seconds from ``begin`` until before ``end`` (``None``: the end of
+    the run), or at the times ``departures``. Dwell times (s) are drawn for each trip and stop.
+    """
+
+    id: Identifier
+    start: Label
+    goal: Label | None = None
+    stops: Annotated[tuple[ServedStop, ...], Field(min_length=1, max_length=500)]
+    headway: Annotated[float, Field(ge=10, le=86_400)] | None = None
+    begin: Seconds = 0.0
+    end: Seconds | None = None
+    departures: Annotated[tuple[Seconds, ...], Field(max_length=10_000)] = ()
+    dwell: WrittenDistribution = USUAL_DWELL
+    category: Category = Category.BUS
+    model: Label | None = None
+
+    @model_validator(mode="after")
+    def _one_timetable(self) -> Self:
+        if (self.headway is None) == (not self.departures):
+            raise ValueError(
+                f"give one of headway and departures, not {'both' if self.headway else 'none'}"
+            )
+        given = [one.after for one in self.stops if one.after is not None]
+        if any(later <= earlier for earlier, later in pairwise(given)):
+            raise ValueError("scheduled departures (after) must grow from stop to stop")
+        if list(self.departures) != sorted(set(self.departures)):
+            raise ValueError("departures must grow, each given once")
+        return self
+
+
+class Transit(Part):
+    """Stops and lines of a scenario."""
+
+    stops: tuple[TransitStop, ...] = ()
+    lines: tuple[TransitLine, ...] = ()
+
+
+WholeSeconds = Annotated[float, Field(ge=0, le=1e9, multiple_of=1)]
+Line = Annotated[tuple[Label, ...], Field(min_length=1, max_length=100)]
+"""Nodes of the lane graph, one for each lane that is crossed."""
+
+
+class Detector(Part):
+    """Counts vehicles, their speed, and the share of the time in which one is on it."""
+
+    id: Identifier
+    nodes: Line
+
+    @property
+    def lines(self) -> tuple[tuple[str, Line], ...]:
+        """Its lines, with the names of their fields."""
+        return (("nodes", self.nodes),)
+
+
+class TravelTimeSection(Part):
+    """Measures the time from one line to another, of the vehicles that cross both."""
+
+    id: Identifier
+    begin: Line
+    end: Line
+
+    @property
+    def lines(self) -> tuple[tuple[str, Line], ...]:
+        """Its lines, with the names of their fields."""
+        return (("begin", self.begin), ("end", self.end))
+
+
+class Cordon(Part):
+    """Counts the vehicles that enter and leave an area, at all the lines around it."""
+
+    id: Identifier
+    entries: Line
+    exits: Line
+
+    @property
+    def lines(self) -> tuple[tuple[str, Line], ...]:
+        """Its lines, with the names of their fields."""
+        return (("entries", self.entries), ("exits", self.exits))
+
+
+class Study(Part):
+    """What of a run is analysed, and where it is measured besides.
+
+    ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
+    over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
+    """
+
+    warm_up: WholeSeconds = 0.0
+    interval: Annotated[float, Field(ge=1, le=86_400, multiple_of=1)] | None = None
+    detectors: tuple[Detector, ...] = ()
+    sections: tuple[TravelTimeSection, ...] = ()
+    cordons: tuple[Cordon, ...] = ()
+
+    @property
+    def stations(self) -> tuple[tuple[str, Detector | TravelTimeSection | Cordon], ...]:
+        """All stations, with their places in the document."""
+        return tuple(
+            (f"study.{kind}[{index}]", station)
+            for kind in ("detectors", "sections", "cordons")
+            for index, station in enumerate(getattr(self, kind))
+        )
+
+
+EditValue = Annotated[
+    Any,
+    WithJsonSchema({"type": ["null", "boolean", "number", "string", "array", "object"]}),
+]
+"""An argument of an edit: any JSON, for what is possible is for the edit to say."""
+
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+class Variant(Part):
+    """The scenario that a variant was made of, and the edits that made it.
+
+    ``parent`` is the name of its file, ``parent_sha256`` and ``sha256`` are of the content of the
+    parent and of this scenario when it was made, seed and name apart. An edit is an object with its
+    ``kind`` and arguments, as :mod:`odscen.scenario.edits` has them.
+    """
+
+    parent: Label
+    parent_sha256: Sha256
+    sha256: Sha256
+    edits: Annotated[tuple[dict[str, EditValue], ...], Field(min_length=1, max_length=5000)]
+
+
+ParameterName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=64)]
+Value = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Parameter(Part):
+    """A named number with its unit and the bounds between which it makes sense.
+
+    Any number of the document may be written as a formula of parameters, ``"$gap"`` or
+    ``"2 * $gap + 1"``, and so may the ``value`` of a later parameter.
+    """
+
+    value: Value
+    unit: Annotated[str, Field(max_length=40)] = ""
+    min: Value | None = None
+    max: Value | None = None
+    description: Annotated[str, Field(max_length=1000)] = ""
+
+    @model_validator(mode="after")
+    def _within_bounds(self) -> Self:
+        low, high = self.min, self.max
+        if low is not None and high is not None and low > high:
+            raise ValueError(f"min {low:g} is above max {high:g}")
+        if (low is not None and self.value < low) or (high is not None and self.value > high):
+            bounds = f"{'' if low is None else f'{low:g}'}..{'' if high is None else f'{high:g}'}"
+            msg = f"value {self.value:g} is outside {bounds} {self.unit}".rstrip()
+            raise ValueError(msg)
+        return self
+
+
+RouteShare = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
+"""Relative to the other routes of the same trips."""
+Via = Annotated[tuple[Label, ...], Field(max_length=50)]
+"""Segments that a route leads over, in this order; without any it is the usual route."""
+
+
+class SharedRoutes(Part):
+    """Trips from ``origin`` to ``destination`` are dealt out to routes by fixed shares.
+
+    Both are zones or segments. Each of ``routes`` is the segments it leads over and its share.
+    """
+
+    origin: Label
+    destination: Label
+    routes: Annotated[tuple[tuple[Via, RouteShare], ...], Field(min_length=1, max_length=50)]
+
+
+class RouteChoice(Part):
+    """How trips of inputs, matrices and background traffic choose their routes.
+
+    By ``length`` each takes the shortest. By ``travel_time`` the run is repeated, at most
+    ``iterations`` times, and each time some trips change to the route that was quickest, until
+    ``gap``, the share of travel time that could be saved, is small enough. Travel times are means
+    of ``interval`` seconds. With a ``spread`` drivers tell routes apart only roughly: of two routes
+    one of which takes longer by that share of the time, it is taken ``e`` times as rarely.
+
+    ``informed`` is the share of drivers who look for a quicker route on the way, every ``period``
+    seconds, whichever route they began with. ``shares`` deal out trips to routes beforehand.
+    """
+
+    by: Literal["length", "travel_time"] = "length"
+    iterations: Annotated[int, Field(ge=1, le=100)] = 20
+    gap: Annotated[float, Field(ge=0, lt=1)] = 0.01
+    interval: Annotated[float, Field(ge=60, le=3600)] = 900.0
+    spread: Annotated[float, Field(ge=0, le=1)] = 0.03
+    informed: Annotated[float, Field(ge=0, le=1)] = 0.0
+    period: Annotated[float, Field(ge=1, le=3600)] = 60.0
+    shares: Annotated[tuple[SharedRoutes, ...], Field(max_length=1000)] = ()
+
+
+USUAL_STAY = Constant(value=3600.0)
+
+ParkingShare = Annotated[float, Field(ge=0, le=1)]
+
+
+class TripParking(Part):
+    """Shares of the cars of matrices, inputs and background that park.
+
+    ``begin`` is the share that begin in a parking place (inputs begin at the boundary), ``end``
+    the share that end in one. ``stay`` is how long a place is taken, seconds: before a trip that
+    begins there, and after one that has ended there. Between zones, places are at most ``within``
+    metres from where the trip would begin or end; elsewhere anywhere in the region.
+    """
+
+    begin: ParkingShare = 0.0
+    end: ParkingShare = 0.0
+    stay: WrittenDistribution = USUAL_STAY
+    within: Annotated[float, Field(ge=10, le=10_000)] = 300.0
+
+    @property
+    def used(self) -> bool:
+        """Whether any trip parks."""
+        return self.begin > 0.0 or self.end > 0.0
+
 
 FORMAT: Final = "odscen-scenario"
 VERSION: Final = 1

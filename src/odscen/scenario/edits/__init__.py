@@ -15,21 +15,24 @@ from odscen.scenario.edits.actor_edits import (
     set_goal,
 )
 from odscen.scenario.edits.demand_edits import (
+    add_flow,
+    change_flow,
     remove_demand,
+    remove_flow,
+    remove_transit,
     set_background,
     set_clock,
     set_counts,
     set_input,
+    set_line,
     set_matrix,
     set_parking,
     set_profile,
     set_routes,
+    set_stop,
     set_zone,
 )
-from odscen.scenario.edits.flow_edits import add_flow, change_flow, remove_flow
-from odscen.scenario.edits.measure_edits import remove_measure, set_measure
-from odscen.scenario.edits.parameter_edits import remove_parameter, set_formula, set_parameter
-from odscen.scenario.edits.program_part_edits import (
+from odscen.scenario.edits.program_edits import (
     add_stage,
     remove_detector,
     remove_group,
@@ -47,15 +50,19 @@ from odscen.scenario.edits.roi_edits import (
     removable_segments,
     shrink_roi,
 )
-from odscen.scenario.edits.rule_edits import remove_rule, set_rule
+from odscen.scenario.edits.rule_edits import remove_measure, remove_rule, set_measure, set_rule
 from odscen.scenario.edits.settings_edits import (
     new_scenario,
+    remove_parameter,
     rename,
     set_criteria,
     set_drivers,
     set_environment,
+    set_formula,
+    set_parameter,
     set_seed,
     set_simulation,
+    set_study,
 )
 from odscen.scenario.edits.signal_edits import (
     clear_timing,
@@ -66,8 +73,6 @@ from odscen.scenario.edits.signal_edits import (
     set_timing,
     set_turn,
 )
-from odscen.scenario.edits.study_edits import set_study
-from odscen.scenario.edits.transit_edits import remove_transit, set_line, set_stop
 
 __all__ = [
     "add_actor",

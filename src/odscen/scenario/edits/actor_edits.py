@@ -5,23 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 from odscen.base.errors import ScenarioError
-from odscen.scenario.checks.actor_checks import (
-    Subject,
-    goal_problems,
-    spawn_problems,
-    via_problems,
-)
+from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems, via_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids, roi_problems, shared_nodes
-from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.problems import refuse_errors, validated
 from odscen.scenario.document.sampling_config import SamplingConfig, overridden
-from odscen.scenario.document.scenario_document import (
-    Actor,
-    Scenario,
-)
-from odscen.scenario.document.validation import validated
-from odscen.scenario.edits.edit_registry import edit
-from odscen.scenario.edits.edited_parts import (
+from odscen.scenario.document.scenario_document import Actor, Scenario
+from odscen.scenario.edits.edit_registry import (
     changed_part,
+    edit,
     free_id,
     index_of,
     refuse_placement,
@@ -37,7 +28,7 @@ if TYPE_CHECKING:
 
     from odscen.base.categories import Category
     from odscen.lanegraph.graphs import MapGraph
-    from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.placing.region import Usable
     from odscen.scenario.sampling.sampler import Crew
 
 

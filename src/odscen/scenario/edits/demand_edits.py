@@ -1,34 +1,46 @@
-"""Changes to the demand of a scenario."""
+"""Changes to the demand of a scenario, to its flows, and to its public transport."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from odscen.base.errors import NotFoundError
-from odscen.scenario.checks.demand_checks import demand_problems
+from odscen.scenario.checks.actor_checks import Subject
+from odscen.scenario.checks.demand_checks import demand_problems, transit_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids
 from odscen.scenario.document.document_parts import Identifier  # noqa: TC001 (read at run time)
-from odscen.scenario.document.parking_document import TripParking
-from odscen.scenario.document.problems import refuse_errors
-from odscen.scenario.document.routes_document import RouteChoice
+from odscen.scenario.document.problems import refuse_errors, validated
 from odscen.scenario.document.scenario_document import (
     Background,
     Counts,
     Demand,
+    Flow,
     Matrix,
     Profile,
+    RouteChoice,
     Scenario,
+    TransitLine,
+    TransitStop,
+    TripParking,
     VehicleInput,
     Zone,
 )
-from odscen.scenario.document.validation import validated
-from odscen.scenario.edits.edit_registry import edit
+from odscen.scenario.edits.edit_registry import (
+    changed_part,
+    edit,
+    free_id,
+    index_of,
+    refuse_placement,
+    replaced_at,
+    with_fields,
+)
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.lanegraph.graphs import MapGraph
+
 
 _Part = TypeVar("_Part", bound=Zone | Profile | VehicleInput | Matrix | Counts | Background)
 
@@ -48,7 +60,7 @@ def set_routes(
     Parameters
     ----------
     fields
-        Fields of :class:`~odscen.scenario.document.routes_document.RouteChoice`, such as ``by``;
+        Fields of :class:`~odscen.scenario.document.scenario_document.RouteChoice`, such as ``by``;
         those not given stay as they are.
 
     Raises
@@ -68,7 +80,7 @@ def set_parking(scenario: Scenario, **fields: Annotated[Any, TripParking]) -> Sc
     Parameters
     ----------
     fields
-        Fields of :class:`~odscen.scenario.document.parking_document.TripParking`, such as ``end``;
+        Fields of :class:`~odscen.scenario.document.scenario_document.TripParking`, such as ``end``;
         those not given stay as they are.
     """
     old = scenario.demand.parking
@@ -244,3 +256,136 @@ def _checked(scenario: Scenario, graph: MapGraph) -> Scenario:
     region = Region.of(graph, scenario.roi)
     refuse_errors([*demand_problems(scenario, region), *duplicate_ids(scenario)])
     return scenario
+
+
+_One = TypeVar("_One", bound=TransitStop | TransitLine)
+
+
+@edit("Stop {stop}")
+def set_stop(
+    scenario: Scenario,
+    graph: MapGraph,
+    *,
+    stop: Identifier,
+    **fields: Annotated[Any, TransitStop],
+) -> Scenario:
+    """Add a stop, or change that of this name.
+
+    Parameters
+    ----------
+    fields
+        Fields of :class:`~odscen.scenario.document.scenario_document.TransitStop`, such as
+        ``node``; those not given stay as they are.
+
+    Raises
+    ------
+    ScenarioError
+        If there can be no stop, or a line cannot be driven any more.
+    """
+    stops = _with_transit_part(scenario.transit.stops, TransitStop, stop, fields)
+    return _checked_transit(scenario, graph, "stops", stops)
+
+
+@edit("Line {line}")
+def set_line(
+    scenario: Scenario,
+    graph: MapGraph,
+    *,
+    line: Identifier,
+    **fields: Annotated[Any, TransitLine],
+) -> Scenario:
+    """Add a line, or change that of this name.
+
+    Parameters
+    ----------
+    fields
+        Fields of :class:`~odscen.scenario.document.scenario_document.TransitLine`, such as
+        ``stops``; those not given stay as they are, except that ``headway`` takes the place of
+        ``departures`` and the other way round.
+
+    Raises
+    ------
+    ScenarioError
+        If a stop is unknown, or no way leads from one to the next.
+    """
+    if {"headway", "departures"} & fields.keys():
+        fields = {"headway": None, "departures": (), **fields}
+    lines = _with_transit_part(scenario.transit.lines, TransitLine, line, fields)
+    return _checked_transit(scenario, graph, "lines", lines)
+
+
+@edit("Remove {part}")
+def remove_transit(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario:
+    """Remove a stop or a line by its name.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none of that name.
+    ScenarioError
+        If a line serves the stop.
+    """
+    for kind in ("lines", "stops"):
+        ones = getattr(scenario.transit, kind)
+        left = tuple(one for one in ones if one.id != part)
+        if len(left) < len(ones):
+            return _checked_transit(scenario, graph, kind, left)
+    what = "stop or line"
+    known = [line.id for line in scenario.transit.lines]
+    raise NotFoundError(what, part, [*known, *(stop.id for stop in scenario.transit.stops)])
+
+
+def _with_transit_part(
+    ones: tuple[_One, ...], model: type[_One], name: str, fields: Any
+) -> list[_One]:
+    """Change the one of that name, or add it at the end."""
+    if all(one.id != name for one in ones):
+        return [*ones, validated(model, {**fields, "id": name})]
+    return [changed_part(one, fields) if one.id == name else one for one in ones]
+
+
+def _checked_transit(
+    scenario: Scenario, graph: MapGraph, kind: str, ones: Sequence[TransitStop | TransitLine]
+) -> Scenario:
+    transit = changed_part(scenario.transit, {kind: tuple(ones)})
+    scenario = scenario.model_copy(update={"transit": transit})
+    region = Region.of(graph, scenario.roi)
+    refuse_errors([*transit_problems(scenario, region), *duplicate_ids(scenario)])
+    return scenario
+
+
+@edit("Add a stream")
+def add_flow(
+    scenario: Scenario,
+    graph: MapGraph,
+    *,
+    spawn: str,
+    per_hour: float,
+    id: str | None = None,  # noqa: A002 - the document's word
+    **fields: Annotated[Any, Flow],
+) -> Scenario:
+    """Put a flow on a node (R44); ``fields`` are further fields of ``Flow``."""
+    fields |= {"spawn": spawn, "per_hour": per_hour, "id": id or free_id(scenario, "flow")}
+    flow = validated(Flow, fields)
+    changed = with_fields(scenario, flows=(*scenario.flows, flow))
+    refuse_placement(changed, graph, Subject.flow, len(scenario.flows))
+    return changed
+
+
+@edit("Change {flow}")
+def change_flow(
+    scenario: Scenario, graph: MapGraph, flow: str, **fields: Annotated[Any, Flow]
+) -> Scenario:
+    """Change any fields of a flow."""
+    index = index_of(scenario.flows, flow)
+    new = changed_part(scenario.flows[index], fields)
+    changed = with_fields(scenario, flows=replaced_at(scenario.flows, index, new))
+    refuse_placement(changed, graph, Subject.flow, index)
+    return changed
+
+
+@edit("Remove {flow}")
+def remove_flow(scenario: Scenario, flow: str) -> Scenario:
+    """Remove a flow."""
+    index = index_of(scenario.flows, flow)
+    return with_fields(scenario, flows=scenario.flows[:index] + scenario.flows[index + 1 :])

@@ -25,7 +25,7 @@ from pydantic import (
 
 from odscen.base.errors import ScenarioError
 from odscen.scenario.document import document_parts, scenario_document, signals_document
-from odscen.scenario.document.validation import validation_problems
+from odscen.scenario.document.problems import validation_problems
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from odscen.base.errors import NotFoundError, ScenarioError
 from odscen.base.ids import SegmentId
 from odscen.lanegraph.query import is_connected, neighbours, removable
 from odscen.scenario.checks.actor_checks import vias
-from odscen.scenario.edits.edit_registry import edit
-from odscen.scenario.edits.edited_parts import (
+from odscen.scenario.edits.edit_registry import (
     PlacedOne,
     all_placed,
     changed_part,
+    edit,
     with_fields,
 )
 from odscen.scenario.placing.region import Region

@@ -1,30 +1,28 @@
-"""Changes to the rules of a scenario: when this, then that."""
+"""Changes to the rules of a scenario, and to its measures."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from odscen.scenario.checks.measure_checks import measure_problems
 from odscen.scenario.checks.rule_checks import rule_problems
+from odscen.scenario.checks.scenario_checks import duplicate_ids
+from odscen.scenario.document.measures_document import Measure  # noqa: TC001 (read at run time)
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.rules_document import StoryRule  # noqa: TC001 (read at run time)
-from odscen.scenario.edits.edit_registry import edit
-from odscen.scenario.edits.edited_parts import (
-    changed_part,
-    drop_part,
-    put_part,
-    with_fields,
-)
+from odscen.scenario.edits.edit_registry import changed_part, drop_part, edit, put_part, with_fields
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.lanegraph.graphs import MapGraph
-    from odscen.scenario.document.conditions_document import Condition
+    from odscen.scenario.document.rules_document import Condition
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.signals.light import Light
 
-_WHAT = "rule"
+
+_RULE = "rule"
 
 
 @edit("Rule {rule.id}")
@@ -55,7 +53,7 @@ def set_rule(
     NotFoundError
         If there is no rule ``instead_of``.
     """
-    rules, index = put_part(scenario.rules, rule, what=_WHAT, instead_of=instead_of)
+    rules, index = put_part(scenario.rules, rule, what=_RULE, instead_of=instead_of)
     if instead_of is not None:
         rules = tuple(
             changed_part(one, {"when": _waiting(one.when, instead_of, rule.id)}) for one in rules
@@ -79,7 +77,7 @@ def remove_rule(scenario: Scenario, *, rule: str) -> Scenario:
     NotFoundError
         If there is none.
     """
-    return with_fields(scenario, rules=drop_part(scenario.rules, _WHAT, rule))
+    return with_fields(scenario, rules=drop_part(scenario.rules, _RULE, rule))
 
 
 def _waiting(condition: Condition, old: str, new: str) -> Condition:
@@ -93,3 +91,50 @@ def _waiting(condition: Condition, old: str, new: str) -> Condition:
         if (parts := getattr(condition, join)) is not None:
             changes[join] = tuple(_waiting(one, old, new) for one in parts)
     return changed_part(condition, changes)
+
+
+_MEASURE = "measure"
+
+
+@edit("Measure {measure.id}")
+def set_measure(
+    scenario: Scenario,
+    graph: MapGraph,
+    lights: Sequence[Light] | None = None,
+    *,
+    measure: Measure,
+    instead_of: str | None = None,
+) -> Scenario:
+    """Add a measure, or put it in the place of that with its id; of another kind, too.
+
+    Parameters
+    ----------
+    lights
+        Traffic lights of the map, for the rules on outages.
+    instead_of
+        Id of the measure that it replaces, if that has another one: it is renamed.
+
+    Raises
+    ------
+    ScenarioError
+        If the map has no such place or light, or the id is taken.
+    NotFoundError
+        If there is no measure ``instead_of``.
+    """
+    measures, _ = put_part(scenario.measures, measure, what=_MEASURE, instead_of=instead_of)
+    scenario = with_fields(scenario, measures=measures)
+    region = Region.of(graph, scenario.roi)
+    refuse_errors([*measure_problems(scenario, region, lights), *duplicate_ids(scenario)])
+    return scenario
+
+
+@edit("Remove {measure}")
+def remove_measure(scenario: Scenario, *, measure: str) -> Scenario:
+    """Remove a measure by its id.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none.
+    """
+    return with_fields(scenario, measures=drop_part(scenario.measures, _MEASURE, measure))

@@ -6,10 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from odscen.base.errors import InputError, NotFoundError
 from odscen.scenario.document.signals_document import JunctionTiming, ProgramStage
-from odscen.scenario.edits.edit_registry import edit
-from odscen.scenario.edits.edited_parts import changed_part, with_fields
-from odscen.scenario.edits.edited_timings import own_program, timing_of_light, with_timing
-from odscen.scenario.edits.program_changes import with_green, with_offset, with_stage
+from odscen.scenario.edits.edit_registry import changed_part, edit, with_fields
+from odscen.scenario.edits.program_changes import (
+    own_program,
+    timing_of_light,
+    with_green,
+    with_offset,
+    with_stage,
+    with_timing,
+)
 from odscen.scenario.edits.turn_treatment import with_turn
 
 if TYPE_CHECKING:

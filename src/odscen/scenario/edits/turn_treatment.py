@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from odscen.base.errors import InputError
 from odscen.scenario.document.signals_document import DayPlan, ProgramGroup, ProgramStage
-from odscen.scenario.edits.edited_parts import changed_part
+from odscen.scenario.edits.edit_registry import changed_part
 from odscen.scenario.edits.program_changes import fitted_cycles
-from odscen.scenario.signals.movement_names import shortest_names
+from odscen.scenario.signals.light import shortest_names
 from odscen.scenario.signals.program_design import DesignedProgram
 
 if TYPE_CHECKING:

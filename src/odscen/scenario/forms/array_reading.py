@@ -14,8 +14,8 @@ from odscen.base.given_arrays import arrays_from_npz
 from odscen.lanegraph.graph_npz import graph_from_arrays
 from odscen.scenario.document.drivers_document import DRIVING_STYLES
 from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.document.problems import validation_problems
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.scenario.document.validation import validation_problems
 from odscen.scenario.forms.array_form import (
     ACTOR_COLUMNS,
     CATEGORIES,

@@ -1,4 +1,4 @@
-"""A region of interest on its map graph: what is inside, and what the names in a document mean."""
+"""A region of interest on its map graph: what is inside, what names mean, what can be used."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.base.categories import Category
+from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.base.errors import NotFoundError
 from odscen.base.ids import NodeId, SegmentId
 from odscen.lanegraph.query import (
@@ -24,10 +24,37 @@ from odscen.lanegraph.query import (
 from odscen.lanegraph.shortest_paths import Router, WalkRouter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.base.arrays import BoolArray, Int32Array
+    from odscen.base.categories import Body
     from odscen.lanegraph.graphs import LaneGraph, MapGraph, PedestrianGraph
+
+
+@dataclass(frozen=True, slots=True)
+class Usable:
+    """What a simulator can use of a map; ``None`` stands for everything.
+
+    Attributes
+    ----------
+    spawnable
+        Shape ``(N,)``: lane-graph nodes on which a vehicle can be placed exactly.
+    drivable
+        Shape ``(N,)``: lane-graph nodes that a path can lead over.
+    walkable
+        Shape ``(P,)``: pedestrian nodes on which a walker can be placed, and arrive.
+    in_junction
+        Shape ``(N,)``: lane-graph nodes inside the simulator's junctions, on the way to a crosswalk
+        before them for example. ``None``: those of the map's junctions.
+    bodies
+        Size of each category.
+    """
+
+    spawnable: BoolArray | None = None
+    drivable: BoolArray | None = None
+    walkable: BoolArray | None = None
+    in_junction: BoolArray | None = None
+    bodies: Mapping[Category, Body] = field(default_factory=lambda: DEFAULT_BODY)
 
 
 class NodePlace(NamedTuple):

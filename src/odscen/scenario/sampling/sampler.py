@@ -3,6 +3,11 @@
 The same map graph, configuration and seed give the same document, byte for byte. Sampled vehicles
 start on road lanes, never on junction lanes, where the lane bends so little that a rigid body keeps
 to it, with a gap to every other body, and with a goal that can be reached.
+
+What a scenario leaves open (members of flows and demand, open goals, speed factors, parameters of
+driver sets) follows the seed anyway. Placed actors have all of it written down, so that seeds
+hardly vary where most of the traffic is placed; this draws it again, by distributions that keep
+what they have on average. Where they start is not drawn: places are checked for room.
 """
 
 from __future__ import annotations
@@ -10,14 +15,16 @@ from __future__ import annotations
 import math
 from collections import Counter
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
-from odscen.scenario.document.distributions import draw_key, draw_place
-from odscen.scenario.document.named_random import stream
+from odscen.lanegraph.graphs import LaneGraph
+from odscen.scenario.checks.actor_checks import SPEED_MAX, SPEED_MIN
+from odscen.scenario.document.distributions import Normal, Uniform, draw_key, draw_place, stream
+from odscen.scenario.document.problems import validated
 from odscen.scenario.document.scenario_document import (
     Actor,
     Environment,
@@ -25,28 +32,134 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Simulation,
 )
-from odscen.scenario.document.validation import validated
 from odscen.scenario.placing.bodies import Box, Crowd, box_at
-from odscen.scenario.placing.random_places import place_at_random
-from odscen.scenario.placing.region import NodePlace, Region, name_of
-from odscen.scenario.placing.spawn_room import Reach
-from odscen.scenario.placing.supply import vehicle_supply, walker_supply
-from odscen.scenario.placing.usable_nodes import Usable
-from odscen.scenario.sampling.sampled_behaviour import draw_behaviour
+from odscen.scenario.placing.region import NodePlace, Region, Usable, name_of
+from odscen.scenario.placing.sampled_places import place_at_random, vehicle_supply, walker_supply
+from odscen.scenario.placing.spawn_room import LANE_MARGIN, Reach
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from odscen.base.arrays import BoolArray
+    from odscen.base.categories import Body
     from odscen.base.ids import SegmentId
-    from odscen.lanegraph.graphs import MapGraph
+    from odscen.lanegraph.graphs import MapGraph, PedestrianGraph
     from odscen.scenario.document.sampling_config import (
+        Behaviour,
         EnvironmentShares,
         MapFilter,
         SamplingConfig,
     )
-    from odscen.scenario.placing.random_places import Spot
-    from odscen.scenario.placing.supply import Supply
+    from odscen.scenario.placing.sampled_places import Spot, Supply
+
+
+Redraw = Literal["open", "drivers", "traffic"]
+"""What a seed draws.
+
+``open``: what the scenario leaves open. ``drivers``: also departures, desired speeds and styles of
+placed actors. ``traffic``: also their goals.
+"""
+
+REDRAWS: tuple[Redraw, ...] = get_args(Redraw)
+
+DEPARTURE = Uniform(low=0.0, high=30.0)
+"""Seconds that a placed actor departs later than the scenario says, if that is not at 0."""
+
+SPEED = Normal(mean=1.0, std=0.08, low=0.8, high=1.2)
+"""Times the desired speed that the scenario gives a placed actor."""
+
+
+def redrawn(scenario: Scenario, what: Redraw) -> Scenario:
+    """Draw what is random about placed actors by the scenario's seed.
+
+    Departures by :data:`DEPARTURE`, desired speeds by :data:`SPEED` within what is plausible for
+    the category; styles change hands within a category, so that their shares stay; goals are left
+    open, so that they are drawn as open ones are. Whoever departs at 0 is on the road from the
+    start, where the scenario says. The ego is what the scenario is about and stays as it is. What
+    is drawn for one actor does not depend on the others, but for the styles.
+    """
+    if what == "open":
+        return scenario
+    styles = _dealt_styles(scenario)
+    actors = [
+        actor if actor.ego else _redrawn(actor, scenario.seed, styles[actor.id])
+        for actor in scenario.actors
+    ]
+    if what == "traffic":
+        actors = [one if one.ego else one.model_copy(update={"goal": None}) for one in actors]
+    return scenario.model_copy(update={"actors": tuple(actors)})
+
+
+def _redrawn(actor: Actor, seed: int, style: str) -> Actor:
+    fields: dict[str, object] = {"style": style}
+    if actor.depart > 0:
+        later = DEPARTURE.draw(stream(seed, "redrawn departure", actor.id))
+        fields["depart"] = round(actor.depart + later, 1)
+    if actor.speed is not None:
+        low, high = SPEED_MIN[actor.category], SPEED_MAX[actor.category]
+        # A speed that the scenario has beyond what is plausible is its own wish and stays one.
+        low, high = min(low, actor.speed), max(high, actor.speed)
+        factor = SPEED.draw(stream(seed, "redrawn speed", actor.id))
+        fields["speed"] = round(min(max(factor * actor.speed, low), high), 2)
+    return actor.model_copy(update=fields)
+
+
+def _dealt_styles(scenario: Scenario) -> dict[str, str]:
+    """Style of each actor: those of a category dealt out again."""
+    dealt: dict[str, str] = {}
+    for category in Category:
+        group = [one for one in scenario.actors if one.category is category and not one.ego]
+        styles = [one.style for one in group]
+        order = stream(scenario.seed, "redrawn styles", category).permutation(len(group))
+        dealt |= {one.id: styles[place] for one, place in zip(group, order.tolist(), strict=True)}
+    return dealt
+
+
+def draw_behaviour(
+    behaviour: Behaviour,
+    graph: LaneGraph | PedestrianGraph,
+    spot: Spot,
+    body: Body,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Draw the fields of an actor that say how it moves; speeds and offsets to the centimetre."""
+    room = (float(graph.width[spot.node]) - body.width) / 2 - LANE_MARGIN
+    fields: dict[str, Any] = {
+        "speed": _speed(behaviour, graph, spot, rng),
+        "lateral_offset": _within(behaviour.lateral_offset.draw(rng), max(room, 0.0)),
+        "depart": round(max(behaviour.depart.draw(rng), 0.0), 1),
+    }
+    if spot.category is Category.PEDESTRIAN:
+        fields["crosses_anywhere"] = bool(rng.random() < behaviour.crosses_anywhere)
+        fields["ignores_red"] = bool(rng.random() < behaviour.ignores_red)
+    else:
+        fields["style"] = draw_key(behaviour.styles, rng)
+    return fields
+
+
+def _speed(
+    behaviour: Behaviour,
+    graph: LaneGraph | PedestrianGraph,
+    spot: Spot,
+    rng: np.random.Generator,
+) -> float:
+    limit = behaviour.unlimited_speed
+    if isinstance(graph, LaneGraph) and 0 < graph.speed_limit[spot.node] < math.inf:
+        limit = float(graph.speed_limit[spot.node])
+    if spot.category is Category.PEDESTRIAN:
+        speed = behaviour.walking_speed.draw(rng)
+    elif spot.category is Category.BICYCLE:
+        speed = min(behaviour.bicycle_speed.draw(rng), limit)
+    else:
+        speed = behaviour.speed_factor.draw(rng) * limit
+    low, high = SPEED_MIN[spot.category], SPEED_MAX[spot.category]
+    return min(max(round(speed, 2), low), high)
+
+
+def _within(offset: float, room: float) -> float:
+    """``offset`` cut to ``room`` either side, towards zero to whole centimetres."""
+    return math.trunc(max(-room, min(room, offset)) * 100) / 100
+
 
 ATTEMPTS = 20
 """Regions that are tried before a map counts as having no place for an actor."""

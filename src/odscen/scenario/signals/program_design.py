@@ -1,22 +1,52 @@
-"""A program of the scenario on its light: groups with their movements, intergreens, plans."""
+"""A program of the scenario on its light: plans of the day, stages and their steps, detectors.
+
+All that begins in the next stage begins at once, as soon as the last intergreen is over. All that
+ends does so as late as its intergreens allow: crossings turn red while vehicles still go.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.scenario.signals.movement_names import find_movements
+from odscen.scenario.signals.light import find_movements
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.scenario.document.signals_document import (
         Control,
         DayPlan,
         JunctionTiming,
         ProgramGroup,
+        Signals,
     )
-    from odscen.scenario.signals.light import Light
+    from odscen.scenario.signals.light import Light, SignalMovement
+
+
+def detector_movements(at: str, movements: Sequence[SignalMovement]) -> tuple[int, ...]:
+    """Movements over the lanes of an approach (``r12``), or of one lane (``12.0.-1``)."""
+    return tuple(
+        n for n, one in enumerate(movements) if one.drive and at in (one.approach, one.lanes[0])
+    )
+
+
+def without_detectors(signals: Signals) -> Signals:
+    """All lights fixed-time and every stage in every cycle: the mesoscopic model sees nobody."""
+    junctions = [
+        timing.model_copy(
+            update={
+                "control": None,
+                "stages": tuple(
+                    stage.model_copy(update={"on_call": False}) for stage in timing.stages
+                ),
+            }
+        )
+        for timing in signals.junctions
+    ]
+    return signals.model_copy(update={"control": "fixed", "junctions": tuple(junctions)})
+
 
 ONLY_PLAN = "scenario"
 """Id of the plan of a program without plans of the day."""
@@ -190,3 +220,139 @@ def seconds_of_day(clock: str) -> float:
     """Seconds after midnight of ``06:30`` or ``06:30:15``."""
     hours, minutes, *seconds = map(float, clock.split(":"))
     return hours * 3600.0 + minutes * 60.0 + sum(seconds)
+
+
+DAY = 86_400.0
+
+
+def active_plans(
+    plans: Iterable[TimedPlan], *, clock: float, until: float | None
+) -> tuple[tuple[float, str], ...]:
+    """Plans of a run and the seconds after its start from which on they are to run.
+
+    The first begins at 0: what is active at ``clock``. Every day is alike.
+
+    Parameters
+    ----------
+    clock
+        Time of day at the start, seconds.
+    until
+        Seconds that the run lasts; a day if not given.
+    """
+    listed = list(plans)
+    begins = sorted((time, plan.id) for plan in listed for time in plan.times)
+    if not begins:
+        return ((0.0, listed[0].id),)
+    end = DAY if until is None else until
+    now = [name for time, name in begins if time <= clock] or [begins[-1][1]]
+    found = [(0.0, now[-1])]
+    days = range(int((clock + end) // DAY) + 1)
+    for day in days:
+        for time, name in begins:
+            after = day * DAY + time - clock
+            if 0.0 < after < end and name != found[-1][1]:
+                found.append((after, name))
+    return tuple(found)
+
+
+YELLOW, ALL_RED, CLEARANCE = "yellow", "all red", "pedestrian clearance"
+
+
+class ShownStep(NamedTuple):
+    """Seconds for which the letters of a state are shown."""
+
+    seconds: float
+    state: str
+    name: str
+
+
+def stage_state(program: DesignedProgram, stage: PlannedStage) -> str:
+    """Letters of a stage: ``G``; ``g`` where a movement gives way to another that has green.
+
+    Movements of one group that meet give way as the junction's right of way says.
+    """
+    green = {n for name in stage.groups for n in program.groups[name].movements}
+    letters = []
+    for n in range(len(program.light.movements)):
+        if n not in green:
+            letters.append("r")
+        else:
+            letters.append("g" if _gives_way(program, stage, n, green) else "G")
+    return "".join(letters)
+
+
+def _gives_way(
+    program: DesignedProgram, stage: PlannedStage, movement: int, green: set[int]
+) -> bool:
+    own = program.group_of[movement]
+    for meeting in program.light.meetings:
+        if meeting.yields == movement and {meeting.one, meeting.other} <= green:
+            other = meeting.other if meeting.one == movement else meeting.one
+            if own in stage.permissive or program.group_of[other] == own:
+                return True
+    return False
+
+
+def beginning_groups(stage: PlannedStage, following: PlannedStage) -> frozenset[str]:
+    """Groups that need a free path from the next stage on: they begin, or no longer give way."""
+    protected = (stage.permissive & following.groups) - following.permissive
+    return (following.groups - stage.groups) | protected
+
+
+def change_steps(
+    program: DesignedProgram, stage: PlannedStage, following: PlannedStage
+) -> tuple[ShownStep, ...]:
+    """Steps from the end of a stage's green to the begin of the next one's."""
+    ending = sorted(stage.groups - following.groups)
+    beginning = beginning_groups(stage, following)
+    needs = {name: _need(program, name, beginning) for name in ending}
+    length = max(needs.values(), default=0.0)
+    before, behind = stage_state(program, stage), stage_state(program, following)
+    starts = {name: length - needs[name] for name in ending}
+    cuts = {0.0, length, *starts.values()}
+    cuts |= {min(starts[name] + program.groups[name].yellow, length) for name in ending}
+    times = sorted(cuts)
+    steps = []
+    for begin, end in pairwise(times):
+        state = list(before)
+        for n, (one, other) in enumerate(zip(before, behind, strict=True)):
+            name = program.group_of.get(n)
+            if name in starts:
+                since = begin - starts[name]
+                group = program.groups[name]
+                state[n] = one if since < 0 else "y" if since < group.yellow else "r"
+            elif one == "G" and other == "g":
+                state[n] = "g"
+        text = "".join(state)
+        going = any(begin < start for start in starts.values())
+        name = YELLOW if "y" in text else CLEARANCE if going else ALL_RED
+        steps.append(ShownStep(end - begin, text, name))
+    return _merged(steps)
+
+
+def _need(program: DesignedProgram, ending: str, beginning: frozenset[str]) -> float:
+    """Seconds before the next stage at which a group has to end."""
+    group = program.groups[ending]
+    return max((program.intergreen(ending, one) for one in beginning), default=0.0) or group.yellow
+
+
+def _merged(steps: list[ShownStep]) -> tuple[ShownStep, ...]:
+    result: list[ShownStep] = []
+    for step in steps:
+        if result and result[-1].state == step.state:
+            longer = result[-1].seconds + step.seconds
+            result[-1] = result[-1]._replace(seconds=longer)
+        else:
+            result.append(step)
+    return tuple(result)
+
+
+def change_length(program: DesignedProgram, stage: PlannedStage, following: PlannedStage) -> float:
+    """Seconds from the end of a stage's green to the begin of the next one's."""
+    return sum(step.seconds for step in change_steps(program, stage, following))
+
+
+def cycle_length(program: DesignedProgram, stages: tuple[PlannedStage, ...]) -> float:
+    """Seconds of all greens and of what is between them."""
+    pairs = zip(stages, (*stages[1:], *stages[:1]), strict=True)
+    return sum(one.green + change_length(program, one, other) for one, other in pairs)

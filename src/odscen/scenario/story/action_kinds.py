@@ -1,75 +1,666 @@
 """The registry of actions: what each kind means, and what it makes of an actor's channel.
 
-To add one: its part in :mod:`odscen.scenario.document.actions_document`, its entry and function
+To add one: its part in :mod:`odscen.scenario.document.rules_document`, its entry and function
 here, and a test.
+
+What is not about an actor on the road is asked of the simulator, on whole steps.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.scenario.story.acting_actor import ActingActor, CannotAct
-from odscen.scenario.story.arrivals import arrive, end_of_arrival, synchronise
-from odscen.scenario.story.asked_actions import (
-    Wanted,
-    ask_to_appear,
-    ask_to_end,
-    ask_to_switch,
-    has_appeared,
-    said_of_end,
-    said_of_goal,
-    said_of_horn,
-    said_of_lights,
-    said_of_signal,
-    set_goal,
-    set_lights,
-    sound_horn,
-)
-from odscen.scenario.story.path_actions import (
-    end_of_path,
-    end_of_replay,
-    end_of_walk,
-    follow_path,
-    on_the_line,
-    on_the_path,
-    replay,
-    replay_further,
-    stay,
-    walk,
-)
-from odscen.scenario.story.side_actions import (
-    after_cut_in,
-    change_lane,
-    cut_in,
-    cut_in_further,
-    lane_lasts,
-    leave_aside,
-    leave_line,
-    move_aside,
-)
-from odscen.scenario.story.speed_laws import (
+from odscen.scenario.story.channels import ActingActor, CannotAct
+from odscen.scenario.story.motion_laws import (
+    SideLaw,
     SpeedLaw,
+    SpeedTable,
+    beside,
     braking,
+    line_length,
+    point_on,
     speed_change,
+    steady,
     stopping,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.scenario.document.actions_document import (
+    from odscen.scenario.document.rules_document import (
+        Appearing,
+        Arriving,
         Braking,
+        CuttingIn,
         GapKeeping,
         Going,
         Ignoring,
+        LaneChange,
+        LateralMove,
+        NewGoal,
+        PathFollowing,
         Releasing,
+        Replaying,
+        RulePlace,
+        SignalSwitch,
         SpeedChange,
         Stopping,
+        TrajectoryRow,
         Vanishing,
+        VehicleLights,
+        Walking,
     )
-    from odscen.scenario.story.road_view import RoadView
+    from odscen.scenario.story.channels import Channel
+    from odscen.scenario.story.motion_laws import AnyLaw
+    from odscen.scenario.story.road_view import ActorView, Point, RoadView
+
+
+_SHORT = 1e-9
+"""Seconds in which no one moves."""
+
+
+def walk(part: Walking, one: ActingActor) -> float:
+    """Begin to walk straight to a place."""
+    places = [one.view.place(place) for place in (*part.through, part.to)]
+    line = (one.spot(), *places)
+    if line_length(line) < 1e-6:
+        return one.instant
+    _along_line(line, part.speed, one)
+    return math.inf
+
+
+def _along_line(line: tuple[Point, ...], speed: float | None, one: ActingActor) -> None:
+    channel = one.channel
+    usual = speed or one.view.walking_speed(one.actor.id)
+    if speed is not None or channel.law is None or channel.held or channel.borrowed:
+        # ... unless a rule has said how fast it goes
+        channel.take_speed(steady(one.instant, usual), one.owner)
+    channel.take_line(line, 0.0, None, one.owner, one.instant)
+
+
+def on_the_line(_: object, one: ActingActor, __: float) -> float:
+    """When the end of the line is reached, if it is in this step."""
+    end = one.channel.reaches_end(one.instant, one.instant + one.step)
+    return math.inf if end is None else end
+
+
+def end_of_walk(part: Walking, one: ActingActor) -> None:
+    """Stay there; on a sidewalk, walk on with the next step."""
+    _leave_or_stay(part.to, one)
+
+
+def stay(one: ActingActor) -> None:
+    """Let a person stand where its line ends."""
+    channel = one.channel
+    channel.take_speed(steady(one.instant, 0.0), None)
+    channel.held = True
+
+
+def _leave_or_stay(place: RulePlace, one: ActingActor) -> None:
+    stay(one)
+    one.channel.leaves = isinstance(place, str) and place.startswith("ped.")
+
+
+def follow_path(part: PathFollowing, one: ActingActor) -> float:
+    """Begin to follow a drawn path; the front of a vehicle is on it, the centre of a person.
+
+    Raises
+    ------
+    CannotAct
+        If the actor stands, and no rule says how fast it goes; or who the points are relative to
+        is not on the road.
+    """
+    points = _points(part, one)
+    line = (_own_point(one), *points)
+    if line_length(line) < 1e-6:
+        return one.instant
+    channel = one.channel
+    if part.times or part.speeds:
+        legs = [math.dist(a, b) for a, b in itertools.pairwise(line)]
+        knots = _timed(legs, part.times) if part.times else _at_points(legs, part.speeds, one.speed)
+        table = SpeedTable(one.instant, knots)
+        channel.take_speed(table, one.owner)
+        channel.take_line(line, 0.0, None, one.owner, one.instant)
+        return table.end
+    if one.actor.person or part.speed is not None:
+        _along_line(line, part.speed, one)
+    elif one.speed > 0.0 or channel.law is not None:
+        channel.take_line(line, 0.0, None, one.owner, one.instant)
+    else:
+        raise CannotAct("it is stopped; the path has to say how fast it is followed")
+    return math.inf
+
+
+def _points(part: PathFollowing, one: ActingActor) -> list[Point]:
+    if part.relative_to is None:
+        return [one.view.place(place) for place in part.points]
+    base = one.view.actor(part.relative_to)
+    if base is None:
+        raise CannotAct(f"{part.relative_to!r} is not on the road")
+    # The actor itself is where it is at the instant of the begin, within the step.
+    x, y = one.spot() if part.relative_to == one.actor.id else (base.x, base.y)
+    c, s = math.cos(base.hdg), math.sin(base.hdg)
+    return [
+        (x + ahead * c - left * s, y + ahead * s + left * c)
+        for ahead, left in (one.view.place(place) for place in part.points)
+    ]
+
+
+def on_the_path(part: PathFollowing, one: ActingActor, end: float) -> float:
+    """When the end of the path is reached."""
+    return end if end < math.inf else on_the_line(part, one, end)
+
+
+def end_of_path(part: PathFollowing, one: ActingActor) -> None:
+    """Give a vehicle back to SUMO; a person stays unless it is on a sidewalk."""
+    if one.actor.person:
+        _leave_or_stay(part.points[-1], one)
+    else:
+        one.channel.release_speed(one.instant)
+        one.channel.leaves = True
+
+
+def replay(part: Replaying, one: ActingActor) -> float:
+    """Begin to be where a recorded road user was."""
+    end = one.instant + part.rows[-1][0]
+    _replay_until(part, one, one.instant)
+    return end
+
+
+def replay_further(part: Replaying, one: ActingActor, end: float) -> float:
+    """Hand over the rows of this step."""
+    _replay_until(part, one, end - part.rows[-1][0])
+    return end
+
+
+def end_of_replay(_: Replaying, one: ActingActor) -> None:
+    """Give a vehicle back to SUMO, with the last speed; a person stays."""
+    if one.actor.person:
+        stay(one)
+    else:
+        one.channel.release_speed(one.instant)
+        one.channel.leaves = True
+
+
+def _replay_until(part: Replaying, one: ActingActor, begin: float) -> None:
+    """Lead the actor through the rows of this step, in a run that began at ``begin``.
+
+    A step is handed over at a time, however long the recording is.
+    """
+    start = one.instant - begin
+    stop = min(one.view.time + one.step - begin, part.rows[-1][0])
+    times = _Times(part.rows)
+    inside = part.rows[bisect_right(times, start) : bisect_left(times, stop)]
+    rows = [_row_at(part.rows, times, start), *inside]
+    if stop - start > _SHORT:
+        rows.append(_row_at(part.rows, times, stop))
+    half = 0.0 if one.actor.person else one.actor.length / 2.0
+    line = tuple((x + half * math.cos(hdg), y + half * math.sin(hdg)) for _, x, y, hdg in rows)
+    knots: list[tuple[float, float]] = []
+    for (a, b), (p, q) in zip(itertools.pairwise(rows), itertools.pairwise(line), strict=True):
+        speed = math.dist(p, q) / (b[0] - a[0])
+        knots += [(a[0] - start, speed), (b[0] - start, speed)]
+    if not knots:
+        line, knots = (*line, *line), [(0.0, 0.0)]
+        rows = [*rows, *rows]
+    table = SpeedTable(one.instant, tuple(knots))
+    one.channel.take_speed(table, one.owner)
+    one.channel.take_line(
+        line, 0.0, None, one.owner, one.instant, headings=tuple(row[3] for row in rows)
+    )
+
+
+class _Times:
+    """Times of rows as a sequence, for bisection, without a copy of them."""
+
+    def __init__(self, rows: tuple[TrajectoryRow, ...]) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, index: int) -> float:
+        return self._rows[index][0]
+
+
+def _row_at(rows: tuple[TrajectoryRow, ...], times: _Times, time: float) -> TrajectoryRow:
+    after = min(max(bisect_right(times, time), 1), len(rows) - 1)
+    (t0, x0, y0, h0), (t1, x1, y1, h1) = rows[after - 1], rows[after]
+    share = min(1.0, max(0.0, (time - t0) / (t1 - t0)))
+    turn = math.remainder(h1 - h0, math.tau)
+    return time, x0 + (x1 - x0) * share, y0 + (y1 - y0) * share, h0 + turn * share
+
+
+def _own_point(one: ActingActor) -> Point:
+    x, y = one.spot()
+    half = 0.0 if one.actor.person else one.actor.length / 2.0
+    return x + half * math.cos(one.actor.hdg), y + half * math.sin(one.actor.hdg)
+
+
+def _timed(legs: list[float], times: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+    knots: list[tuple[float, float]] = []
+    for length, (begin, end) in zip(legs, itertools.pairwise((0.0, *times)), strict=True):
+        speed = length / (end - begin)
+        knots += [(begin, speed), (end, speed)]
+    return tuple(knots)
+
+
+def _at_points(
+    legs: list[float], speeds: tuple[float, ...], speed: float
+) -> tuple[tuple[float, float], ...]:
+    """Speeds that change evenly over time between points."""
+    knots, t, before = [(0.0, speed)], 0.0, speed
+    for length, after in zip(legs, speeds, strict=True):
+        if length > 0.0:
+            if before + after <= 0.0:
+                raise CannotAct("it is stopped, and is to stop at the first point")
+            t += 2.0 * length / (before + after)
+        knots.append((t, after))
+        before = after
+    return tuple(knots)
+
+
+class WantedActor(NamedTuple):
+    """An actor that is to appear: centre and heading of its body, m/s; ``None`` is as planned."""
+
+    actor: str
+    at: tuple[float, float, float] | None
+    speed: float | None
+
+
+class WantedSignal(NamedTuple):
+    """A traffic light that is to be switched, see :class:`SignalSwitch`."""
+
+    light: str
+    shows: str
+    movement: str | None
+
+
+class WantedEnd(NamedTuple):
+    """The run is to end."""
+
+
+Wanted = WantedActor | WantedSignal | WantedEnd
+
+
+def ask_to_appear(part: Appearing, actor: str, view: RoadView) -> Wanted:
+    """Ask for an actor.
+
+    Raises
+    ------
+    CannotAct
+        If it is on the road.
+    """
+    if view.actor(actor) is not None:
+        raise CannotAct(f"{actor!r} is on the road already")
+    return WantedActor(actor, part.at, part.speed)
+
+
+def ask_to_switch(part: SignalSwitch, _: str, __: RoadView) -> Wanted:
+    """Ask for a traffic light."""
+    return WantedSignal(part.light, part.shows, part.movement)
+
+
+def ask_to_end(_: object, __: str, ___: RoadView) -> Wanted:
+    """Ask for the end of the run."""
+    return WantedEnd()
+
+
+def said_of_end(_: object) -> str:
+    """What is reported."""
+    return "ends the run"
+
+
+def said_of_signal(part: SignalSwitch) -> str:
+    """What a light then shows."""
+    return f"light {part.light}: {part.movement or ''} {part.shows}".replace("  ", " ")
+
+
+def has_appeared(_: Appearing, one: ActingActor, __: float) -> float:
+    """Instant at which it is seen on the road."""
+    return one.view.time
+
+
+def set_goal(part: NewGoal, one: ActingActor) -> float:
+    """Take another goal."""
+    one.channel.goal = part.to
+    return one.instant
+
+
+def said_of_goal(part: NewGoal) -> str:
+    """Where it goes to."""
+    return f"goal {part.to}"
+
+
+def set_lights(part: VehicleLights, one: ActingActor) -> float:
+    """Switch lights of a vehicle."""
+    one.channel.lights = _lights(part) if part.model_fields_set else None
+    return one.instant
+
+
+def said_of_lights(part: VehicleLights) -> str:
+    """Lights that are on."""
+    if not part.model_fields_set:
+        return "lights: the driver's"
+    return f"lights: {', '.join(_lights(part)) or 'off'}"
+
+
+def _lights(part: VehicleLights) -> tuple[str, ...]:
+    shown = () if part.indicator in (None, "off") else (str(part.indicator),)
+    names = ("brake", "front", "high_beam", "fog", "emergency")
+    return shown + tuple(name for name in names if getattr(part, name))
+
+
+def sound_horn(_: object, one: ActingActor) -> float:
+    """Sound the horn: nothing moves."""
+    return one.instant
+
+
+def said_of_horn(_: object) -> str:
+    """What is heard."""
+    return "horn"
+
+
+FASTEST = 70.0
+"""m/s; a cut-in that needs more is not possible."""
+_ON_LANE = 2.0
+"""Metres from the centre of a lane at which the front of a vehicle is still on it."""
+
+
+def change_lane(part: LaneChange, one: ActingActor) -> float:
+    """Begin a lane change.
+
+    Raises
+    ------
+    CannotAct
+        If there is no such lane.
+    """
+    if part.to is not None:
+        line = one.view.lane_line_to(one.actor.id, part.to)
+        missing = "none of the lanes beside it leads to the place"
+    else:
+        by = part.by or 0
+        line = _back_in_lane(by, one) or one.view.lane_line(one.actor.id, by)
+        missing = f"there is no lane {abs(by)} to the {'left' if by > 0 else 'right'} for it"
+    if line is None or not _leads_on(line, _front(one), one.actor.hdg):
+        raise CannotAct(missing)
+    _beside_lane(line, 0.0, part.over, one)
+    return one.instant + part.over
+
+
+def _back_in_lane(by: int, one: ActingActor) -> tuple[Point, ...] | None:
+    """The lane beside which a vehicle is led, if that is the next one that way.
+
+    Beside all lanes and in an opposite lane, SUMO does not know which lane it came from.
+    """
+    line, side = one.channel.line, one.channel.side
+    if line is None or side is None or by != -math.copysign(1, side.e1) or abs(side.e1) < _ON_LANE:
+        return None
+    under = one.view.lane_line(one.actor.id, 0)
+    own_way = under is not None and _leads_on(under, _front(one), one.actor.hdg)
+    return None if own_way else line
+
+
+def _leads_on(line: tuple[Point, ...], point: Point, hdg: float) -> bool:
+    """Whether a line leads by a point in about a direction."""
+    return math.cos(point_on(line, beside(line, point).along).hdg - hdg) > 0.0
+
+
+def move_aside(part: LateralMove, one: ActingActor) -> float:
+    """Begin to move to an offset.
+
+    Raises
+    ------
+    CannotAct
+        If the actor is on no lane.
+    """
+    # Far beside its lane SUMO has it on another one, or none: what follows is about the lane that
+    # it was led along until now.
+    led = one.channel.line if one.channel.side is not None else None
+    line = led or one.view.lane_line(one.actor.id, 0)
+    if line is None:
+        raise CannotAct("it is on no lane")
+    _beside_lane(line, part.to, part.over, one)
+    return one.instant + part.over
+
+
+def cut_in(part: CuttingIn, one: ActingActor) -> float:
+    """Begin to change into the lane of another.
+
+    Raises
+    ------
+    CannotAct
+        If that is not on a lane of the road, or the gap cannot be reached in time.
+    """
+    other = _other(part, one)
+    line = one.view.lane_line(part.to, 0)
+    if line is None:
+        raise CannotAct(f"{part.to!r} is on no lane")
+    _beside_lane(line, 0.0, part.over, one)
+    end = one.instant + part.over
+    _reach_gap(part, one, other, end)
+    return end
+
+
+def cut_in_further(part: CuttingIn, one: ActingActor, end: float) -> float:
+    """Choose the speed of this step by the gap that is left, until it is half over.
+
+    Then the actor is in the other lane, and the other one may brake for it.
+
+    Raises
+    ------
+    CannotAct
+        If the lane ends, or the gap cannot be reached in time.
+    """
+    lane_lasts(part, one, end)
+    if end - one.instant > part.over / 2.0:
+        _reach_gap(part, one, _other(part, one), end)
+    return end
+
+
+def after_cut_in(part: CuttingIn, one: ActingActor) -> None:
+    """Let SUMO drive on."""
+    if part.gap is not None:
+        one.channel.release_speed(one.instant)
+    leave_line(part, one)
+
+
+def lane_lasts(_: object, one: ActingActor, end: float) -> float:
+    """Look whether the lane goes on.
+
+    Raises
+    ------
+    CannotAct
+        If it ends in this step.
+    """
+    channel = one.channel
+    metres = channel.metres(one.instant, one.instant + one.step)
+    if channel.along + metres > line_length(channel.line or ()):
+        raise CannotAct("the lane ends before it is there")
+    return end
+
+
+def leave_aside(part: LateralMove, one: ActingActor) -> None:
+    """Leave the line with this step if it ends on a lane that leads the same way.
+
+    Elsewhere the line is followed on: beside all lanes, or in an opposite lane, where SUMO would
+    turn the vehicle round.
+    """
+    line = one.channel.line
+    if line is None or abs(part.to) < _ON_LANE:
+        one.channel.leaves = True
+        return
+    x, y, hdg = point_on(line, one.channel.along, left=part.to)
+    for by in (0, 1 if part.to > 0 else -1):
+        lane = one.view.lane_line(one.actor.id, by)
+        if lane is None or abs(beside(lane, (x, y)).left) >= _ON_LANE:
+            continue
+        if _leads_on(lane, (x, y), hdg):
+            one.channel.leaves = True
+
+
+def leave_line(_: object, one: ActingActor) -> None:
+    """Leave the line with this step."""
+    one.channel.leaves = True
+
+
+def _other(part: CuttingIn, one: ActingActor) -> ActorView:
+    other = one.view.actor(part.to)
+    if other is None or other.person:
+        raise CannotAct(f"{part.to!r} does not drive on the road")
+    return other
+
+
+def _beside_lane(line: tuple[Point, ...], left: float, over: float, one: ActingActor) -> None:
+    """Move the front to ``left`` metres of a line."""
+    place = beside(line, _front(one))
+    side = SideLaw(one.instant, place.left, left, over)
+    one.channel.take_line(line, place.along, side, one.owner, one.instant)
+    one.channel.keeps_lane = True
+
+
+def _front(one: ActingActor) -> Point:
+    actor = one.actor
+    ahead = actor.length / 2.0 + one.channel.metres(one.view.time, one.instant)
+    return actor.x + ahead * math.cos(actor.hdg), actor.y + ahead * math.sin(actor.hdg)
+
+
+def _reach_gap(part: CuttingIn, one: ActingActor, other: ActorView, end: float) -> None:
+    """Take the speed that ends with the gap, if the other one keeps its own.
+
+    g + (v + v1)/2 T - u T = gap,   g the gap now, v and u the speeds, T the seconds left
+    """
+    if part.gap is None:
+        return
+    line = one.channel.line or ()
+    half, left = other.length / 2.0, end - one.instant
+    front = other.x + half * math.cos(other.hdg), other.y + half * math.sin(other.hdg)
+    theirs = beside(line, front).along + other.speed * (one.instant - one.view.time)
+    mine = beside(line, _front(one)).along
+    gap = mine - one.actor.length - theirs
+    v, u = one.speed, other.speed
+    v1 = 2.0 * ((part.gap - gap) / left + u) - v
+    if not 0.0 <= v1 <= FASTEST:
+        raise CannotAct(f"it would have to reach {v1:.1f} m/s for a gap of {part.gap:g} m in time")
+    one.channel.take_speed(SpeedLaw(one.instant, v, v1, left), one.owner)
+
+
+FASTEST_VEHICLE, FASTEST_WALKER = 70.0, 10.0
+"""m/s; who would have to be faster cannot arrive in time."""
+_STEADY = 0.05
+"""m/s^2 of acceleration below which a speed counts as steady."""
+_BY = 1.5
+"""Metres between a line and a place that it leads by."""
+_SAME = 1e-6
+
+
+def arrive(part: Arriving, one: ActingActor) -> float:
+    """Begin: a pedestrian goes straight to the place, unless it is on a line that leads there."""
+    if one.actor.person and _on_line(one.actor, part.at, one.view, one.channel) is None:
+        line = (one.spot(), one.view.place(part.at))
+        one.channel.take_speed(steady(one.instant, 0.0), one.owner)
+        one.channel.take_line(line, 0.0, None, one.owner, one.instant)
+    return math.inf
+
+
+def end_of_arrival(part: Arriving, one: ActingActor) -> None:
+    """Keep the speed; a pedestrian stays where its line ends if that is the place."""
+    line = one.channel.line
+    at = one.view.place(part.at)
+    if one.actor.person and line is not None and math.dist(line[-1], at) < _SAME:
+        stay(one)
+    else:
+        one.channel.keep_speed()
+
+
+def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
+    """Choose the speed that brings both there at one instant; for good once the other is steady.
+
+    Raises
+    ------
+    CannotAct
+        If one of them does not come by its place, or would have to be too fast.
+    """
+    if end < math.inf:
+        return end
+    view, channel = one.view, one.channel
+    other = view.actor(part.to)
+    if other is None:
+        raise CannotAct(f"{part.to!r} is not on the road")
+    theirs = _rest(other, part.when_at, view, one.channels.get(part.to))
+    if theirs is None:
+        raise CannotAct(f"{part.to!r} does not come by the place where it is to be met")
+    done = one.instant - view.time
+    mine = _own_rest(part, one)
+    if other.speed < 0.1:
+        channel.take_speed(steady(one.instant, 0.0), one.owner)
+        return math.inf
+    left = theirs / other.speed - done
+    law = arrival_law(part, one.instant, mine, left)
+    needed = law.speed(one.instant) if left > 0.0 else math.inf
+    fastest = FASTEST_WALKER if one.actor.person else FASTEST_VEHICLE
+    if needed > fastest:
+        raise CannotAct(f"it would have to go at {needed:.1f} m/s to be there in time")
+    channel.take_speed(law, one.owner)
+    settled = abs(other.acceleration) < _STEADY or left <= one.step
+    return one.instant + left if settled else math.inf
+
+
+def arrival_law(part: Arriving, instant: float, rest: float, left: float) -> AnyLaw:
+    """Speed that covers ``rest`` metres in ``left`` seconds, even or to the speed on arrival.
+
+        D = rest - steady, T = left - steady/u, u the speed on arrival: v = 2 D/T - u
+
+    From v it changes evenly to u, within T. Where v would be negative the actor first stands; where
+    there is no time left for a change its speed is even.
+    """
+    last = part.speed
+    even = steady(instant, rest / left if left > 0.0 else math.inf)
+    if last is None:
+        return even
+    metres, seconds = rest - part.steady, left - (part.steady / last if last else 0.0)
+    if metres <= 0.0 or seconds <= _SAME:
+        return even
+    first = 2.0 * metres / seconds - last
+    if first >= 0.0:
+        return SpeedTable(instant, ((0.0, first), (seconds, last)))
+    waits = seconds - 2.0 * metres / last
+    return SpeedTable(instant, ((0.0, 0.0), (waits, 0.0), (seconds, last)))
+
+
+def _own_rest(part: Arriving, one: ActingActor) -> float:
+    """Metres from where the actor is at the instant to where it is to be."""
+    rest = _rest(one.actor, part.at, one.view, one.channel)
+    if rest is None:
+        raise CannotAct("its route does not lead to the place")
+    return rest - one.channel.metres(one.view.time, one.instant)
+
+
+def _rest(
+    actor: ActorView, place: RulePlace, view: RoadView, channel: Channel | None
+) -> float | None:
+    on_line = None if channel is None else _on_line(actor, place, view, channel)
+    if on_line is not None:
+        return on_line
+    if actor.person:
+        return math.dist((actor.x, actor.y), view.place(place))
+    return view.lane_distance(actor.id, place)
+
+
+def _on_line(actor: ActorView, place: RulePlace, view: RoadView, channel: Channel) -> float | None:
+    """Metres from the centre to a place that the actor's line leads by; ``None`` without one."""
+    if channel.line is None or channel.held:  # what is held stands, whatever line that is on
+        return None
+    there = beside(channel.line, view.place(place))
+    centre = channel.along - (0.0 if actor.person else actor.length / 2.0)
+    rest = there.along - centre
+    near = abs(there.left) < _BY and there.along < line_length(channel.line) + _BY
+    return rest if near and rest > -_BY else None
+
 
 _HELD = 1e-3
 """Metres of a line on which a person stands."""
@@ -93,7 +684,7 @@ class ActionKind:
         What it is there.
     begin
         Gets the part of the document and an
-        :class:`~odscen.scenario.story.acting_actor.ActingActor`, takes over what the action needs,
+        :class:`~odscen.scenario.story.channels.ActingActor`, takes over what the action needs,
         and gives the instant at which it is over, infinity if that is not known yet.
     update
         Is asked at the beginning of each further step, and gets and gives that instant.

@@ -1,4 +1,4 @@
-"""What rules have taken over of an actor: its speed, where it is beside its line, or both.
+"""What rules have taken over of an actor, and who acts when an action begins.
 
 What is not taken over is SUMO's. In a step several laws may follow one another; the metres of the
 step are the sum of theirs, so that motion begins and ends at the instant and not with the step.
@@ -8,16 +8,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.scenario.story.side_motion import SideLaw, heading_on, line_length, point_on
-from odscen.scenario.story.speed_laws import law_from_state, steady
+from odscen.scenario.story.motion_laws import (
+    SideLaw,
+    heading_on,
+    law_from_state,
+    line_length,
+    point_on,
+    steady,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.scenario.story.road_view import ActorView, Point
-    from odscen.scenario.story.speed_laws import AnyLaw
+    from odscen.scenario.story.motion_laws import AnyLaw
+    from odscen.scenario.story.road_view import ActorView, Point, RoadView
+
 
 _HALVINGS = 60
 
@@ -266,3 +274,36 @@ class Channel:
         for name in ("headings", "lights"):
             data[name] = None if data[name] is None else tuple(data[name])
         return cls(**data)
+
+
+class CannotAct(Exception):  # noqa: N818 - a reason, caught by the story
+    """Why an actor cannot do what a rule says."""
+
+
+class ActingActor(NamedTuple):
+    """Who acts, from when on, and what is seen.
+
+    ``instant`` lies in the step that begins at ``view.time`` and lasts ``step`` seconds; ``owner``
+    is rule and number of the action. ``channels`` are what rules have taken over of all actors.
+    """
+
+    view: RoadView
+    actor: ActorView
+    channel: Channel
+    instant: float
+    step: float
+    owner: str
+    channels: Mapping[str, Channel] = MappingProxyType({})
+
+    @property
+    def speed(self) -> float:
+        """Speed of the actor at the instant."""
+        return self.channel.speed(self.instant)
+
+    def spot(self) -> Point:
+        """Where the actor's centre is at the instant, if it goes straight on."""
+        ahead = self.channel.metres(self.view.time, self.instant)
+        if self.channel.held:
+            ahead = 0.0
+        one = self.actor
+        return one.x + ahead * math.cos(one.hdg), one.y + ahead * math.sin(one.hdg)

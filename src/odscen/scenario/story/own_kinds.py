@@ -16,15 +16,14 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from odscen.base.errors import InputError, OdscenError
-from odscen.scenario.story.acting_actor import CannotAct
 from odscen.scenario.story.action_kinds import ACTIONS, ActionKind
+from odscen.scenario.story.channels import CannotAct
 from odscen.scenario.story.condition_kinds import CONDITIONS, ConditionKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.scenario.document.actions_document import Action
-    from odscen.scenario.document.conditions_document import Condition
+    from odscen.scenario.document.rules_document import Action, Condition
 
 _Kind = TypeVar("_Kind", ConditionKind, ActionKind)
 CONDITION_GROUP, ACTION_GROUP = "odscen.conditions", "odscen.actions"

@@ -17,14 +17,14 @@ from odscen.scenario.story.condition_tree import CLOSE
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
 
-    from odscen.scenario.document.conditions_document import (
+    from odscen.scenario.document.rules_document import (
         AfterTime,
         Condition,
         DistanceBounded,
         OwnBounded,
         Reaching,
+        StoryRule,
     )
-    from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.story.road_view import ActorView, Point, RoadView
 
 BEFORE = 3

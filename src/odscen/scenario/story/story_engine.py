@@ -8,24 +8,53 @@ ends, the next begins, another rule has waited for that.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.scenario.story.acting_actor import ActingActor, CannotAct
-from odscen.scenario.story.channels import Channel, WantedMove
+from odscen.scenario.story.channels import ActingActor, CannotAct, Channel, WantedMove
 from odscen.scenario.story.condition_tree import NEVER_IN_STEP, ConditionTree
 from odscen.scenario.story.own_kinds import action_kind
 from odscen.scenario.story.quiet_spells import QuietSpells
-from odscen.scenario.story.rule_states import RuleState, Running
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from odscen.scenario.document.actions_document import Action
-    from odscen.scenario.document.rules_document import StoryRule
-    from odscen.scenario.story.action_kinds import ActionKind
-    from odscen.scenario.story.asked_actions import Wanted
+    from odscen.scenario.document.rules_document import Action, StoryRule
+    from odscen.scenario.story.action_kinds import ActionKind, Wanted
     from odscen.scenario.story.road_view import RoadView
+
+
+@dataclass
+class Running:
+    """An action that runs: its place in the item of ``then``, and when it is over."""
+
+    number: int
+    end: float
+
+    def state(self) -> dict[str, Any]:
+        """Values that JSON can hold."""
+        return {"number": self.number, "end": None if self.end == math.inf else self.end}
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Running:
+        """Inverse of :meth:`state`."""
+        return cls(state["number"], math.inf if state["end"] is None else state["end"])
+
+
+@dataclass
+class RuleState:
+    """A rule: how often it has fired, what it does, and when it may fire again.
+
+    ``started`` and ``ended`` have the first instant of each, if there was one.
+    """
+
+    fired: int = 0
+    ready: float = 0.0
+    item: int | None = None
+    running: list[Running] = field(default_factory=list)
+    started: list[float] = field(default_factory=list)
+    ended: list[float] = field(default_factory=list)
+
 
 STARTED, ENDED, FAILED, OVERRIDDEN = "started", "ended", "failed", "overridden"
 ACTED = "acted"

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.scenario.templates.lane_stretches import LaneStretch, first_fit
-from odscen.scenario.templates.no_place import Unfit
-from odscen.scenario.templates.scene_actors import (
+from odscen.scenario.templates.scene_sites import LaneStretch, Unfit, first_fit
+from odscen.scenario.templates.scene_template import (
     LEFT,
     RIGHT,
+    SceneTemplate,
+    TemplateParameter,
+    TemplateScene,
     apart,
     at_once,
     beside,
@@ -24,7 +26,6 @@ from odscen.scenario.templates.scene_actors import (
     rule,
     vehicle,
 )
-from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

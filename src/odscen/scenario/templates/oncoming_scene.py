@@ -10,9 +10,11 @@ from scipy.spatial import cKDTree
 
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.scenario.templates.lane_stretches import LaneStretch, first_fit
-from odscen.scenario.templates.no_place import Unfit
-from odscen.scenario.templates.scene_actors import (
+from odscen.scenario.templates.scene_sites import LaneStretch, Unfit, first_fit
+from odscen.scenario.templates.scene_template import (
+    SceneTemplate,
+    TemplateParameter,
+    TemplateScene,
     apart,
     at_once,
     body_length,
@@ -23,7 +25,6 @@ from odscen.scenario.templates.scene_actors import (
     rule,
     vehicle,
 )
-from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

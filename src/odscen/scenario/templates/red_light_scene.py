@@ -11,9 +11,11 @@ import numpy as np
 from shapely import LineString
 
 from odscen.lanegraph.query import node_id
-from odscen.scenario.templates.lane_stretches import LaneStretch, first_fit
-from odscen.scenario.templates.no_place import Unfit
-from odscen.scenario.templates.scene_actors import (
+from odscen.scenario.templates.scene_sites import LaneStretch, Unfit, first_fit
+from odscen.scenario.templates.scene_template import (
+    SceneTemplate,
+    TemplateParameter,
+    TemplateScene,
     at_once,
     kmh,
     metres_at,
@@ -21,7 +23,6 @@ from odscen.scenario.templates.scene_actors import (
     rule,
     vehicle,
 )
-from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

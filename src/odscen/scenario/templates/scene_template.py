@@ -1,4 +1,4 @@
-"""What a template is: its parameters, where they come from, and what it makes of a map."""
+"""What a template is, and the actors and rules that it makes of a map."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from odscen.base.categories import Category
 from odscen.base.errors import InputError
+from odscen.lanegraph.query import node_id
+from odscen.scenario.templates.scene_sites import LaneStretch, Unfit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from odscen.scenario.placing.region import Region
-    from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.placing.region import Region, Usable
     from odscen.scenario.signals.light import Light
-    from odscen.scenario.templates.lane_stretches import LaneStretches
-    from odscen.scenario.templates.walk_sides import WalkSides
+    from odscen.scenario.templates.scene_sites import LaneStretches, RoadCrossing, WalkSides
 
 
 class TemplateParameter(NamedTuple):
@@ -74,7 +77,7 @@ class SceneTemplate:
     parameters
         Its numbers.
     place
-        Places it, or raises :class:`~odscen.scenario.templates.no_place.NoPlaceError`.
+        Places it, or raises :class:`~odscen.scenario.templates.scene_sites.NoPlaceError`.
     """
 
     name: str
@@ -106,3 +109,145 @@ class SceneTemplate:
                 )
         usual = {one.name: one.default for one in self.parameters if one.default is not None}
         return usual | dict(given)
+
+
+STEADY = "steady"
+"""Id of the driver set of scenes: constant speed, no change of lane of one's own accord."""
+STEADY_DRIVER = {
+    "id": STEADY,
+    "parameters": {
+        "sigma": 0.0,
+        "lcSpeedGain": 0.0,
+        "lcKeepRight": 0.0,
+        "lcCooperative": 0.0,
+        "lcOvertakeRight": 1.0,
+    },
+}
+LEFT, RIGHT = 1, -1
+CHILD = 5.0 / 3.6
+"""Walking speed of the pedestrians of Euro NCAP's crossing tests, m/s (5 km/h)."""
+
+
+def kmh(speed: float) -> str:
+    """A speed (m/s) in words."""
+    return f"{speed * 3.6:.0f} km/h"
+
+
+def body_length(site: TemplateSite, category: Category) -> float:
+    """Metres of a vehicle of the category."""
+    return site.usable.bodies[category].length
+
+
+def near_side(site: TemplateSite, stretch: LaneStretch) -> int:
+    """Side of the road on which the lane lies: right where traffic keeps right."""
+    lanes = site.region.graph.lanes
+    row = int(lanes.lane[stretch.nodes[0]])
+    keeps_right = bool(lanes.lanes.forward[row]) == (lanes.lanes.keys[row].lane < 0)
+    return RIGHT if keeps_right else LEFT
+
+
+def node_near(site: TemplateSite, stretch: LaneStretch, along: float) -> int:
+    """Node of a stretch about so many metres on, on which a vehicle can be placed.
+
+    Raises
+    ------
+    Unfit
+        If there is none within a node's spacing.
+    """
+    spacing = site.region.graph.lanes.spacing
+    order = np.argsort(np.abs(stretch.along - along), kind="stable")
+    for place in order[:3].tolist():
+        if abs(stretch.along[place] - along) > 1.5 * spacing:
+            break
+        if site.stretches.spawnable[stretch.nodes[place]]:
+            return int(stretch.nodes[place])
+    raise Unfit("have no node for a vehicle where it is to start")
+
+
+def metres_at(stretch: LaneStretch, node: int) -> float:
+    """Metres of a node along its stretch."""
+    return float(stretch.along[np.flatnonzero(stretch.nodes == node)[0]])
+
+
+def beside(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretch:
+    """The nodes of the next lane of the same direction, abreast of those of a stretch.
+
+    Raises
+    ------
+    Unfit
+        If there is none all along, or it is not for all vehicles.
+    """
+    lanes = site.region.graph.lanes
+    rows = (lanes.left_lane if side == LEFT else lanes.right_lane)[stretch.nodes]
+    name = "left" if side == LEFT else "right"
+    if (rows < 0).any():
+        raise Unfit(f"have no lane to the {name} all along")
+    first = lanes.lanes.first_node
+    found = np.empty(len(rows), dtype=np.int64)
+    for row in np.unique(rows).tolist():
+        mine = np.flatnonzero(rows == row)
+        its = np.arange(first[row], first[row + 1])
+        away = np.abs(lanes.s[stretch.nodes[mine]][:, None] - lanes.s[its][None, :])
+        found[mine] = its[np.argmin(away, axis=1)]
+    if not site.stretches.plain[found].all():
+        raise Unfit(f"have a lane to the {name} that is not for all vehicles")
+    return LaneStretch(found, stretch.along, stretch.bend)
+
+
+def apart(site: TemplateSite, one: int, other: int) -> float:
+    """Metres between the centre lines of two lanes at two nodes abreast."""
+    lanes = site.region.graph.lanes
+    dx, dy = lanes.x[other] - lanes.x[one], lanes.y[other] - lanes.y[one]
+    hdg = lanes.hdg[one]
+    return float(abs(dy * np.cos(hdg) - dx * np.sin(hdg)))
+
+
+def vehicle(
+    site: TemplateSite,
+    name: str,
+    spawn: int,
+    by: int,
+    *,
+    speed: float,
+    category: Category = Category.CAR,
+    moving: bool = True,
+    **fields: Any,
+) -> dict[str, Any]:
+    """Make a vehicle that drives from ``spawn`` by the node ``by`` at a constant speed (m/s)."""
+    graph = site.region.graph
+    start = {"initial_speed": round(speed, 4)} if moving else {}
+    return {
+        "id": name,
+        "category": str(category),
+        "spawn": node_id(graph, spawn),
+        "goal": node_id(graph, site.stretches.goal(spawn, by)),
+        "speed": round(speed, 4),
+        "style": STEADY,
+        **start,
+        **fields,
+    }
+
+
+def pedestrian(name: str, crossing: RoadCrossing) -> dict[str, Any]:
+    """Make a pedestrian who stands at the beginning of a crossing line."""
+    return {
+        "id": name,
+        "category": str(Category.PEDESTRIAN),
+        "spawn": crossing.start,
+        "goal": crossing.goal,
+    }
+
+
+def rule(name: str, actor: str, when: dict[str, Any], *then: dict[str, Any]) -> dict[str, Any]:
+    """Make a rule."""
+    return {"id": name, "actor": actor, "when": when, "then": list(then)}
+
+
+def at_once(name: str, actor: str, *then: dict[str, Any]) -> dict[str, Any]:
+    """Make a rule that fires at the start."""
+    return rule(name, actor, {"time": {"after": 0}}, *then)
+
+
+def driven(name: str, actor: str, speed: float) -> dict[str, Any]:
+    """Make a rule that keeps an actor at a speed (m/s) from the start."""
+    return at_once(name, actor, {"speed": {"to": round(speed, 4), "shape": "step"}})

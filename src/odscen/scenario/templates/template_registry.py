@@ -11,12 +11,10 @@ from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.edits.settings_edits import new_scenario
 from odscen.scenario.placing.region import Region
 from odscen.scenario.templates.car_scenes import BUS_LEAVES, CUT_IN, LEAD_BRAKES
-from odscen.scenario.templates.lane_stretches import LaneStretches
 from odscen.scenario.templates.oncoming_scene import ONCOMING
 from odscen.scenario.templates.red_light_scene import RED_LIGHT
-from odscen.scenario.templates.scene_actors import STEADY_DRIVER
-from odscen.scenario.templates.scene_template import TemplateSite
-from odscen.scenario.templates.walk_sides import WalkSides
+from odscen.scenario.templates.scene_sites import LaneStretches, WalkSides
+from odscen.scenario.templates.scene_template import STEADY_DRIVER, TemplateSite
 from odscen.scenario.templates.walker_scenes import HIDDEN_CHILD, MID_BLOCK
 
 if TYPE_CHECKING:
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
 
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.placing.region import Usable
     from odscen.scenario.signals.light import Light
     from odscen.scenario.templates.scene_template import SceneTemplate
 

@@ -8,10 +8,12 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.categories import Category
-from odscen.scenario.templates.lane_stretches import first_fit
-from odscen.scenario.templates.no_place import NoPlaceError, Unfit
-from odscen.scenario.templates.scene_actors import (
+from odscen.scenario.templates.scene_sites import NoPlaceError, Unfit, first_fit
+from odscen.scenario.templates.scene_template import (
     CHILD,
+    SceneTemplate,
+    TemplateParameter,
+    TemplateScene,
     at_once,
     beside,
     body_length,
@@ -23,14 +25,12 @@ from odscen.scenario.templates.scene_actors import (
     rule,
     vehicle,
 )
-from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from odscen.scenario.templates.lane_stretches import LaneStretch
+    from odscen.scenario.templates.scene_sites import LaneStretch, RoadCrossing
     from odscen.scenario.templates.scene_template import TemplateSite
-    from odscen.scenario.templates.walk_sides import RoadCrossing
 
 _REAR = 6.0
 _STRAIGHT = 0.05

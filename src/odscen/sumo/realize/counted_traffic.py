@@ -17,7 +17,7 @@ import numpy as np
 
 from odscen.scenario.demand.count_stations import Passing
 from odscen.scenario.demand.trips import FIRST, Trips, drawn_categories
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.sumo.realize.sumo_tools import run_tool
 
 if TYPE_CHECKING:

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
-from odscen.scenario.document.distributions import draw_key
+from odscen.scenario.document.distributions import draw_key, stream
 from odscen.scenario.document.driver_parameters import DRIVER_PARAMETERS
 from odscen.scenario.document.drivers_document import Drivers
-from odscen.scenario.document.named_random import stream
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

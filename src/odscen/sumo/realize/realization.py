@@ -28,13 +28,13 @@ from odscen.runs.layout import (
 )
 from odscen.runs.recording import region_xml
 from odscen.runs.run_settings import AS_DESIGNED
-from odscen.scenario.checks.signal_timing import signal_problems
-from odscen.scenario.document.parking_document import TripParking
+from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.rules_document import appearing_actors
+from odscen.scenario.document.scenario_document import TripParking
 from odscen.scenario.placing.region import Region
-from odscen.scenario.sampling.redrawn_traffic import redrawn
-from odscen.scenario.signals.detectors import without_detectors
+from odscen.scenario.sampling.sampler import redrawn
+from odscen.scenario.signals.program_design import without_detectors
 from odscen.sumo.realize.lights.light_realization import realized_lights
 from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.lights.program_files import signals_xml

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.lanegraph.graphs import Relation
-from odscen.scenario.placing.usable_nodes import Usable
+from odscen.scenario.placing.region import Usable
 from odscen.sumo.realize.road_net import PEDESTRIAN
 
 if TYPE_CHECKING:

@@ -35,8 +35,7 @@ from odscen.runs import layout
 from odscen.runs.recorded import read_calls, read_light_states
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.edits.turn_treatment import crossing_turns
-from odscen.scenario.signals.light import find_light
-from odscen.scenario.signals.movement_names import shortest_names
+from odscen.scenario.signals.light import find_light, shortest_names
 from odscen.scenario.signals.program_design import seconds_of_day
 from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import OfVersion, ScenarioState, Version

@@ -24,7 +24,7 @@ from odscen.experiments.studies import (
 from odscen.experiments.study_page import SHOWN_FIGURES, write_study_page
 from odscen.experiments.work import LocalExecutor
 from odscen.maps.folder_names import check_name, plain_name
-from odscen.scenario.document.validation import validated
+from odscen.scenario.document.problems import validated
 from odscen.web.studies.study_messages import MOST_PAGE_RUNS, StudyInfo, StudyProblem
 from odscen.web.studies.under_way import OneAtATime, UnderWay
 

@@ -11,8 +11,7 @@ import pytest
 from lxml import etree
 
 from odscen.records.light_programs import programs_from_json, programs_to_json
-from odscen.scenario.signals.program_design import DesignedProgram
-from odscen.scenario.signals.stage_sequence import cycle_length
+from odscen.scenario.signals.program_design import DesignedProgram, cycle_length
 from odscen.sumo.realize.lights.light_realization import realized_lights
 from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.runner.prepare import prepare

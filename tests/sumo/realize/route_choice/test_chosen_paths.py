@@ -10,7 +10,7 @@ from odscen.base.categories import Category
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import node_index
 from odscen.lanegraph.shortest_paths import Router
-from odscen.scenario.checks.demand_route_checks import route_problems
+from odscen.scenario.checks.demand_checks import route_problems
 from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.road_user import RoadUser

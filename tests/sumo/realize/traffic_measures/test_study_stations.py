@@ -12,7 +12,7 @@ from odscen.base.errors import InputError
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
 from odscen.runs.run_settings import RunSettings
-from odscen.scenario.document.study_document import Cordon, Detector, Study, TravelTimeSection
+from odscen.scenario.document.scenario_document import Cordon, Detector, Study, TravelTimeSection
 from odscen.scenario.edits.demand_edits import set_input
 from odscen.scenario.placing.region import NodePlace, name_of
 from odscen.sumo.runner.prepare import prepare

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from odscen.scenario.document.actions_document import Arriving
-from odscen.scenario.story.arrivals import arrival_law
+from odscen.scenario.document.rules_document import Arriving
+from odscen.scenario.story.action_kinds import arrival_law
 from tests.sumo.story_case import MIDDLE, RIGHT, Track, document, loaded, node_at, run
 from tests.sumo.worker.story.test_story_run import (
     MOTORWAY,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.formats.openscenario_import.traced_numbers import with_formulas
-from odscen.scenario.document.expressions import names_in
-from odscen.scenario.document.formulas import computed
+from odscen.scenario.document.formulas import computed, names_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from odscen.base.errors import InputError
 from odscen.formats.openscenario_import.traced_numbers import TracedText
-from odscen.scenario.document.expressions import evaluate, names_in
+from odscen.scenario.document.formulas import evaluate, names_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -11,7 +11,7 @@ from odscen.formats.openscenario_import.places.map_points import MapPoint
 from odscen.formats.openscenario_import.start.actor_places import ActorPlaces
 from odscen.formats.openscenario_import.start.read_appearances import AppearanceReader
 from odscen.formats.openscenario_import.story.global_actions import tell_unread
-from odscen.scenario.templates.scene_actors import STEADY
+from odscen.scenario.templates.scene_template import STEADY
 
 if TYPE_CHECKING:
     from lxml.etree import _Element

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from odscen.scenario.signals.detectors import detector_movements
+from odscen.scenario.signals.program_design import detector_movements
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

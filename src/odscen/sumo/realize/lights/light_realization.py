@@ -12,8 +12,12 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from odscen.scenario.document.signals_document import JunctionTiming
-from odscen.scenario.signals.plan_times import active_plans
-from odscen.scenario.signals.program_design import ONLY_PLAN, DesignedProgram, TimedPlan
+from odscen.scenario.signals.program_design import (
+    ONLY_PLAN,
+    DesignedProgram,
+    TimedPlan,
+    active_plans,
+)
 from odscen.sumo.realize.lights.actuated.call_areas import call_areas, called
 from odscen.sumo.realize.lights.actuated.called_light import called_light
 from odscen.sumo.realize.lights.light_detectors import (
@@ -105,7 +109,7 @@ def realized_lights(
     ----------
     scenario
         Its signals without errors, see
-        :func:`odscen.scenario.checks.signal_timing.signal_problems`.
+        :func:`odscen.scenario.checks.signal_checks.signal_problems`.
     until
         Seconds that the run lasts; the scenario's duration if not given.
     """

@@ -11,7 +11,7 @@ from odscen.records.light_programs import (
     ShownGroup,
     ShownPlan,
 )
-from odscen.scenario.signals.movement_names import shortest_names
+from odscen.scenario.signals.light import shortest_names
 from odscen.sumo.realize.lights.actuated.detector_places import shown_bus_areas, shown_detectors
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from odscen.convert.model.net import CROSSED, STAGE
 from odscen.convert.signals.signal_programs import LEAST_GREEN, PROLONGED
-from odscen.scenario.signals.stage_sequence import (
+from odscen.scenario.signals.program_design import (
     change_length,
     change_steps,
     cycle_length,

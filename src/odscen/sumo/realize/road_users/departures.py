@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.scenario.checks.goals import flow_goals, resolve_goals
 from odscen.scenario.demand.count_stations import observations
 from odscen.scenario.demand.day_profiles import curve
 from odscen.scenario.demand.inflow import input_trips
 from odscen.scenario.demand.trips import background_trips, matrix_trips
 from odscen.scenario.demand.zones import TripEnds
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.scenario.placing.region import place_of
+from odscen.scenario.sampling.actor_goals import flow_goals, resolve_goals
 from odscen.sumo.realize.counted_traffic import counted_trips
 from odscen.sumo.realize.passages import planned_passages
 from odscen.sumo.realize.road_user import RoadUser
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from odscen.scenario.demand.day_profiles import Curve
     from odscen.scenario.demand.trips import Trips
     from odscen.scenario.document.scenario_document import Flow, Scenario
-    from odscen.scenario.placing.region import Region
-    from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.placing.region import Region, Usable
     from odscen.sumo.realize.transit.parking_trips import ParkingOfTrips
 
 

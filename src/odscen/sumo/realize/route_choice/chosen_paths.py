@@ -8,7 +8,7 @@ import numpy as np
 
 from odscen.base.categories import DEFAULT_BODY
 from odscen.scenario.demand.zones import segments_of
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.sumo.realize.route_choice.travel_times import free_flow_costs
 from odscen.sumo.realize.route_paths import CostRouter, each_path
 
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import Int32Array
     from odscen.base.categories import Body
     from odscen.lanegraph.shortest_paths import Router
-    from odscen.scenario.document.routes_document import SharedRoutes
-    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.document.scenario_document import Scenario, SharedRoutes
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser
 

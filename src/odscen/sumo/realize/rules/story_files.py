@@ -10,8 +10,7 @@ from odscen.base.errors import ScenarioError
 from odscen.base.stored_files import stored_document
 from odscen.scenario.document.rules_document import StoryRule, places_of, rule_parts
 from odscen.scenario.placing.region import place_of
-from odscen.scenario.signals.light import find_light
-from odscen.scenario.signals.movement_names import find_movements
+from odscen.scenario.signals.light import find_light, find_movements
 from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.routes_file import HeldActor
 

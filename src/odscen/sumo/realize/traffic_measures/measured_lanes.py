@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import ScenarioError
-from odscen.scenario.checks.measure_places import PlaceNames, UnknownPlace
+from odscen.scenario.checks.measure_checks import PlaceNames, UnknownPlace
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from odscen.base.arrays import BoolArray
-    from odscen.scenario.checks.measure_places import MeasurePlace
+    from odscen.scenario.checks.measure_checks import MeasurePlace
     from odscen.sumo.realize.road_net import Link, RoadNetLane
     from odscen.sumo.realize.sumo_map import SumoMap
 

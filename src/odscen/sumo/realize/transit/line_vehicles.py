@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.scenario.demand.trips import FIRST
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.scenario_document import Actor
 from odscen.scenario.placing.region import place_of
 from odscen.sumo.realize.road_user import RoadUser, StopVisit
@@ -15,8 +15,7 @@ from odscen.sumo.realize.road_user import RoadUser, StopVisit
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from odscen.scenario.document.scenario_document import Scenario
-    from odscen.scenario.document.transit_document import TransitLine
+    from odscen.scenario.document.scenario_document import Scenario, TransitLine
     from odscen.scenario.placing.region import Region
 
 LEAST_DWELL = 1.0

@@ -7,15 +7,14 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
-from odscen.scenario.demand.parked_trips import ParkableTrip, ParkingChoice
-from odscen.scenario.demand.trips import FIRST
+from odscen.scenario.demand.trips import FIRST, ParkableTrip, ParkingChoice
 from odscen.sumo.realize.road_user import ParkingStay, appears_at
 from odscen.sumo.realize.transit.parking_places import parking_positions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.scenario.demand.parked_trips import Parked
+    from odscen.scenario.demand.trips import Parked
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError, NotFoundError
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
-from odscen.learning.named_objects import named_object
-from odscen.learning.offered_models import installed_names, offered_models
+from odscen.learning.offered_models import installed_names, named_object, offered_models
 from odscen.learning.offered_options import values_for
 from odscen.runs.layout import BEHAVIOUR_FILE
 from odscen.sumo.worker.behaviour.piped_driver import PipedDriver, SocketDriver

@@ -10,10 +10,9 @@ import numpy as np
 
 from odscen.base.errors import InputError, OdscenError, SimulationError
 from odscen.base.frames import angle_deg_from_hdg
-from odscen.learning.behaviour.behaviour_model import DrivingKind
-from odscen.learning.behaviour.checked_action import CheckedAction
+from odscen.learning.behaviour.behaviour_model import CheckedAction, DrivingKind
 from odscen.runs.layout import BEHAVIOUR_FILE, SUMO_FOLDER
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour, read_behaviour
 from odscen.sumo.worker.behaviour.road_sight import RoadSight
 

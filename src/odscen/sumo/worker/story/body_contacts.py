@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from odscen.records.run_events import Event, EventKind
-from odscen.scenario.story.body_distance import overlap
+from odscen.scenario.story.condition_kinds import overlap
 from odscen.sumo.worker.story.story_view import stranger
 
 if TYPE_CHECKING:

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import angle_deg_from_hdg
 from odscen.records.run_events import Event, EventKind
-from odscen.scenario.story.asked_actions import WantedActor, WantedEnd
+from odscen.scenario.story.action_kinds import WantedActor, WantedEnd
 from odscen.sumo.worker.simulation.moved_actors import DARK, SavedWalk
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.records.run_plan import PlannedActor
-    from odscen.scenario.story.asked_actions import Wanted, WantedSignal
+    from odscen.scenario.story.action_kinds import Wanted, WantedSignal
     from odscen.sumo.realize.rules.story_files import StoryPlan
     from odscen.sumo.worker.recorder import Recorder
     from odscen.sumo.worker.simulation.moved_actors import MovedActors

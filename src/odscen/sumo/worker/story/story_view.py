@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import SumoPose, body_centre, sumo_to_xodr
+from odscen.scenario.story.motion_laws import beside, line_length
 from odscen.scenario.story.road_view import MOST_GAIN, ActorView, Stood, leapt
-from odscen.scenario.story.side_motion import beside, line_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence

@@ -10,8 +10,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.scenario.document.signals_document import JunctionTiming
-from odscen.scenario.signals.program_design import DesignedGroup, DesignedProgram, PlannedStage
-from odscen.scenario.signals.stage_sequence import change_steps, stage_state
+from odscen.scenario.signals.program_design import (
+    DesignedGroup,
+    DesignedProgram,
+    PlannedStage,
+    change_steps,
+    stage_state,
+)
 from odscen.sumo.realize.lights.stage_phases import SumoPhase
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from odscen.scenario.checks.actor_checks import (
     spawn_problems,
     via_problems,
 )
-from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.problems import Problem, refuse_errors
 from odscen.scenario.placing.region import NodePlace, Region, name_of, on_foot
 
