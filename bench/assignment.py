@@ -33,6 +33,7 @@ from odscen.runs.finished_run import Run
 from odscen.runs.layout import ASSIGNMENT_FILE
 from odscen.runs.recorded import trajectory_files
 from odscen.runs.recording import Recording
+from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
@@ -148,6 +149,11 @@ def progress(step: AssignmentStep) -> None:
     print(f"  {step.words}, teleported {step.teleported}", file=sys.stderr, flush=True)
 
 
+class StepsReporter(Reporter):
+    def said(self, words: str) -> None:
+        print(f"  {words}", file=sys.stderr, flush=True)
+
+
 def passages(fit: CountFits, kind: str) -> float:
     return sum(float(getattr(row, kind)) for row in fit.rows)
 
@@ -200,7 +206,7 @@ def zones_of(loaded: LoadedMap, region: Region) -> list[Zone]:
 
 def simulated(workspace: Workspace, scenario: Scenario, name: str) -> Run:
     checked = check_run(workspace, scenario, name=name, settings=SETTINGS)
-    run = carry_out(checked, prepare_run(checked, iterated=progress))
+    run = carry_out(checked, prepare_run(checked, reporter=StepsReporter()))
     if run.status != "completed":
         raise SystemExit(run.summary["error"])
     return run

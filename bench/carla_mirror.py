@@ -23,9 +23,9 @@ from odscen.carla.server.batch import ROLE
 from odscen.carla.server.blueprints import choose_blueprints
 from odscen.carla.server.carla_server import Server
 from odscen.carla.server.client import Address, import_carla
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.maps.store import Workspace
 from odscen.records.run_plan import Plan, PlannedActor
+from odscen.simulators.assets import shipped_assets
 from odscen.sumo.runner.in_step import Step
 from odscen.sumo.worker.protocol import ForeignUser
 from odscen.sumo.worker.simulation.session import open_session

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.app.template_scenarios import template_scenario
-from odscen.experiments.search.proposals import SEARCH_METHODS
-from odscen.experiments.sweeps.critical_search import SearchSettings, search
-from odscen.experiments.sweeps.sweep_folder import SweepSettings
+from odscen.experiments.proposals import SEARCH_METHODS
+from odscen.experiments.search import SearchSettings, search
+from odscen.experiments.sweeps import SweepSettings
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.sweeps.sweep_plan import Range

@@ -31,23 +31,26 @@ import numpy as np
 import numpy.typing as npt
 
 from odscen.app.scenarios import read_scenario, write_scenario
-from odscen.experiments.regression.baseline import baseline_of
-from odscen.experiments.regression.detection import DetectEntry, Pairs, detection_of, size_of
-from odscen.experiments.regression.gates import run_suite
-from odscen.experiments.regression.measure import FigureKey, Measured
-from odscen.experiments.regression.scatter import (
+from odscen.experiments.baseline import baseline_of
+from odscen.experiments.gates import PILOT, PROBE, run_suite, with_longer_headway
+from odscen.experiments.measure import FigureKey, Measured
+from odscen.experiments.suite import Case, Suite, read_suite
+from odscen.experiments.tolerance import (
     CAUGHT,
     CHANGE,
     FEWEST_SEEDS,
     FLOOR,
+    DetectEntry,
     Level,
+    Pairs,
+    Tolerances,
     allowed_by_chance,
+    detection_of,
     seeds_needed,
+    size_of,
+    usual,
 )
-from odscen.experiments.regression.seed_sizing import PILOT, PROBE, with_longer_headway
-from odscen.experiments.regression.tolerance import Tolerances, usual
-from odscen.experiments.regression.verdict import hold_against
-from odscen.experiments.suites.suite import Case, Suite, read_suite
+from odscen.experiments.verdict import hold_against
 from odscen.maps.store import Workspace
 from odscen.sumo.realize.driving import HEADWAY
 

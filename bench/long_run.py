@@ -35,11 +35,11 @@ from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.runs import layout
 from odscen.runs.checkpoint import last_number, read_checkpoint
+from odscen.runs.new_run import make_summary
 from odscen.runs.recorded import trajectory_files
 from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.forked_worker import worker_environment
 from odscen.sumo.runner.prepare import prepare
-from odscen.sumo.runner.run_folder import make_summary, write_run_folder
 from odscen.sumo.runner.worker_process import run_worker
 from tools.make_maps.__main__ import map_text
 
@@ -87,7 +87,7 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
             prepared = prepare(
                 scenario, loaded.sumo, net, assets, settings=RunSettings(seed=seed, until=until)
             )
-            write_run_folder(prepared, run)
+            prepared.write(run)
             times["preparation"].append(since(start))
             config = run / layout.SUMO_FOLDER / layout.CONFIG_FILE
             silent = without_output(config)
@@ -96,7 +96,7 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
             start = spent()
             ended = run_worker(run)
             times["odscen"].append(since(start))
-            if ended.done is None:
+            if ended.sim_seconds is None:
                 raise SystemExit(ended.error)
             records.append(rows(trajectory_files(run)) / alone)
             summary = make_summary(prepared, run, ended)

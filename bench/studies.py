@@ -24,12 +24,10 @@ import dask
 import psutil
 from distributed import Client, LocalCluster, as_completed
 
-from odscen.experiments.studies.dask_executor import DaskExecutor
-from odscen.experiments.studies.executors import Executor, LocalExecutor
-from odscen.experiments.studies.map_packs import CACHE_VARIABLE, pack_map
-from odscen.experiments.studies.study_folder import TABLE_FILE
-from odscen.experiments.studies.study_plan import StudyPlan
-from odscen.experiments.studies.study_runs import begin_study_of, carry_out_study
+from odscen.experiments.dask_executor import CACHE_VARIABLE, DaskExecutor, pack_map
+from odscen.experiments.plan import StudyPlan
+from odscen.experiments.studies import TABLE_FILE, begin_study_of, carry_out_study
+from odscen.experiments.work import Executor, LocalExecutor
 from odscen.maps.store import Workspace
 
 MAP = Path(__file__).parents[1] / "maps" / "signal_crossing.xodr"

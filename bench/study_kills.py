@@ -35,9 +35,9 @@ import psutil
 from distributed import LocalCluster, Status
 
 from bench.studies import QUIET
-from odscen.experiments.studies.map_packs import CACHE_VARIABLE
-from odscen.experiments.studies.study_folder import TABLE_FILE
-from odscen.experiments.studies.study_journal import JOURNAL_FILE, PARTS_FOLDER, read_rows
+from odscen.experiments.dask_executor import CACHE_VARIABLE
+from odscen.experiments.journal import JOURNAL_FILE, PARTS_FOLDER, read_rows
+from odscen.experiments.studies import TABLE_FILE
 from odscen.maps.store import Workspace
 
 MAP = Path(__file__).parents[1] / "maps" / "t_junction_signs.xodr"

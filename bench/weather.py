@@ -16,8 +16,8 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from bench.saturation import run_cars, saturation_flow, straight_road
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.scenario.document.drivers_document import Drivers
+from odscen.simulators.assets import shipped_assets
 from odscen.sumo.realize.weather_effects import WeatherEffect, weather_effect
 
 PRESETS = {

@@ -17,8 +17,8 @@ from typer.main import get_command
 
 from odscen.app.running import batches
 from odscen.cli.commands import command_line
-from odscen.experiments.regression.compare import compare_runs, read_runs
-from odscen.experiments.regression.comparison_page import comparison_page
+from odscen.experiments.compare import compare_runs, read_runs
+from odscen.experiments.comparison_page import comparison_page
 from odscen.maps.store import Workspace
 from odscen.records.outcomes import StopReason
 from odscen.runs.recording import Recording

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from odscen.experiments.sweeps.sweep_runs import sweep
+from odscen.experiments.sweeps import sweep
 from odscen.maps.store import Workspace
 from odscen.scenario.sweeps.sweep_plan import SweepPlan, axis_from_text
 from tools import page as tool

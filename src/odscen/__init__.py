@@ -19,6 +19,10 @@ from typing import TYPE_CHECKING
 from odscen.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from odscen.app.demand.demand_correction import correct_matrix
+    from odscen.app.demand.demands import add_background, fit_counts, import_demand, whole_day
+    from odscen.app.demand.transit_feeds import import_transit
+    from odscen.app.editing import Editing
     from odscen.app.export import export
     from odscen.app.learner_arrays import scenario_arrays, scenario_from_arrays
     from odscen.app.running.batches import run_many
@@ -28,6 +32,11 @@ if TYPE_CHECKING:
     from odscen.app.running.watched_runs import WatchedRun, watch
     from odscen.app.scenarios import check_scenario as check
     from odscen.app.scenarios import generate, read_scenario, write_scenario
+    from odscen.app.signals.green_waves import coordinate_signals
+    from odscen.app.signals.signal_optimisation import time_signals
+    from odscen.app.signals.signal_plans import export_signals, import_signals, signal_programs
+    from odscen.app.template_scenarios import template_scenario as place_template
+    from odscen.app.template_scenarios import templates
     from odscen.base.errors import (
         ConflictError,
         InputError,
@@ -39,7 +48,7 @@ if TYPE_CHECKING:
         WorkspaceError,
     )
     from odscen.convert.model.conversion_settings import ConversionSettings
-    from odscen.experiments.regression.compare import RunComparison, compare
+    from odscen.experiments.compare import RunComparison, compare
     from odscen.figures.judging.expectations import parse_expectation
     from odscen.learning.hetero_data import read_arrays
     from odscen.maps.map_entry import MapEntry
@@ -54,6 +63,7 @@ if TYPE_CHECKING:
     from odscen.scenario.story.action_kinds import ActionKind
     from odscen.scenario.story.condition_kinds import ConditionKind, Reading
     from odscen.scenario.story.speed_laws import SpeedLaw
+    from odscen.scenario.templates.scene_template import SceneTemplate
     from odscen.sumo.runner.in_step import Step
 
 _HOMES = {
@@ -69,6 +79,21 @@ _HOMES = {
     "write_scenario": "odscen.app.scenarios",
     "check": "odscen.app.scenarios:check_scenario",
     "export": "odscen.app.export",
+    "Editing": "odscen.app.editing",
+    "SceneTemplate": "odscen.scenario.templates.scene_template",
+    "templates": "odscen.app.template_scenarios",
+    "place_template": "odscen.app.template_scenarios:template_scenario",
+    "import_demand": "odscen.app.demand.demands",
+    "add_background": "odscen.app.demand.demands",
+    "whole_day": "odscen.app.demand.demands",
+    "fit_counts": "odscen.app.demand.demands",
+    "correct_matrix": "odscen.app.demand.demand_correction",
+    "import_transit": "odscen.app.demand.transit_feeds",
+    "signal_programs": "odscen.app.signals.signal_plans",
+    "import_signals": "odscen.app.signals.signal_plans",
+    "export_signals": "odscen.app.signals.signal_plans",
+    "time_signals": "odscen.app.signals.signal_optimisation",
+    "coordinate_signals": "odscen.app.signals.green_waves",
     "scenario_arrays": "odscen.app.learner_arrays",
     "scenario_from_arrays": "odscen.app.learner_arrays",
     "read_arrays": "odscen.learning.hetero_data",
@@ -87,8 +112,8 @@ _HOMES = {
     "Step": "odscen.sumo.runner.in_step",
     "Run": "odscen.runs.finished_run",
     "renew_report": "odscen.app.running.reports",
-    "compare": "odscen.experiments.regression.compare",
-    "RunComparison": "odscen.experiments.regression.compare",
+    "compare": "odscen.experiments.compare",
+    "RunComparison": "odscen.experiments.compare",
     "OdscenError": "odscen.base.errors",
     "InputError": "odscen.base.errors",
     "ScenarioError": "odscen.base.errors",
@@ -108,6 +133,7 @@ __all__ = [
     "ConditionKind",
     "ConflictError",
     "ConversionSettings",
+    "Editing",
     "GenerationSettings",
     "InputError",
     "LimitError",
@@ -122,17 +148,27 @@ __all__ = [
     "RunSettings",
     "Scenario",
     "ScenarioError",
+    "SceneTemplate",
     "SpeedLaw",
     "Step",
     "ToolError",
     "WatchedRun",
     "Workspace",
     "WorkspaceError",
+    "add_background",
     "check",
     "compare",
+    "coordinate_signals",
+    "correct_matrix",
     "export",
+    "export_signals",
+    "fit_counts",
     "generate",
+    "import_demand",
+    "import_signals",
+    "import_transit",
     "parse_expectation",
+    "place_template",
     "read_arrays",
     "read_scenario",
     "renew_report",
@@ -142,7 +178,11 @@ __all__ = [
     "scenario_arrays",
     "scenario_from_arrays",
     "shipped_maps",
+    "signal_programs",
+    "templates",
+    "time_signals",
     "watch",
+    "whole_day",
     "write_scenario",
 ]
 

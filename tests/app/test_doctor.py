@@ -13,12 +13,13 @@ from odscen.app.running.reports import renew_report
 from odscen.app.running.resumed_runs import resume
 from odscen.app.running.runs import carry_out, check_file, prepare_run
 from odscen.base.errors import DamagedError, InputError
-from odscen.experiments.regression.compare import compare
+from odscen.experiments.compare import compare
 from odscen.maps.store import Workspace
+from odscen.runs.reporter import Progress
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_sums import damaged_in
 from odscen.sumo.runner.live_run import Live
-from odscen.sumo.worker.protocol import Progress
+from tests.reporters import EachProgress, Listener
 
 SLICE = 10.0
 
@@ -43,7 +44,7 @@ def pair(workspace: Workspace, sampled: Path, tmp_path_factory: pytest.TempPathF
         if message.time > 2 * SLICE + 2.0:
             live.kill()
 
-    run = carry_out(checked, prepare_run(checked), progress=kill, live=live)
+    run = carry_out(checked, prepare_run(checked), reporter=EachProgress(kill), live=live)
     assert run.status == "failed"
     finished = out / "finished"
     shutil.copytree(run.folder, finished)
@@ -74,12 +75,13 @@ class ComputingError(Exception):
 def test_a_byte_that_has_changed_anywhere_is_named_by_resume_before_anything_is_computed(
     pair: RunPair, tmp_path: Path, place: float
 ) -> None:
-    told: list[str] = []
+    class UntilResumed(Listener):
+        def said(self, words: str) -> None:
+            super().said(words)
+            if words.startswith(("resumes at", "begins anew")):
+                raise ComputingError
 
-    def tell(words: str) -> None:
-        told.append(words)
-        if words.startswith(("resumes at", "begins anew")):
-            raise ComputingError
+    listener = UntilResumed()
 
     names = files_of(pair.interrupted)
     assert len(names) > 20
@@ -89,10 +91,10 @@ def test_a_byte_that_has_changed_anywhere_is_named_by_resume_before_anything_is_
         run = tmp_path / "run"
         shutil.copytree(pair.interrupted, run)
         flip(run / name, place)
-        told.clear()
+        listener.words.clear()
         with pytest.raises((DamagedError, ComputingError)) as caught:
-            resume(pair.workspace, run, tell=tell)
-        said = str(caught.value) if isinstance(caught.value, DamagedError) else told[0]
+            resume(pair.workspace, run, reporter=listener)
+        said = str(caught.value) if isinstance(caught.value, DamagedError) else listener.words[0]
         assert f"{name}: expected" in said, (name, said)
         shutil.rmtree(run)
 

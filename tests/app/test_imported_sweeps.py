@@ -14,7 +14,7 @@ import pytest
 from odscen.app.scenario_imports import import_scenario
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError
-from odscen.experiments.sweeps.sweep_runs import sweep
+from odscen.experiments.sweeps import sweep
 from odscen.formats.openscenario_import.traced_numbers import TracedNumber
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run

@@ -13,6 +13,7 @@ from odscen.base.errors import ConflictError, NotFoundError
 from odscen.base.folder_locks import locked
 from odscen.maps.store import Workspace
 from odscen.maps.wastebasket import Wastebasket
+from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
 
 SHORT = RunSettings(until=5.0)
@@ -84,10 +85,11 @@ def test_a_run_whose_map_is_removed_while_it_goes_on_ends_with_its_report(
     prepared = prepare_run(checked)
     name, sha256 = checked.scenario.map.name, checked.scenario.map.sha256
 
-    def take_map_away(_folder: Path) -> None:
-        remove(own, "map", name)
+    class TakeMapAway(Reporter):
+        def started(self) -> None:
+            remove(own, "map", name)
 
-    done = carry_out(checked, prepared, ended=take_map_away)
+    done = carry_out(checked, prepared, reporter=TakeMapAway())
     assert done.status == "completed"
     assert name not in own.map_names()
     assert (done.folder / "actors.json").read_bytes() == (kept / "actors.json").read_bytes()

@@ -16,11 +16,11 @@ from playwright.sync_api import Page, expect
 
 from odscen.app.running import batches
 from odscen.app.scenarios import SUFFIX, generate
-from odscen.experiments.regression.compare import compare_runs, read_runs
-from odscen.experiments.regression.comparison_page import comparison_page
-from odscen.experiments.studies.executors import LocalExecutor
-from odscen.experiments.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
-from odscen.experiments.studies.study_runs import begin_study_of, carry_out_study
+from odscen.experiments.compare import compare_runs, read_runs
+from odscen.experiments.comparison_page import comparison_page
+from odscen.experiments.plan import StudyPlan, StudyRuns, StudyVariant
+from odscen.experiments.studies import begin_study_of, carry_out_study
+from odscen.experiments.work import LocalExecutor
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.sampling.generation_settings import GenerationSettings

@@ -12,7 +12,7 @@ from playwright.sync_api import expect
 from odscen.app.running.runs import run
 from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.app.template_scenarios import template_scenario
-from odscen.experiments.sweeps.sweep_runs import WATCHES_CLOSENESS
+from odscen.experiments.sweeps import WATCHES_CLOSENESS
 from odscen.figures.measures.conflicts import SEEN_PET
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings

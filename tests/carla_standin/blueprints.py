@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from odscen.base.categories import Category
-from odscen.maps.asset_catalogue import Blueprint, shipped_assets
+from odscen.simulators.assets import Blueprint, shipped_assets
 
 CAMERA, LIDAR, RADAR = "sensor.camera.rgb", "sensor.lidar.ray_cast", "sensor.other.radar"
 WALKER_CONTROLLER = "controller.ai.walker"

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from odscen.maps.asset_catalogue import shipped_assets
+from odscen.simulators.assets import shipped_assets
 from tests.carla_standin.conftest import DELTA, MAPS, Connected, connect, synchronize
 from tests.carla_standin.process import StandIn
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from odscen.lanegraph.build_graphs import build_map_graph
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.opendrive.parse import parse
+from odscen.simulators.assets import shipped_assets
 from tests.carla_standin.conftest import DELTA, MAPS, Connected, connect, synchronize
 from tests.carla_standin.process import StandIn
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.scenario.placing.bodies import overlap
+from odscen.simulators.assets import shipped_assets
 from tests.carla_standin import camera, scanners, wire
 from tests.carla_standin.actors import Actor, Kind
 from tests.carla_standin.blueprints import (

@@ -8,7 +8,7 @@ import pytest
 from lxml import etree
 
 from tests.cli.conftest import odscen
-from tests.experiments.regression.conftest import write_tiny
+from tests.experiments.conftest import write_tiny
 
 
 @pytest.fixture(scope="module")

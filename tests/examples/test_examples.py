@@ -102,3 +102,12 @@ def test_the_regression_test_passes_and_fails_when_the_bound_is_tighter(tmp_path
     )  # fmt: skip
     assert "2 failed, 2 passed" in done.stdout, done.stdout
     assert "expected mean_delay <= 1 s, but it is" in done.stdout
+
+
+@pytest.mark.slow
+def test_the_edited_scene_is_undone_timed_and_run(workspace: Path) -> None:
+    text = printed("edit_and_run.py", workspace)
+    assert "undone: Change the seed, seed 0" in text
+    assert re.search(r"^Junction .*: cycle [\d.]+ s \(was", text, re.MULTILINE)
+    assert "Background traffic, Time the light" in text
+    assert re.search(r"^\d+ road users, mean delay [\d.]+ s$", text, re.MULTILINE)

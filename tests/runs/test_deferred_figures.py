@@ -18,26 +18,27 @@ from odscen.runs.ended import RECORDS_ONLY
 from odscen.runs.finished_run import Run
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_sums import damaged_in
-from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
+from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.conftest import Prepare
 
 CLOCK = ("wall_seconds", "real_time_factor")
 
 
 @pytest.fixture
-def prepared(prepare: Prepare) -> PreparedRun:
+def prepared(prepare: Prepare) -> SumoPreparedRun:
     """Of a map, as all runs but those of other tests."""
     return replace(prepare(), about={"map": "grid", "map_sha256": "0" * 64, "meso": False})
 
 
 @pytest.fixture
-def waiting(prepared: PreparedRun, tmp_path: Path) -> Run:
+def waiting(prepared: SumoPreparedRun, tmp_path: Path) -> Run:
     """A run whose figures have not been asked for."""
     return run_prepared(prepared, tmp_path / "waiting", figures=False)
 
 
 def test_a_run_that_is_opened_ends_with_the_bytes_of_one_that_was_measured_at_once(
-    prepared: PreparedRun, waiting: Run, tmp_path: Path
+    prepared: SumoPreparedRun, waiting: Run, tmp_path: Path
 ) -> None:
     measured = run_prepared(prepared, tmp_path / "measured")
     assert not (waiting.folder / layout.FIGURES_FILE).exists()
@@ -84,7 +85,7 @@ def test_nothing_is_computed_from_damaged_records(waiting: Run) -> None:
 
 
 def test_what_is_expected_of_a_run_is_held_against_figures_at_once(
-    prepared: PreparedRun, tmp_path: Path
+    prepared: SumoPreparedRun, tmp_path: Path
 ) -> None:
     settings = RunSettings(expectations=(parse_expectation("mean_speed >= 1 km/h"),))
     judged = run_prepared(replace(prepared, settings=settings), tmp_path / "run", figures=False)

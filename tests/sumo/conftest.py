@@ -14,7 +14,7 @@ from odscen.records.run_plan import Plan, PlannedActor
 from odscen.sumo.realize.measure_files import measures_xml
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner import long_runs, worker_process
-from odscen.sumo.runner.run_jobs import PreparedRun
+from odscen.sumo.runner.run_folder import SumoPreparedRun
 
 BIN = Path(sumo.SUMO_HOME) / "bin"
 
@@ -24,7 +24,7 @@ SLICE, UNTIL = 60.0, 200.0
 ROWS = ("A0B0 B0C0 C0C1", "A1B1 B1C1", "C2B2 B2A2 A2A1", "C0C1 C1C2", "B2B1 B1B0 B0A0")
 WALKS = ("A0B0 B0C0", "C1B1 B1A1", "B2B1 B1B0")
 
-Prepare = Callable[..., PreparedRun]
+Prepare = Callable[..., SumoPreparedRun]
 
 
 def start_killed_workers(patch: pytest.MonkeyPatch) -> None:
@@ -55,7 +55,7 @@ def prepare(grid: Path) -> Prepare:
 
     def prepared(
         *, cars: int = 4, walker: bool = True, until: float = 200.0, routes: str | None = None
-    ) -> PreparedRun:
+    ) -> SumoPreparedRun:
         actors = [car(i) for i in range(cars)] + ([WALKER] if walker else [])
         text = routes or "\n".join(
             ["<routes>", TYPES, *(_car_xml(i) for i in range(cars)), *[WALK] * walker, "</routes>"]
@@ -65,7 +65,7 @@ def prepare(grid: Path) -> Prepare:
             actors=tuple(actors),
         )  # fmt: skip
         settings = SumocfgSettings(until=until, step_length=0.5, seed=7, measures=True)
-        return PreparedRun(
+        return SumoPreparedRun(
             plan=plan,
             sumo_files={
                 "measures.add.xml": measures_xml(10.0, emissions=True),
@@ -80,7 +80,7 @@ def prepare(grid: Path) -> Prepare:
 
 
 @pytest.fixture(scope="session")
-def long(grid: Path) -> PreparedRun:
+def long(grid: Path) -> SumoPreparedRun:
     """Cars whose drivers dawdle at random, and walkers, over 200 s in slices of 60 s."""
     chance = random.Random(3)
     departs = sorted(round(chance.uniform(0.0, 150.0), 2) for _ in range(90))
@@ -112,7 +112,7 @@ def long(grid: Path) -> PreparedRun:
         "scenario.sumocfg": sumo_config(settings),
     }
     plan = Plan("grid", 7, UNTIL, 0.5, (0.0, 0.0), tuple(actors), slice_length=SLICE)
-    return PreparedRun(plan, files, grid, scenario_json="{}")
+    return SumoPreparedRun(plan=plan, sumo_files=files, net=grid, scenario_json="{}")
 
 
 TYPES = """\

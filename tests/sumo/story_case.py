@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
     from odscen.records.run_events import Event
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import PreparedRun
+    from odscen.sumo.runner.run_folder import SumoPreparedRun
 
 MAPS = Path(__file__).parents[2] / "maps"
 LEFT, MIDDLE, RIGHT = -4.875, -8.625, -12.375
@@ -128,7 +128,7 @@ class Told:
         return event.time
 
 
-def prepared(scenario: Scenario, *, slice_length: float | None = None) -> PreparedRun:
+def prepared(scenario: Scenario, *, slice_length: float | None = None) -> SumoPreparedRun:
     made_on = loaded(scenario.map.name)
     errors = [
         one
@@ -141,7 +141,7 @@ def prepared(scenario: Scenario, *, slice_length: float | None = None) -> Prepar
     return prepare(scenario, made_on.sumo, net, settings=settings)
 
 
-def told(run: PreparedRun, folder: Path) -> Told:
+def told(run: SumoPreparedRun, folder: Path) -> Told:
     result = run_prepared(run, folder)
     log = (folder / "sumo.log").read_text() if (folder / "sumo.log").is_file() else ""
     assert result.status == "completed", (result.summary.get("error"), log)

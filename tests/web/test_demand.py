@@ -137,7 +137,7 @@ def test_the_fit_of_a_run_is_that_of_its_trajectories_with_places_on_the_map(
     assert finished(client, run)["state"] == "completed"
     assert client.get(f"/api/runs/{run}/content").json()["counts"] == 2
     found = client.get(f"/api/runs/{run}/fit").json()
-    ours = demands.fit(workspace, workspace.runs / run)
+    ours = demands.fit_counts(workspace, workspace.runs / run)
     assert [row["modelled"] for row in found["rows"]] == [row.modelled for row in ours.rows]
     assert found["met"] == sum(row.met for row in ours.rows) < 2
     assert "add up to 900" in found["rows"][1]["why"]

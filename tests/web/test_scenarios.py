@@ -23,7 +23,7 @@ from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.measures_document import Measure
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.scenario_document import Actor, Flow, Matrix, Scenario
-from odscen.scenario.edits.edit_messages import MESSAGES, EditBase
+from odscen.scenario.edits.edit_messages import EDIT_MESSAGES, EditBase
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region, name_of, place_of
@@ -173,10 +173,12 @@ def test_every_edit_function_is_an_edit_message_and_tried_below() -> None:
     kinds = set(EDIT_ENTRIES)
     assert kinds == public - {"new_scenario", "eligible_segments", "removable_segments"}
     assert {kind for kind, _ in ALL} == kinds
-    assert {get_args(message.model_fields["kind"].annotation)[0] for message in MESSAGES} == kinds
+    assert {
+        get_args(message.model_fields["kind"].annotation)[0] for message in EDIT_MESSAGES.values()
+    } == kinds
 
 
-@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: message.__name__)
+@pytest.mark.parametrize("message", EDIT_MESSAGES.values(), ids=lambda message: message.__name__)
 def test_the_words_of_an_edit_need_only_what_it_always_has(message: type[EditBase]) -> None:
     (kind,) = get_args(message.model_fields["kind"].annotation)
     label = Formatter().parse(EDIT_ENTRIES[kind].label)
@@ -190,7 +192,7 @@ def test_the_words_of_an_edit_need_only_what_it_always_has(message: type[EditBas
     [("change_actor", Actor), ("add_actor", Actor), ("change_flow", Flow), ("set_matrix", Matrix)],
 )
 def test_an_edit_of_a_part_takes_every_field_that_the_part_has(kind: str, part: type[Part]) -> None:
-    message = next(one for one in MESSAGES if kind in get_args(one.model_fields["kind"].annotation))
+    message = EDIT_MESSAGES[kind]
     assert part.model_fields.keys() <= message.model_fields.keys()
 
 

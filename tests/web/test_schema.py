@@ -19,7 +19,7 @@ from schemathesis.specs.openapi.checks import (
 )
 
 from odscen.app.scenarios import generate, read_scenario
-from odscen.app.signals.signal_plans import lights_of
+from odscen.app.signals.signal_plans import signal_programs
 from odscen.maps.store import Workspace
 from odscen.maps.wastebasket import Wastebasket
 from odscen.scenario.sampling.generation_settings import GenerationSettings
@@ -61,7 +61,7 @@ def kept(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 @pytest.fixture(scope="module")
 def light(kept: Workspace) -> str:
     scenario = read_scenario(kept.scenarios / f"{CROSSING}-0001.scenario.json")
-    return lights_of(kept, scenario)[0].junctions[0]
+    return signal_programs(kept, scenario)[0].junctions[0]
 
 
 @pytest.fixture(scope="module")

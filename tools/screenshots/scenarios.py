@@ -5,9 +5,9 @@ from __future__ import annotations
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, generate, write_scenario
 from odscen.app.template_scenarios import template_scenario
-from odscen.experiments.studies.executors import LocalExecutor
-from odscen.experiments.studies.study_plan import StudyPlan, StudyRuns, StudyVariant
-from odscen.experiments.studies.study_runs import begin_study_of, carry_out_study
+from odscen.experiments.plan import StudyPlan, StudyRuns, StudyVariant
+from odscen.experiments.studies import begin_study_of, carry_out_study
+from odscen.experiments.work import LocalExecutor
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.scenario import edits

@@ -1,7 +1,7 @@
 import { call } from "./client";
 import type { components } from "./schema";
 
-/** A generator or behaviour model that is installed. */
+/** A generator, behaviour model or simulator that is installed. */
 export type Offered = components["schemas"]["OfferedInfo"];
 export type OfferedOption = components["schemas"]["OptionInfo"];
 export type OptionValue = boolean | number | string;
@@ -15,4 +15,8 @@ export interface Chosen {
 export const models = {
   generators: () => call("get", "/api/generators"),
   behaviours: () => call("get", "/api/behaviours"),
+  simulators: () => call("get", "/api/simulators"),
+  /** What a simulator does not do of a scenario. */
+  unsupported: (simulator: string, scenario: string) =>
+    call("get", "/api/simulators/{simulator}/unsupported", { path: { simulator }, query: { scenario } }),
 };

@@ -110,6 +110,22 @@ export interface paths {
          */
         get: operations["list_behaviours_api_behaviours_get"];
     };
+    "/api/simulators": {
+        /**
+         * List Simulators
+         * @description Simulators that are installed, for a new run: those that ship are the first.
+         *
+         *     The address of a CARLA server is the one that this server was started with.
+         */
+        get: operations["list_simulators_api_simulators_get"];
+    };
+    "/api/simulators/{simulator}/unsupported": {
+        /**
+         * List Unsupported
+         * @description What a simulator does not do of a scenario as it is now.
+         */
+        get: operations["list_unsupported_api_simulators__simulator__unsupported_get"];
+    };
     "/api/scenarios": {
         /**
          * List Scenarios
@@ -1170,6 +1186,13 @@ export interface components {
         };
         /** @description An installed behaviour model by its name, and options that differ from its usual ones. */
         ChosenBehaviour: {
+            name: string;
+            options?: {
+                [key: string]: boolean | number | string;
+            };
+        };
+        /** @description An installed simulator by its name, and options that differ from its usual ones. */
+        ChosenSimulator: {
             name: string;
             options?: {
                 [key: string]: boolean | number | string;
@@ -2559,6 +2582,7 @@ export interface components {
          *     Places of road users are recorded ``every`` so many seconds, ``None`` with each step, unless
          *     ``trajectories`` is false. With ``carla`` it is shown on the CARLA server too, step by step, and
          *     recorded whole. Vehicles are driven by a ``behaviour`` model, ``None`` for SUMO's drivers.
+         *     A ``simulator`` plays it instead of SUMO.
          */
         NewRun: {
             scenario: string;
@@ -2574,6 +2598,7 @@ export interface components {
             /** @default false */
             carla?: boolean;
             behaviour?: components["schemas"]["ChosenBehaviour"] | null;
+            simulator?: components["schemas"]["ChosenSimulator"] | null;
         };
         /**
          * @description Start a scenario on a map; a free name is found if none is given.
@@ -5419,6 +5444,36 @@ export interface operations {
             200: {
                 content: {
                     "application/json": components["schemas"]["OfferedInfo"][];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    list_simulators_api_simulators_get: {
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["OfferedInfo"][];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    list_unsupported_api_simulators__simulator__unsupported_get: {
+        parameters: {
+            query: {
+                scenario: string;
+            };
+            path: {
+                simulator: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["ProblemInfo"][];
                 };
             };
             default: components["responses"]["Error"];

@@ -14,6 +14,7 @@ import { Duration } from "./Duration";
 import { Forecast } from "./Forecast";
 import { MeasureList } from "./MeasureList";
 import { ModelChoice } from "./ModelChoice";
+import { SimulatorChoice } from "./SimulatorChoice";
 
 const CONTROLS = localized(() => [
   { value: "fixed", label: t`Fixed-time` },
@@ -67,6 +68,7 @@ export function RunStep({
   const [recording, setRecording] = useState("step");
   const [pace, setPace] = useState<string | null>(null);
   const [driver, setDriver] = useState<Chosen | null>(null);
+  const [simulator, setSimulator] = useState<Chosen | null>(null);
   const long = duration > LONG;
   const chosenPace = pace ?? (long ? "fast" : "real");
   const every = inCarla || recording === "step" || recording === "none" ? null : Number(recording);
@@ -77,6 +79,12 @@ export function RunStep({
     trajectories: inCarla || recording !== "none",
     every,
     ...(driver && { behaviour: driver }),
+  };
+  const elsewhere: RunWish | null = simulator && {
+    scenario: name,
+    trajectories: recording !== "none",
+    every: recording === "step" || recording === "none" ? null : Number(recording),
+    simulator,
   };
   return (
     <>
@@ -112,8 +120,8 @@ export function RunStep({
         description={t`for replay, charts and counts`}
         inputWrapperOrder={["label", "input", "description"]}
         data={RECORDINGS()}
-        value={inCarla ? "step" : recording}
-        disabled={inCarla}
+        value={inCarla && !simulator ? "step" : recording}
+        disabled={inCarla && !simulator}
         allowDeselect={false}
         onChange={(value) => setRecording(value ?? "step")}
       />
@@ -142,28 +150,33 @@ export function RunStep({
         </div>
       )}
       <MeasureList measures={measures} />
-      <ModelChoice
-        offered={models.behaviours}
-        label={t`Vehicles driven by`}
-        none={t`SUMO’s drivers`}
-        words={driverWords}
-        unusable={t`This behaviour model cannot be used`}
-        chosen={driver}
-        onChange={setDriver}
-      />
-      <div>
-        <Text size="sm" fw={500}>
-          <Trans>Speed at the start</Trans>
-        </Text>
-        <SegmentedControl
-          fullWidth
-          data={PACES()}
-          value={chosenPace}
-          aria-label={t`Speed at the start`}
-          onChange={setPace}
-        />
-      </div>
-      <CarlaChoice chosen={inCarla} onChoose={setInCarla} />
+      <SimulatorChoice scenario={name} version={version} chosen={simulator} onChange={setSimulator} />
+      {!simulator && (
+        <>
+          <ModelChoice
+            offered={models.behaviours}
+            label={t`Vehicles driven by`}
+            none={t`SUMO’s drivers`}
+            words={driverWords}
+            unusable={t`This behaviour model cannot be used`}
+            chosen={driver}
+            onChange={setDriver}
+          />
+          <div>
+            <Text size="sm" fw={500}>
+              <Trans>Speed at the start</Trans>
+            </Text>
+            <SegmentedControl
+              fullWidth
+              data={PACES()}
+              value={chosenPace}
+              aria-label={t`Speed at the start`}
+              onChange={setPace}
+            />
+          </div>
+          <CarlaChoice chosen={inCarla} onChoose={setInCarla} />
+        </>
+      )}
       {empty && (
         <Text size="sm">
           <Trans>There are no road users yet. Place some in “Road users”, or add traffic in “Traffic”.</Trans>
@@ -174,13 +187,13 @@ export function RunStep({
           <Trans>Solve the problems listed below first.</Trans>
         </Text>
       )}
-      {!blocked && !empty && <Forecast wish={wish} version={version} />}
+      {!blocked && !empty && !simulator && <Forecast wish={wish} version={version} />}
       <Button
         size="md"
         leftSection={<IconPlay />}
         loading={busy}
         disabled={blocked || empty}
-        onClick={() => onRun(wish)}
+        onClick={() => onRun(elsewhere ?? wish)}
       >
         <Trans context="button">Run</Trans>
       </Button>

@@ -352,10 +352,23 @@ const BEHAVIOURS = [
   },
   { name: "gone", summary: "", options: [], error: "it cannot be imported" },
 ];
+const SIMULATORS = ["sumo", "carla-mirror", "carla-native", "steady"].map((name) => ({
+  name,
+  summary: "",
+  options: [],
+  error: "",
+}));
 const CARLA = { state: "absent", address: "", message: "No CARLA server is there." };
 
 function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunStep>[0]> = {}) {
-  server({ "/carla": CARLA, "/behaviours": BEHAVIOURS });
+  server({
+    "/carla": CARLA,
+    "/behaviours": BEHAVIOURS,
+    "/simulators/steady/unsupported": [
+      { ...problem("rules[0]"), message: "Steady traffic does not follow rule r" },
+    ],
+    "/simulators": SIMULATORS,
+  });
   const [onEdit, onRun] = [vi.fn(), vi.fn()];
   const shown = show(
     <RunStep
@@ -374,6 +387,20 @@ function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunSt
   );
   return { ...shown, onEdit, onRun };
 }
+
+test("a run is played by the simulator that is chosen, and what that leaves out is said before", async () => {
+  const { user, onRun } = toRun(scenario([actor("a")]));
+  await choose(user, "Simulator", "steady");
+  expect(await screen.findByText("Steady traffic does not follow rule r")).toBeTruthy();
+  expect(screen.queryByLabelText("Vehicles driven by")).toBeNull();
+  await user.click(screen.getByRole("button", { name: "Run" }));
+  expect(onRun).toHaveBeenLastCalledWith({
+    scenario: "s",
+    trajectories: true,
+    every: null,
+    simulator: { name: "steady", options: {} },
+  });
+});
 
 test("measures are listed with what they do and when", () => {
   const measures: ScenarioDocument["measures"] = [

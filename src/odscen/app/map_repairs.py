@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from odscen.base.checksums import SUMS_FILE, file_digest, sums_of, write_sums
 from odscen.base.errors import DamagedError, InputError, OdscenError
-from odscen.maps.asset_catalogue import BLUEPRINTS_FILE
 from odscen.maps.map_entry import INFO_FILE, XODR_FILE, read_entry
+from odscen.simulators.assets import BLUEPRINTS_FILE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -8,7 +8,7 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.base.errors import ConflictError
 from odscen.maps.folder_names import check_name
-from odscen.scenario.templates.template_registry import find_template, place_template
+from odscen.scenario.templates.template_registry import TEMPLATES, find_template, place_template
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,6 +16,18 @@ if TYPE_CHECKING:
 
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.templates.scene_template import SceneTemplate
+
+
+def templates() -> tuple[SceneTemplate, ...]:
+    """List the templates that can be placed on maps.
+
+    Returns
+    -------
+    tuple of SceneTemplate
+        In the order in which they are offered.
+    """
+    return tuple(TEMPLATES.values())
 
 
 def template_scenario(
@@ -30,14 +42,22 @@ def template_scenario(
 
     Parameters
     ----------
+    workspace
+        Has the map.
     template
-        Its name.
+        Its name, one of :func:`templates`.
     map_name
         Map of the workspace.
     values
         Numbers that differ from the template's, by the names of its parameters.
     name
         Of the scenario; made of those of template and map if not given.
+
+    Returns
+    -------
+    Scenario
+        The scene on the first place of the map that has room; the same map and numbers give the
+        same document.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, pri
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.maps.asset_catalogue import Blueprint
+    from odscen.simulators.assets import Blueprint
 
 app = typer.Typer(help="Models of road users, and weather presets.", no_args_is_help=True)
 
@@ -73,8 +73,8 @@ def update(
     from odscen.carla.server.carla_server import Server
     from odscen.carla.server.client import Address
     from odscen.carla.server.server_models import SOURCE, fetch_models
-    from odscen.maps.asset_catalogue import BLUEPRINTS_FILE, blueprint_row
     from odscen.maps.store import Workspace
+    from odscen.simulators.assets import BLUEPRINTS_FILE, blueprint_row
 
     store = Workspace.open(workspace)
     old = store.assets()

@@ -79,6 +79,23 @@ BehaviourTimeoutOption = Annotated[
     ),
 ]
 
+SimulatorOption = Annotated[
+    str,
+    typer.Option(
+        help="What plays the scenario: sumo, carla-mirror, carla-native, an entry point, "
+        "package.module:Class or FILE.py:Class.",
+        metavar="NAME",
+    ),
+]
+SimulatorSettingOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--simulator-set",
+        help="A setting of it: address=127.0.0.1:2000; repeatable.",
+        metavar="NAME=VALUE",
+    ),
+]
+
 _MOST_SEEDS = 1000
 
 

@@ -25,15 +25,18 @@ from odscen.cli.console import (
 )
 from odscen.cli.cosim_selfcheck import run_selfcheck
 from odscen.records.outcomes import RunStatus
+from odscen.runs.reporter import Reporter
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from odscen.carla.mirror.cosim_report import CosimReport
     from odscen.carla.mirror.foreign_actors import ForeignRoles
     from odscen.carla.native.native_run import NativeOptions
     from odscen.carla.sensors.sensor_file import SensorWish
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.runs.run_settings import RunSettings
-    from odscen.sumo.worker.protocol import Progress
 
 
 class Ego(StrEnum):
@@ -250,17 +253,13 @@ def cosim(
             as_json=as_json,
         )
     with progress("mirroring") as step:
-
-        def show(message: Progress) -> None:
-            step(f"{message.time:.0f} s, {message.running} on the road", message.share)
-
         result, report = run_cosim(
             Workspace.open(workspace),
             scenario,
             options,
             settings=settings,
             out=out,
-            progress=show,
+            reporter=_BarReporter(step),
         )
     _show(result, report, as_json=as_json)
     raise typer.Exit(_exit_code(result, report))
@@ -309,10 +308,7 @@ def _run_native(
             options,
             settings=settings,
             out=out,
-            tell=log,
-            progress=lambda message: step(
-                f"{message.time:.0f} s, {message.running} on the road", message.share
-            ),
+            reporter=_BarReporter(step),
         )
     if as_json:
         print_json({**result.to_dict(), "carla": asdict(report)})
@@ -321,14 +317,26 @@ def _run_native(
         counts = result.summary["actors"]
         row = (result.folder.name, result.status, *(counts[key] for key in keys))
         print_table("", ("run", "status", *keys), [row])
-    for words in (*report.notes, result.summary["error"]):
-        if words:
-            log(words)
+    if result.summary["error"]:
+        log(result.summary["error"])
     if report.interrupted:
         log("Interrupted; what CARLA did so far is kept.")
     log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
     failed = result.status is RunStatus.FAILED
     raise typer.Exit(INTERRUPTED if report.interrupted and not failed else result.exit_code)
+
+
+class _BarReporter(Reporter):
+    """Shows how far a run is, and logs what is to be known of it."""
+
+    def __init__(self, show: Callable[[str, float], None]) -> None:
+        self._show = show
+
+    def advanced(self, progress: Progress) -> None:
+        self._show(f"{progress.time:.0f} s, {progress.running} on the road", progress.share)
+
+    def said(self, words: str) -> None:
+        log(words)
 
 
 def _exit_code(result: Run, report: CosimReport) -> int:

@@ -36,7 +36,7 @@ def fit(
     from odscen.app.demand import demands
     from odscen.maps.store import Workspace
 
-    found = demands.fit(Workspace.open(workspace), what)
+    found = demands.fit_counts(Workspace.open(workspace), what)
     if page is not None:
         from odscen.app.demand.demand_correction import write_fit_page
 

@@ -98,7 +98,7 @@ def import_(
     if not given:
         raise InputError("name a table to import: --od, --inputs, --counts, --profile or --zones")
     for kind, file in given.items():
-        document = demands.import_table(
+        document = demands.import_demand(
             store, document, file, kind=kind, name=name, day=day, **common
         )
     path = scenarios.write_scenario(document, out or scenario)

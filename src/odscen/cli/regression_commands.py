@@ -21,7 +21,7 @@ from odscen.cli.console import (
 )
 
 if TYPE_CHECKING:
-    from odscen.experiments.regression.case_results import SuiteResult
+    from odscen.experiments.suite import SuiteResult
     from odscen.maps.store import Workspace
 
 HtmlOption = Annotated[
@@ -93,10 +93,10 @@ def gate(
     Exit code 0: all pass; 1: something differs or falls short; 2: bad input; 3: a run failed. The
     largest that a scenario has is that of the suite.
     """
-    from odscen.experiments.regression.gates import Update, run_suite
-    from odscen.experiments.suites.suite import read_suite
-    from odscen.experiments.suites.suite_parts import read_parts
-    from odscen.experiments.suites.suite_words import to_dict
+    from odscen.experiments.gates import Update, run_suite
+    from odscen.experiments.suite import read_suite
+    from odscen.experiments.suite_runs import read_parts
+    from odscen.experiments.suite_words import to_dict
     from odscen.maps.store import Workspace
 
     read, store = read_suite(suite), Workspace.open(workspace)
@@ -133,10 +133,9 @@ def _write(
     results: Path | None,
 ) -> None:
     from odscen.base.text_files import write_text
-    from odscen.experiments.regression.junit import junit_xml
-    from odscen.experiments.suites.suite_page import suite_page
-    from odscen.experiments.suites.suite_parts import results_json
-    from odscen.experiments.suites.suite_summary import suite_summary
+    from odscen.experiments.suite_page import suite_page
+    from odscen.experiments.suite_runs import results_json
+    from odscen.experiments.suite_words import junit_xml, suite_summary
 
     if junit is not None:
         write_text(junit, junit_xml(result))
@@ -153,7 +152,7 @@ def _write(
 
 
 def _show(result: SuiteResult, *, as_json: bool) -> None:
-    from odscen.experiments.suites.suite_words import lines
+    from odscen.experiments.suite_words import lines
 
     if not as_json:
         rows = [
@@ -177,8 +176,8 @@ def compare(
 ) -> None:
     """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
     from odscen.base.text_files import write_text
-    from odscen.experiments.regression.compare import compare as compare_sides
-    from odscen.experiments.regression.comparison_page import comparison_page
+    from odscen.experiments.compare import compare as compare_sides
+    from odscen.experiments.comparison_page import comparison_page
     from odscen.maps.store import Workspace
 
     # The page draws the map, if the workspace has it.

@@ -1,4 +1,4 @@
-"""``odscen run``: scenarios in SUMO."""
+"""``odscen run``: scenarios in SUMO, or in another simulator."""
 
 from __future__ import annotations
 
@@ -21,26 +21,29 @@ from odscen.cli.console import (
     JobsOption,
     JsonOption,
     SeedsOption,
+    SimulatorOption,
+    SimulatorSettingOption,
     WarmUpOption,
     WorkspaceOption,
     behaviour_door,
     duration,
     log,
+    option_settings,
     print_json,
     print_table,
     progress,
 )
 from odscen.records.outcomes import RunStatus
+from odscen.runs.reporter import Reporter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.runs.run_settings import RunSettings, SliceLength
     from odscen.scenario.sampling.redrawn_traffic import Redraw
-    from odscen.sumo.runner.run_jobs import RunJob
-    from odscen.sumo.worker.protocol import Progress
 
 
 @contextmanager
@@ -144,6 +147,8 @@ def run(
     behaviour_set: BehaviourSettingOption = None,
     behaviour_cmd: BehaviourCommandOption = None,
     behaviour_timeout: BehaviourTimeoutOption = 60.0,
+    simulator: SimulatorOption = "sumo",
+    simulator_set: SimulatorSettingOption = None,
     reports: Annotated[
         bool | None,
         typer.Option(
@@ -177,9 +182,10 @@ def run(
     completed; 1: completed, but an expectation failed; 2: bad input, or the folder is in the hands
     of another process; 3: a run failed, or the machine lacks room, memory or handles.
     """
-    from odscen.sumo.runner.forked_worker import get_ready
+    if simulator == "sumo":
+        from odscen.sumo.runner.forked_worker import get_ready
 
-    get_ready()  # its imports take as long as ours, and are done meanwhile
+        get_ready()  # its imports take as long as ours, and are done meanwhile
     gc.disable()  # what is imported stays, and need not be gone through again and again
     from odscen.app.running import batches
     from odscen.app.scenarios import scenario_files
@@ -210,6 +216,8 @@ def run(
         warm_up=warm_up,
         interval=interval,
         behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout),
+        simulator=simulator,
+        simulator_options=option_settings(simulator_set or (), element="--simulator-set"),
     )
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)
@@ -234,8 +242,7 @@ def run(
             processes=jobs,
             reports=reports,
             figures=reports or as_json,
-            progress=_follow(step, len(paths) * len(seeds or (None,))),
-            tell=log,
+            reporter=_BarReporter(step, len(paths) * len(seeds or (None,))),
         )
     show_results(results, as_json=as_json, several=len(results) > 1 or scenarios[0].is_dir())
     if seeds is not None:
@@ -267,7 +274,7 @@ def _run_until_confident(
         runs, found = run_until_confident(
             store, path, share=wanted, figure=figure, most=most, settings=settings, out=out,
             seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds, processes=processes,
-            reports=reports, tell=log,
+            reports=reports, reporter=_BarReporter(),
         )  # fmt: skip
         results += runs
         intervals.append(found)
@@ -288,7 +295,7 @@ def _run_until_confident(
 
 def _warn_of_seeds(results: Sequence[Run], seeds: int) -> None:
     """Say of which scenario the seeds hardly vary; runs of one scenario follow each other."""
-    from odscen.experiments.regression.scatter import VARYING, hardly_varying
+    from odscen.experiments.tolerance import VARYING, hardly_varying
     from odscen.figures.measures.registry import run_figure
 
     figure = run_figure(VARYING)
@@ -306,23 +313,27 @@ def resume(
     time_limit: Annotated[
         float | None, typer.Option(min=1, help="Wall seconds after which it is interrupted again.")
     ] = None,
+    behaviour: BehaviourOption = None,
+    behaviour_set: BehaviourSettingOption = None,
+    behaviour_cmd: BehaviourCommandOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Resume an interrupted long run; it ends as if it had not been interrupted.
 
-    Exit codes as of ``run``.
+    A run that is driven by a program, a module or a file resumes when that is named again: what
+    a folder says is never executed by itself. Exit codes as of ``run``.
     """
     from odscen.app.running import resumed_runs
     from odscen.maps.store import Workspace
 
     with progress("resuming") as step:
-
-        def follow(message: Progress) -> None:
-            step(_words(run.name, message), message.time / message.until)
-
         result = resumed_runs.resume(
-            Workspace.open(workspace), run, time_limit=time_limit, progress=follow, tell=log
+            Workspace.open(workspace),
+            run,
+            time_limit=time_limit,
+            reporter=_BarReporter(step).of_run(run.name),
+            behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, 60.0),
         )
     show_results([result], as_json=as_json, several=False)
     raise typer.Exit(result.exit_code)
@@ -375,18 +386,30 @@ def _say_verdicts(result: Run) -> None:
         log(f"{result.folder.name}: failed: {has}")
 
 
-def _follow(step: Callable[[str, float], None], total: int) -> Callable[[RunJob, Progress], None]:
-    shares: dict[str, float] = {}
+class _BarReporter(Reporter):
+    """Shows runs that go on at the same time as one bar; what they say is logged.
 
-    def follow(job: RunJob, message: Progress) -> None:
-        shares[job.name] = message.time / message.until if message.until else 0.0
-        step(_words(job.name, message), sum(shares.values()) / total)
+    ``show`` gets words and the share done of ``total`` runs.
+    """
 
-    return follow
+    def __init__(self, show: Callable[[str, float], None] | None = None, total: int = 1) -> None:
+        self._show, self._total = show, total
+        self._shares: dict[str, float] = {}
+        self._name = ""
 
+    def of_run(self, name: str) -> Reporter:
+        own = _BarReporter(self._show, self._total)
+        own._shares, own._name = self._shares, name
+        return own
 
-def _words(name: str, message: Progress) -> str:
-    line = f"{name}: {message.time:,.0f} s, {message.running:,} on the road"
-    if message.time_left is None:
-        return line
-    return f"{line}, about {clock(message.time_left + 59)} h left"
+    def advanced(self, progress: Progress) -> None:
+        if self._show is None:
+            return
+        self._shares[self._name] = progress.time / progress.until if progress.until else 0.0
+        line = f"{self._name}: {progress.time:,.0f} s, {progress.running:,} on the road"
+        if progress.time_left is not None:
+            line = f"{line}, about {clock(progress.time_left + 59)} h left"
+        self._show(line, sum(self._shares.values()) / self._total)
+
+    def said(self, words: str) -> None:
+        log(words)

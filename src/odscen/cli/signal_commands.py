@@ -47,12 +47,12 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """Show signal groups, stages and plans of the lights of a scenario."""
-    from odscen.app.signals.signal_plans import lights_of
+    from odscen.app.signals.signal_plans import signal_programs
     from odscen.app.signals.signal_views import chosen_lights
     from odscen.maps.store import Workspace
 
     space = Workspace.open(workspace)
-    lights = chosen_lights(lights_of(space, scenario), junction or ())
+    lights = chosen_lights(signal_programs(space, scenario), junction or ())
     drawn = [] if svg is None else _draw(space, scenario, junction or (), svg)
     if as_json:
         more = {} if svg is None else {"svg": [str(path) for path in drawn]}

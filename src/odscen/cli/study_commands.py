@@ -21,9 +21,9 @@ from odscen.cli.console import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.experiments.studies.executors import Executor
-    from odscen.experiments.studies.study_report import StudyGroup
-    from odscen.experiments.studies.study_runs import StudyState
+    from odscen.experiments.studies import StudyState
+    from odscen.experiments.study_page import StudyGroup
+    from odscen.experiments.work import Executor
     from odscen.maps.store import Workspace
 
 app = typer.Typer(
@@ -82,9 +82,8 @@ def run(
     resumes with the same command, or with `odscen study resume`. Exit code 0: all have
     completed; 2: bad input; 3: a run failed or was not possible.
     """
-    from odscen.experiments.studies.study_grid import found_sources, grid_of
-    from odscen.experiments.studies.study_plan import read_study_plan
-    from odscen.experiments.studies.study_runs import begin_study
+    from odscen.experiments.plan import found_sources, grid_of, read_study_plan
+    from odscen.experiments.studies import begin_study
     from odscen.maps.store import Workspace
 
     place = Workspace.open(workspace)
@@ -140,9 +139,8 @@ def extend(
 
     Runs that have ended stay as they are. Exit codes as of `odscen study run`.
     """
-    from odscen.experiments.studies.study_folder import read_study
-    from odscen.experiments.studies.study_plan import StudyPlan, read_study_plan
-    from odscen.experiments.studies.study_runs import extend_study
+    from odscen.experiments.plan import StudyPlan, read_study_plan
+    from odscen.experiments.studies import extend_study, read_study
     from odscen.maps.store import Workspace
     from odscen.scenario.document.validation import validated
 
@@ -161,7 +159,7 @@ def extend(
 @app.command()
 def status(study: FolderArgument, as_json: JsonOption = False) -> None:
     """Say how far a study is, and why runs failed; also while it runs."""
-    from odscen.experiments.studies.study_runs import study_state
+    from odscen.experiments.studies import study_state
 
     _show_state(study_state(study), as_json=as_json)
 
@@ -180,8 +178,8 @@ def report(
     as_json: JsonOption = False,
 ) -> None:
     """Write a page: means with confidence intervals by scenario and variant, and failures."""
-    from odscen.experiments.studies.study_folder import PAGE_FILE
-    from odscen.experiments.studies.study_report import (
+    from odscen.experiments.studies import PAGE_FILE
+    from odscen.experiments.study_page import (
         SHOWN_FIGURES,
         study_groups,
         write_study_page,
@@ -213,7 +211,7 @@ def _show_groups(title: str, groups: Sequence[StudyGroup], figures: Sequence[str
 
 def open_executor(place: Workspace, name: str, jobs: int, scheduler: str | None) -> Executor:
     """The executor that the options name."""
-    from odscen.experiments.studies.executors import LocalExecutor
+    from odscen.experiments.work import LocalExecutor
 
     if name == "local":
         if scheduler is not None:
@@ -221,7 +219,7 @@ def open_executor(place: Workspace, name: str, jobs: int, scheduler: str | None)
         return LocalExecutor(place, jobs)
     if name != "dask":
         raise InputError(f"--executor {name!r} is not local or dask")
-    from odscen.experiments.studies.dask_executor import DaskExecutor
+    from odscen.experiments.dask_executor import DaskExecutor
 
     return DaskExecutor(place, scheduler)
 
@@ -237,7 +235,7 @@ def _carry_out(
     again: bool,
     as_json: bool,
 ) -> None:
-    from odscen.experiments.studies.study_runs import carry_out_study
+    from odscen.experiments.studies import carry_out_study
 
     with progress("study") as step:
         ended = carry_out_study(
@@ -252,7 +250,7 @@ def _carry_out(
 
 
 def _show_state(state: StudyState, *, as_json: bool) -> None:
-    from odscen.experiments.studies.study_folder import TABLE_FILE
+    from odscen.experiments.studies import TABLE_FILE
 
     if as_json:
         print_json(state.to_dict() | {"table": str(state.folder / TABLE_FILE)})
@@ -296,8 +294,7 @@ def dataset(
     The same command after an interruption runs what is missing. Runs that failed or that the
     plan leaves out are counted in the card. Exit code 0: the dataset is complete; 2: bad input.
     """
-    from odscen.experiments.datasets.dataset_plan import read_dataset_plan
-    from odscen.experiments.datasets.dataset_runs import CARD_FILE, make_dataset
+    from odscen.experiments.datasets import CARD_FILE, make_dataset, read_dataset_plan
     from odscen.maps.store import Workspace
 
     place = Workspace.open(workspace)

@@ -30,8 +30,8 @@ from odscen.cli.scenario_commands import ScenarioArgument
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from odscen.experiments.sweeps.critical_search import SearchResult
-    from odscen.experiments.sweeps.sweep_table import Sweep
+    from odscen.experiments.search import SearchResult
+    from odscen.experiments.sweeps import Sweep
     from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import Method, SweepPlan
@@ -112,8 +112,8 @@ def sweep(
     0, whether cases are safe or not; 2: bad input; 3: a run failed.
     """
     from odscen.app import scenarios
-    from odscen.experiments.sweeps.sweep_folder import SweepSettings
-    from odscen.experiments.sweeps.sweep_runs import sweep as run_sweep
+    from odscen.experiments.sweeps import SweepSettings
+    from odscen.experiments.sweeps import sweep as run_sweep
     from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
@@ -191,7 +191,7 @@ def _read(file: Path) -> dict[str, Any]:
 def _figures(
     given: Sequence[str],
 ) -> tuple[dict[str, Callable[[Run], float | None]], tuple[str, ...]]:
-    from odscen.experiments.regression.own_figures import own_column
+    from odscen.experiments.own_figures import own_column
 
     own = {}
     for text in given:
@@ -287,9 +287,9 @@ def search(
     whether there are critical cases or not; 2: bad input; 3: a run failed.
     """
     from odscen.app import scenarios
-    from odscen.experiments.sweeps.critical_search import SearchSettings
-    from odscen.experiments.sweeps.critical_search import search as find
-    from odscen.experiments.sweeps.sweep_folder import SweepSettings
+    from odscen.experiments.search import SearchSettings
+    from odscen.experiments.search import search as find
+    from odscen.experiments.sweeps import SweepSettings
     from odscen.maps.store import Workspace
     from odscen.scenario.sweeps.sweep_plan import axis_from_text
 

@@ -50,7 +50,7 @@ def import_(
     from odscen.app.demand import transit_feeds
     from odscen.maps.store import Workspace
 
-    document, placed = transit_feeds.import_feed(
+    document, placed = transit_feeds.import_transit(
         Workspace.open(workspace),
         scenarios.read_scenario(scenario),
         feed,

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.maps.asset_catalogue import Assets
     from odscen.opendrive.road_model import OpenDrive
     from odscen.records.run_plan import PlannedActor
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.simulators.assets import Assets
     from odscen.sumo.realize.sumo_map import SumoMap
 
 

@@ -23,17 +23,17 @@ from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.maps.allowances import BY_SIZE
-from odscen.maps.asset_catalogue import assets_in
 from odscen.maps.folder_names import check_name, is_name, name_from_file
 from odscen.maps.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.maps.map_files import read_map_file
+from odscen.simulators.assets import assets_in
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from odscen.maps.allowances import BuildLimits
-    from odscen.maps.asset_catalogue import Assets
     from odscen.maps.converters import GivenNetwork
+    from odscen.simulators.assets import Assets
 
 BUILDER = "12"
 """Raised whenever what a map folder contains changes; older folders are rebuilt when opened."""

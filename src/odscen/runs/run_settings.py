@@ -17,6 +17,7 @@ from odscen.scenario.sampling.redrawn_traffic import REDRAWS
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from odscen.learning.offered_options import OptionValue
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sampling.redrawn_traffic import Redraw
 
@@ -72,6 +73,8 @@ class RunSettings:
         Of figures over time, in whole seconds; the scenario's own if ``None``.
     behaviour
         What drives vehicles instead of SUMO; ``None``: nothing does.
+    simulator, simulator_options
+        Name of what plays the scenario, see :mod:`odscen.simulators.installed`, and its options.
 
     Raises
     ------
@@ -92,6 +95,8 @@ class RunSettings:
     warm_up: float | None = None
     interval: float | None = None
     behaviour: BehaviourDoor | None = None
+    simulator: str = "sumo"
+    simulator_options: Mapping[str, OptionValue] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.seed is not None and not 0 <= self.seed < _SEEDS:
@@ -159,8 +164,11 @@ class RunSettings:
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """As values that JSON can hold."""
-        return {**asdict(self), "expectations": [one.text for one in self.expectations]}
+        """As values that JSON can hold; the simulator only where it is not SUMO."""
+        values = {**asdict(self), "expectations": [one.text for one in self.expectations]}
+        if self.simulator == "sumo":
+            del values["simulator"], values["simulator_options"]
+        return values
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:

@@ -29,20 +29,9 @@ _START = (
     layout.SETTINGS_FILE,
     layout.LANE_PLACES_FILE,
     layout.LIGHTS_FILE,
-    *(
-        f"{layout.SUMO_FOLDER}/{name}"
-        for name in (
-            layout.NET_FILE,
-            layout.ROUTES_FILE,
-            layout.SIGNALS_FILE,
-            layout.STORY_FILE,
-            layout.REGION_FILE,
-            layout.MEASURES_FILE,
-            layout.CONFIG_FILE,
-        )
-    ),
+    layout.ASSIGNMENT_FILE,
 )
-"""What a run in slices starts from."""
+"""What a run in slices starts from, beside all that is in its SUMO folder."""
 _INNER = frozenset({layout.STATUS_FILE, layout.SETTINGS_FILE})
 """Removed when a run in slices has ended."""
 REPAIR = "odscen doctor --repair rebuilds what can be rebuilt"
@@ -50,8 +39,28 @@ REPAIR = "odscen doctor --repair rebuilds what can be rebuilt"
 
 def seal_start(run: Path) -> None:
     """Write down the checksums of what a run in slices starts from."""
-    start = (name for name in _START if (run / name).is_file())
+    start = [name for name in _START if (run / name).is_file()] + _sumo_files(run)
     write_sums(run, {name: file_digest(run / name) for name in start})
+
+
+def refuse_additions(run: Path) -> None:
+    """Refuse a run to which files were added that SUMO or the worker would read.
+
+    Raises
+    ------
+    DamagedError
+        With each file of its SUMO folder that has no checksum.
+    """
+    sums = read_sums(run) or {}
+    added = [name for name in _sumo_files(run) if name not in sums]
+    if added:
+        wrong = [DamagedFile(name, "no such file", file_digest(run / name)) for name in added]
+        raise DamagedError(str(run), wrong)
+
+
+def _sumo_files(run: Path) -> list[str]:
+    folder = run / layout.SUMO_FOLDER
+    return sorted(path.relative_to(run).as_posix() for path in folder.rglob("*") if path.is_file())
 
 
 def seal_run(run: Path, *, hidden: bool = False) -> None:

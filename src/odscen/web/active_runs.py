@@ -21,10 +21,14 @@ from odscen.carla.served.served_run import ServedJob, run_served
 from odscen.records.run_plan import Plan
 from odscen.runs import layout
 from odscen.runs.recording import Recording
+from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_status import read_status
 from odscen.scenario.document.json_form import dumps
+from odscen.simulators.installed import CARLA_MIRROR, CARLA_NATIVE, SUMO, open_simulator
 from odscen.sumo.runner.live_run import Live
+from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.sumo_simulator import SumoSimulator
 from odscen.sumo.worker.behaviour.behaviour_doors import chosen_behaviour
 from odscen.sumo.worker.protocol import Command, Failed, Pace
 from odscen.sumo.worker.snapshots import origin
@@ -40,8 +44,8 @@ if TYPE_CHECKING:
     from odscen.carla.server.client import Address
     from odscen.maps.store import Workspace
     from odscen.maps.wastebasket import RemovedItem
-    from odscen.records.assignment_steps import AssignmentStep
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.web.wire.run_messages import GoOn, NewRun, RunControl
 
@@ -49,6 +53,27 @@ MOST = 8
 """Runs that can go on at a time."""
 PATIENCE = 5.0
 """Wall seconds that runs have for their end when the server ends."""
+
+
+class PageReporter(Reporter):
+    """Shows on the page how far a run is; the page can end it.
+
+    ``watched`` runs have the page as their companion.
+    """
+
+    def __init__(self, active: Active, *, watched: bool) -> None:
+        self._active, self._watched = active, watched
+
+    def advanced(self, progress: Progress) -> None:
+        if not self._watched:  # who watches a run in SUMO has heard it
+            self._active.live.take(progress, b"")
+
+    def said(self, words: str) -> None:
+        self._active.preparing = words
+
+    @property
+    def cancelled(self) -> bool:
+        return self._active.live.stop_wanted
 
 
 class Runs:
@@ -72,7 +97,9 @@ class Runs:
         ConflictError
             If too many are going on, or CARLA shows another one.
         """
-        run = check_run(self._workspace, scenario, name=name, settings=_settings(wish))
+        if wish.simulator is not None and wish.simulator.name == CARLA_MIRROR:
+            wish = wish.model_copy(update={"carla": True, "simulator": None})
+        run = check_run(self._workspace, scenario, name=name, settings=self._settings(wish))
         if wish.carla and (wish.every is not None or not wish.trajectories):
             raise InputError(
                 "a run that CARLA shows is recorded step by step; leave every and trajectories out"
@@ -104,7 +131,7 @@ class Runs:
             self._refuse_more()
         live = Live(Pace(paused=wish.paused, speed=wish.speed))
         file = self._workspace.scenarios / f"{name}{SUFFIX}"
-        large = LargeRun(self._workspace, file, name=name, settings=_settings(wish), live=live)
+        large = LargeRun(self._workspace, file, name=name, settings=self._settings(wish), live=live)
         try:
             with self._lock:
                 self._refuse_more()
@@ -148,12 +175,13 @@ class Runs:
         ScenarioError
             If the scenario has errors.
         """
-        settings = _settings(wish)
+        settings = self._settings(wish)
         prepared = prepare_run(
             check_run(self._workspace, scenario, name=wish.scenario, settings=settings)
         )
+        if not isinstance(prepared, SumoPreparedRun) or prepared.expected is None:
+            raise InputError("what a run will need is known of runs in SUMO only")
         expected = prepared.expected
-        assert expected is not None
         return RunForecast(
             planned=len(prepared.plan.actors),
             running=expected.running,
@@ -302,18 +330,14 @@ class Runs:
     def _simulate(
         self, active: Active, run: CheckedRun, wish: NewRun
     ) -> tuple[RunState, str | None]:
-        def iterated(step: AssignmentStep) -> None:
-            active.preparing = step.words
-
-        prepared = prepare_run(run, iterated=iterated)
+        reporter = PageReporter(active, watched=isinstance(run.simulator, SumoSimulator))
+        prepared = prepare_run(run, reporter=reporter)
         active.prepared(prepared.plan)
         if wish.carla:
             return self._mirror(active, prepared.plan, run.settings, wish)
 
-        def ended(_folder: Path) -> None:
-            active.finishing = True
-
-        return _end_of(carry_out(run, prepared, ended=ended, live=active.live), active)
+        result = carry_out(run, prepared, reporter=reporter, live=active.live)
+        return _end_of(result, active)
 
     def _follow(self, active: Active, large: LargeRun) -> tuple[RunState, str | None]:
         def prepared(slice_length: float | None) -> None:
@@ -365,23 +389,37 @@ class Runs:
             return "failed", last.reason
         return ("stopped" if last.stopped else "completed"), None
 
+    def _settings(self, wish: NewRun) -> RunSettings:
+        """How a run is wished for; a CARLA server is the one that the page was started with.
+
+        Raises
+        ------
+        InputError
+            If a behaviour model or simulator is not one of those installed, or not possible so.
+        """
+        driver, chosen = wish.behaviour, wish.simulator
+        name, options = SUMO, {}
+        if chosen is not None:
+            name, options = chosen.name, dict(chosen.options)
+            if name == CARLA_NATIVE:
+                options["address"] = str(self._carla)
+            open_simulator(name, options, installed_only=True)
+        return RunSettings(
+            seed=wish.seed,
+            until=wish.until,
+            step_length=wish.step_length,
+            recording=Recording(trajectories=wish.trajectories, every=wish.every),
+            behaviour=None if driver is None else chosen_behaviour(driver.name, driver.options),
+            simulator=name,
+            simulator_options=options,
+        )
+
     def _free_id(self, name: str) -> str:
         for number in itertools.count(1):
             free = f"{numbered_stem(name)}-{number}"
             if free not in self._active and not (self._workspace.runs / free).exists():
                 return free
         raise AssertionError
-
-
-def _settings(wish: NewRun) -> RunSettings:
-    chosen = wish.behaviour
-    return RunSettings(
-        seed=wish.seed,
-        until=wish.until,
-        step_length=wish.step_length,
-        recording=Recording(trajectories=wish.trajectories, every=wish.every),
-        behaviour=None if chosen is None else chosen_behaviour(chosen.name, chosen.options),
-    )
 
 
 def _end_of(result: Run, active: Active) -> tuple[RunState, str | None]:

@@ -13,30 +13,27 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from odscen.app.editing import HistoryFolder, written_document
 from odscen.app.removal import remove
 from odscen.app.scenarios import SUFFIX
-from odscen.base.errors import (
-    ConflictError,
-    NotFoundError,
-    ScenarioError,
-)
+from odscen.base.errors import ConflictError, NotFoundError, ScenarioError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.maps.folder_names import check_name, is_name
 from odscen.maps.wastebasket import HISTORY, Wastebasket
 from odscen.scenario.document.json_form import dumps, loads
-from odscen.web import history
-from odscen.web.history import History
+from odscen.scenario.edits.edit_history import History, document_sha256
 from odscen.web.messages import ScenarioRow
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from odscen.maps.store import Workspace
     from odscen.maps.wastebasket import RemovedItem
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.edits.edit_messages import EditBase
     from odscen.web.large.large_documents import LargeDocuments
 
 
@@ -111,10 +108,12 @@ class Drafts:
                 raise NotFoundError("scenario", name, [row.name for row in self.rows()])
             text = path.read_text(encoding="utf-8", errors="replace")
             known = self._open.get(name)
-            sha256 = history.digest(text)
+            sha256 = document_sha256(text)
             if known is not None and known.history.sha256 == sha256:
                 return known
-            return self._opened(name, text, sha256)
+            scenario = loads(text, file=f"{name}{SUFFIX}")
+            self._open[name] = Draft(name, scenario, self._history(name).open(text))
+            return self._open[name]
 
     def create(self, scenario: Scenario, name: str | None, *, stem: str, label: str) -> Draft:
         """Save a new scenario; a free name is made from ``stem`` if none is given.
@@ -129,15 +128,26 @@ class Drafts:
         with self._lock, disk_errors("scenarios"), alone:
             name = self._free_name(stem) if name is None else check_name(name, what="scenario")
             self._refuse_taken(name)
-            begun = history.first(text, self._history(name), label=label)
+            begun = self._history(name).begin(text, label=label)
             write_text(self._path(name), text)
             self._open[name] = Draft(name, scenario, begun)
             return self._open[name]
 
     def change(
-        self, name: str, version: int, label: str, edit: Callable[[Scenario], Scenario]
+        self,
+        name: str,
+        version: int,
+        label: str,
+        edit: Callable[[Scenario], Scenario],
+        *,
+        edits: Sequence[EditBase] = (),
     ) -> Draft:
         """Make an edit and save it.
+
+        Parameters
+        ----------
+        edits
+            Edits by name that it is made of, if it is; the history keeps them.
 
         Raises
         ------
@@ -148,11 +158,9 @@ class Drafts:
         """
         with self._lock, disk_errors("scenarios"):
             old = self.of_version(name, version)
-            scenario = edit(old.scenario)
-            text = dumps(scenario)
-            if scenario.formulas:  # one whose number was set to another is no formula any more
-                scenario = loads(text)
-            new = history.grown(old.history, text, self._history(name), label=label)
+            scenario, text = written_document(edit(old.scenario))
+            data = [message.data for message in edits]
+            new = self._history(name).add(old.history, text, label=label, edits=data)
             return self._save(Draft(name, scenario, new, old.scenario), text)
 
     def undo(self, name: str, version: int) -> Draft:
@@ -169,9 +177,9 @@ class Drafts:
             draft = self.get(name)
             check_name(new, what="scenario")
             self._refuse_taken(new)
-            shutil.rmtree(self._history(new), ignore_errors=True)
+            shutil.rmtree(self._history(new).folder, ignore_errors=True)
             with suppress(FileNotFoundError):
-                self._history(name).rename(self._history(new))
+                self._history(name).folder.rename(self._history(new).folder)
             self._path(name).rename(self._path(new))
             del self._open[name]
             self._open[new] = replace(draft, name=new)
@@ -180,12 +188,12 @@ class Drafts:
     def keep(self, name: str, file: str, text: str) -> None:
         """Keep a file beside the history of a scenario; it goes where the scenario goes."""
         with self._lock, disk_errors("scenarios"):
-            write_text(self._history(name) / file, text)
+            write_text(self._history(name).folder / file, text)
 
     def kept(self, name: str, file: str) -> str | None:
         """What was kept under that name; ``None`` if nothing was, or there is no scenario."""
         try:
-            return (self._history(name) / file).read_text(encoding="utf-8")
+            return (self._history(name).folder / file).read_text(encoding="utf-8")
         except FileNotFoundError:
             return None
 
@@ -202,18 +210,6 @@ class Drafts:
         with self._lock:
             return Wastebasket(self._workspace).restore(item)
 
-    def _opened(self, name: str, text: str, sha256: str) -> Draft:
-        scenario = history.document(text, file=f"{name}{SUFFIX}")
-        folder = self._history(name)
-        found = history.read(folder)
-        if found is None:
-            found = history.first(text, folder, label="Open")
-        elif found.sha256 != sha256:
-            found = history.grown(found, text, folder, label="Change by another program")
-            found = replace(found, sha256=sha256)
-        self._open[name] = Draft(name, scenario, found)
-        return self._open[name]
-
     def _move(self, name: str, version: int, step: int) -> Draft:
         with self._lock, disk_errors("scenarios"):
             old = self.of_version(name, version)
@@ -221,8 +217,8 @@ class Drafts:
                 raise ConflictError(
                     f"there is nothing to {'undo' if step < 0 else 'redo'}", current=version
                 )
-            new, text = history.moved(old.history, step, self._history(name))
-            scenario = history.document(text, file=f"{name}{SUFFIX}")
+            new, text = self._history(name).move(old.history, step)
+            scenario = loads(text, file=f"{name}{SUFFIX}")
             return self._save(Draft(name, scenario, new, old.scenario), text)
 
     def _save(self, draft: Draft, text: str) -> Draft:
@@ -247,13 +243,13 @@ class Drafts:
             draft = self.get(name)
         except ScenarioError as error:
             return ScenarioRow(name=name, modified=modified, version=0, error=str(error))
-        one = draft.scenario
+        scenario = draft.scenario
         return ScenarioRow(
             name=name,
-            title=one.name,
-            map=one.map.name,
-            actors=len(one.actors),
-            flows=len(one.flows),
+            title=scenario.name,
+            map=scenario.map.name,
+            actors=len(scenario.actors),
+            flows=len(scenario.flows),
             modified=modified,
             version=draft.history.version,
         )
@@ -271,8 +267,8 @@ class Drafts:
     def _path(self, name: str) -> Path:
         return self._folder / f"{check_name(name, what='scenario')}{SUFFIX}"
 
-    def _history(self, name: str) -> Path:
-        return self._folder / HISTORY / check_name(name, what="scenario")
+    def _history(self, name: str) -> HistoryFolder:
+        return HistoryFolder(self._folder / HISTORY / check_name(name, what="scenario"))
 
 
 def _file_state(path: Path) -> _FileState:

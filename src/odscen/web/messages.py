@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from odscen.base.categories import Category
 from odscen.learning.offered_models import OfferedModel
 from odscen.learning.offered_options import OptionKind, OptionValue
-from odscen.maps.asset_catalogue import Age, TimeOfDay
 from odscen.scenario.document.scenario_document import Scenario
+from odscen.simulators.assets import Age, TimeOfDay
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 Version = Annotated[int, Field(ge=0, lt=2**53)]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pyproj
 import pytest
 
-from odscen.app.demand.transit_feeds import import_feed
+from odscen.app.demand.transit_feeds import import_transit
 from odscen.app.maps import load_map
 from odscen.base.errors import InputError
 from odscen.base.ids import LaneKey, RoadId
@@ -96,7 +96,7 @@ def feed(workspace: Workspace, folder: Path, **tables: str) -> Path:
 def test_bus_trips_of_the_day_become_a_line_with_their_times(
     workspace: Workspace, scenario: Scenario, tmp_path: Path
 ) -> None:
-    changed, placed = import_feed(workspace, scenario, feed(workspace, tmp_path), day=MONDAY)
+    changed, placed = import_transit(workspace, scenario, feed(workspace, tmp_path), day=MONDAY)
     graph = load_map(workspace.map(CROSSING)).sumo.graph
     (line,) = changed.transit.lines
     assert line.id == "line-7"
@@ -118,7 +118,7 @@ def test_bus_trips_of_the_day_become_a_line_with_their_times(
 def test_trips_set_off_where_vehicles_enter_and_reach_their_first_stop_in_time(
     workspace: Workspace, scenario: Scenario, tmp_path: Path
 ) -> None:
-    changed, _ = import_feed(workspace, scenario, feed(workspace, tmp_path), day=MONDAY)
+    changed, _ = import_transit(workspace, scenario, feed(workspace, tmp_path), day=MONDAY)
     graph = load_map(workspace.map(CROSSING)).sumo.graph
     (line,) = changed.transit.lines
     place = place_of(graph, line.start)
@@ -131,11 +131,11 @@ def test_the_weekend_has_its_own_trips(
     workspace: Workspace, scenario: Scenario, tmp_path: Path
 ) -> None:
     file = feed(workspace, tmp_path)
-    changed, _ = import_feed(workspace, scenario, file, day=date(2026, 11, 22))
+    changed, _ = import_transit(workspace, scenario, file, day=date(2026, 11, 22))
     assert [len(line.departures) for line in changed.transit.lines] == [1]
     exception = "service_id,date,exception_type\nweekend,20261122,2\nwork,20261122,1\n"
     file = feed(workspace, tmp_path, calendar_dates_txt=exception)
-    changed, _ = import_feed(workspace, scenario, file, day=date(2026, 11, 22))
+    changed, _ = import_transit(workspace, scenario, file, day=date(2026, 11, 22))
     assert [len(line.departures) for line in changed.transit.lines] == [2]
 
 
@@ -151,7 +151,7 @@ def test_a_feed_that_cannot_be_used_is_refused_with_its_place(
     workspace: Workspace, scenario: Scenario, tmp_path: Path, tables: dict[str, str], message: str
 ) -> None:
     with pytest.raises(InputError, match=message):
-        import_feed(workspace, scenario, feed(workspace, tmp_path, **tables), day=MONDAY)
+        import_transit(workspace, scenario, feed(workspace, tmp_path, **tables), day=MONDAY)
 
 
 def test_a_feed_needs_a_day_and_an_archive_that_is_whole(
@@ -159,7 +159,7 @@ def test_a_feed_needs_a_day_and_an_archive_that_is_whole(
 ) -> None:
     file = feed(workspace, tmp_path)
     with pytest.raises(InputError, match="has a calendar; name a day"):
-        import_feed(workspace, scenario, file)
+        import_transit(workspace, scenario, file)
     file.write_bytes(file.read_bytes()[:300])
     with pytest.raises(InputError, match="no zip archive that can be read"):
-        import_feed(workspace, scenario, file, day=MONDAY)
+        import_transit(workspace, scenario, file, day=MONDAY)

@@ -11,6 +11,7 @@ from odscen.app.running.confident_runs import confidence_of, parse_share, run_un
 from odscen.base.errors import InputError, NotFoundError
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
+from tests.reporters import Listener
 
 DELAYS = (20.0, 22.0, 18.0, 21.0, 19.0)
 
@@ -50,12 +51,12 @@ def test_seeds_are_added_until_the_interval_is_narrow_enough_or_there_are_too_ma
 ) -> None:
     settings = RunSettings(until=90.0, redraw="traffic")
     wanted = {"figure": "mean_speed", "settings": settings, "seeds": (1, 2, 3)}
-    said: list[str] = []
+    listener = Listener()
     runs, wide = run_until_confident(
-        workspace, sampled, share=0.9, out=tmp_path / "wide", tell=said.append, **wanted
+        workspace, sampled, share=0.9, out=tmp_path / "wide", reporter=listener, **wanted
     )
     assert (len(runs), wide.seeds, wide.enough) == (3, 3, True)
-    assert len(said) == 1
+    assert len(listener.words) == 1
     runs, narrow = run_until_confident(
         workspace, sampled, share=0.0001, most=5, out=tmp_path / "narrow", **wanted
     )

@@ -16,10 +16,10 @@ ROOT = Path(odscen.__file__).parent
 STEPS = {
     # Whatever makes or starts a run, and the rooms that may import it.
     "prepare": set[str](),
-    "prepare_assigned": {"app"},
+    "prepare_assigned": set[str](),
     "assign_routes": {"app"},
     "run_prepared": {"app"},
-    "run_many": {"app"},
+    "simulate": {"carla"},  # mirrored
     "run_worker": set[str](),
     "realize": {"app", "formats"},  # the SUMO files alone, of which nothing is run
 }

@@ -11,7 +11,12 @@ from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.base.errors import ScenarioError
 from odscen.figures.judging.expectations import parse_expectation
 from odscen.maps.store import Workspace
+from odscen.runs.new_run import SimulationOutcome
+from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
+from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.sumo_simulator import SumoSimulator
+from tests.reporters import Listener
 
 SHORT = RunSettings(until=5.0)
 
@@ -54,15 +59,20 @@ def test_settings_reach_plan_and_summary_unchanged(
 def test_files_can_be_added_when_the_simulation_has_ended_and_before_the_report(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
-    ready = check_file(workspace, sampled, out=tmp_path, settings=SHORT)
     seen: list[tuple[bool, bool]] = []
 
-    def ended(folder: Path) -> None:
-        there = (folder / "actors.json").is_file(), (folder / "report.html").is_file()
-        seen.append(there)
-        (folder / "parity.html").write_text("{}", encoding="utf-8")
+    class WithParity(SumoSimulator):
+        def run(
+            self, prepared: SumoPreparedRun, folder: Path, reporter: Reporter
+        ) -> SimulationOutcome:
+            outcome = super().run(prepared, folder, reporter)
+            there = (folder / "actors.json").is_file(), (folder / "report.html").is_file()
+            seen.append(there)
+            (folder / "parity.html").write_text("{}", encoding="utf-8")
+            return outcome
 
-    result = carry_out(ready, prepare_run(ready), ended=ended)
+    ready = check_file(workspace, sampled, out=tmp_path, settings=SHORT, simulator=WithParity())
+    result = carry_out(ready, prepare_run(ready))
     assert seen == [(True, False)]
     assert result.summary["files"]["parity"] == "parity.html"
     assert (result.folder / "report.html").is_file()
@@ -77,9 +87,9 @@ def test_a_checked_scenario_is_run_several_times_without_reports_if_none_are_wan
         for seed in (1, 2)
         for own in (RunSettings(seed=seed, until=5.0),)
     ]
-    told: list[str] = []
-    results = run_all(runs, reports=False, done=lambda job, _result: told.append(job.name))
-    assert told == ["s1", "s2"]
+    listener = Listener()
+    results = run_all(runs, reports=False, reporter=listener)
+    assert [run.folder.name for run in listener.runs] == ["s1", "s2"]
     assert [result.summary["seed"] for result in results] == [1, 2]
     assert not any((result.folder / "report.html").exists() for result in results)
 

@@ -8,7 +8,7 @@ import pytest
 
 from odscen.app.maps import load_map
 from odscen.app.signals.green_waves import coordinate_signals
-from odscen.app.signals.signal_plans import lights_of
+from odscen.app.signals.signal_plans import signal_programs
 from odscen.base.errors import InputError
 from odscen.maps.store import Workspace
 from odscen.scenario import edits
@@ -39,7 +39,7 @@ def test_lights_of_a_road_get_one_cycle_and_offsets_with_the_bands_that_are_repo
     names = [one.junctions[0] for one in found.lights]
     assert names in (list(AVENUE), list(AVENUE[::-1]))
     assert min(found.out.seconds, found.back.seconds) > min(found.before)
-    shown = {light.junctions[0]: light for light in lights_of(workspace, found.scenario)}
+    shown = {light.junctions[0]: light for light in signal_programs(workspace, found.scenario)}
     offsets = [shown[name].plans[0].offset for name in names]
     assert {shown[name].plans[0].cycle for name in names} == {80.0}
     assert offsets == [one.offset for one in found.lights]

@@ -8,7 +8,7 @@ import pytest
 
 from odscen.app.maps import map_of
 from odscen.app.signals.program_editing import stretch_cycle, take_over_program
-from odscen.app.signals.signal_plans import lights_of
+from odscen.app.signals.signal_plans import signal_programs
 from odscen.base.errors import InputError, NotFoundError
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
@@ -35,7 +35,7 @@ def placed(workspace: Workspace, one: Scenario) -> Scenario:
 
 
 def spans(workspace: Workspace, one: Scenario) -> tuple[StageSpan, ...]:
-    (light,) = lights_of(workspace, one, whole_day=True)
+    (light,) = signal_programs(workspace, one, whole_day=True)
     return stage_spans(light.plans[0])
 
 

@@ -10,7 +10,7 @@ from odscen.app.demand.demands import add_background
 from odscen.app.maps import load_map
 from odscen.app.signals.program_editing import take_over_program
 from odscen.app.signals.signal_optimisation import time_signals
-from odscen.app.signals.signal_plans import lights_of
+from odscen.app.signals.signal_plans import signal_programs
 from odscen.base.errors import InputError, NotFoundError
 from odscen.maps.store import Workspace
 from odscen.scenario import edits
@@ -91,7 +91,7 @@ def test_greens_of_the_map_and_of_a_program_are_replaced_and_add_up(workspace: W
         one = placed(workspace, scenario(junction, vehicles=500.0))
         (light,) = time_signals(workspace, one).lights
         new = time_signals(workspace, one).scenario
-        (shown,) = lights_of(workspace, new)
+        (shown,) = signal_programs(workspace, new)
         assert shown.plans[0].cycle == pytest.approx(light.times.cycle)
         assert [p.seconds for p in shown.plans[0].phases if p.stage] == list(light.times.green)
         assert light.times.green != light.before.green
@@ -155,7 +155,7 @@ def test_lights_of_a_coordination_whose_cycles_differ_get_one(workspace: Workspa
     junctions = [light.names[0] for light in loaded.lights[:2]]
     for name in junctions:
         town = take_over_program(workspace, town, name)
-    cycles = [plan.cycle for light in lights_of(workspace, town)[:2] for plan in light.plans]
+    cycles = [plan.cycle for light in signal_programs(workspace, town)[:2] for plan in light.plans]
     assert cycles == [40.0, 46.0]
     town = with_timings(town, [
         changed_part(one, {"coordination": "Avenue", "cycle": cycle})
@@ -163,5 +163,5 @@ def test_lights_of_a_coordination_whose_cycles_differ_get_one(workspace: Workspa
     ])  # fmt: skip
     timed = time_signals(workspace, town, junctions=junctions[:1]).scenario
     assert len({timing.cycle for timing in timed.signals.junctions}) == 1
-    shown = {light.plans[0].cycle for light in lights_of(workspace, timed)[:2]}
+    shown = {light.plans[0].cycle for light in signal_programs(workspace, timed)[:2]}
     assert shown == {timed.signals.junctions[0].cycle}

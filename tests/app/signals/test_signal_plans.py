@@ -13,7 +13,7 @@ from odscen.app.export import export
 from odscen.app.networks import bring_in
 from odscen.app.running.runs import run
 from odscen.app.scenarios import read_scenario, write_scenario
-from odscen.app.signals.signal_plans import export_signals, import_signals, lights_of
+from odscen.app.signals.signal_plans import export_signals, import_signals, signal_programs
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.maps.netconvert import NetconvertLimits, run_netconvert
@@ -159,7 +159,7 @@ def test_the_program_of_the_network_becomes_one_of_stages(workspace: Workspace) 
         ("1", 13.0), ("2", 1.0), ("3", 13.0), ("4", 1.0),
     ]  # fmt: skip
     assert timing.intergreens == ()
-    before, after = (lights_of(workspace, case)[0].plans[0].phases for case in (one, back))
+    before, after = (signal_programs(workspace, case)[0].plans[0].phases for case in (one, back))
     shown = [[(seconds, state.lower()) for seconds, state, *_ in case] for case in (before, after)]
     assert shown[0] == shown[1]
 
@@ -311,7 +311,7 @@ def test_stages_by_netconvert_are_timed_anew_called_and_prolonged(
 
 def test_lights_by_netconvert_show_movements_by_segments(by_netconvert: Workspace) -> None:
     """Lanes for bicycles, which our own network does not lead through the junction, included."""
-    (light,) = lights_of(by_netconvert, placed(by_netconvert, scenario(None)))
+    (light,) = signal_programs(by_netconvert, placed(by_netconvert, scenario(None)))
     assert sorted(name for group in light.groups for name in group.movements) == [
         "r1", "r2", "r3", "r4", "walk r1", "walk r2", "walk r3", "walk r4",
     ]  # fmt: skip
@@ -336,7 +336,7 @@ def test_lights_of_a_town_by_netconvert_have_movements_and_crossings(tmp_path: P
         MAP.with_name("town_5x5.xodr"), settings=ConversionSettings(converter="netconvert")
     )
     reference = MapReference(name="town_5x5", sha256=entry.info["sha256"])
-    lights = lights_of(store, scenario(None).model_copy(update={"map": reference, "roi": ()}))
+    lights = signal_programs(store, scenario(None).model_copy(update={"map": reference, "roi": ()}))
     assert len(lights) == 6
     for light in lights:
         names = {name for group in light.groups for name in group.movements}

@@ -11,7 +11,7 @@ import pytest
 from odscen.app.demand.demands import add_background
 from odscen.app.maps import load_map
 from odscen.app.signals.signal_optimisation import time_signals
-from odscen.app.signals.signal_plans import lights_of
+from odscen.app.signals.signal_plans import signal_programs
 from odscen.app.signals.turn_arrows import PRODUCTS, with_turn_arrows
 from odscen.base.errors import InputError
 from odscen.maps.store import Workspace
@@ -144,7 +144,7 @@ def test_who_turns_through_gaps_never_sees_yellow_while_oncoming_traffic_goes_on
         one = placed(workspace, scenario(None, vehicles=vehicles))
         new = time_signals(workspace, with_turn_arrows(workspace, one)[0]).scenario
         assert len(timing(new).stages) == 4
-        (shown,) = lights_of(workspace, new)
+        (shown,) = signal_programs(workspace, new)
         phases = [phase.state for phase in shown.plans[0].phases]
         both = 0
         for before, now in pairwise([*phases, phases[0]]):

@@ -14,8 +14,8 @@ from odscen.carla.server.blueprints import Shape, choose_blueprints
 from odscen.carla.server.environment import vehicle_lights
 from odscen.convert.lane_table.light_heads import Heads
 from odscen.convert.lane_table.table import SumoLight
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.records.run_plan import Plan, PlannedActor
+from odscen.simulators.assets import shipped_assets
 from odscen.sumo.runner.in_step import Step
 
 

@@ -22,6 +22,7 @@ from odscen.carla.native.tick_watch import TickWatch, free
 from odscen.carla.server.client import Address
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
+from tests.reporters import EachProgress
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -169,7 +170,11 @@ def test_a_worker_that_gives_no_sign_is_ended_and_what_it_told_is_kept(
             address=Address(server.host, server.port, timeout=0.5), physics=False
         )
         run, _ = run_native(
-            workspace, sample(CROSSING, seed=5), options, out=tmp_path / "runs", progress=freeze
+            workspace,
+            sample(CROSSING, seed=5),
+            options,
+            out=tmp_path / "runs",
+            reporter=EachProgress(freeze),
         )
         left = [one["type_id"] for one in server.actors() if "vehicle." in one["type_id"]]
     assert frozen

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.maps.store import Workspace
+from odscen.simulators.assets import shipped_assets
 from tests.carla.conftest import MAPS
 from tests.carla_standin.process import StandIn
 from tests.cli.conftest import odscen

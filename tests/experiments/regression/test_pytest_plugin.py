@@ -8,7 +8,7 @@ import tomllib
 import pytest
 
 from odscen.maps.store import Workspace
-from tests.experiments.regression.conftest import ROOT
+from tests.experiments.conftest import ROOT
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.experiments.regression.tolerance import usual
+from odscen.experiments.tolerance import usual
 from odscen.figures.measures.figure import Better, Figure, RunData, SummaryPart
 from odscen.figures.measures.figure_docs import between_markers, column_table, run_figure_table
 from odscen.figures.measures.registry import (

@@ -16,13 +16,14 @@ from odscen.figures.measures.registry import figure_values
 from odscen.runs.recorded import read_conflicts, read_trajectories
 from odscen.runs.recording import Recording
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
-from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
+from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.conftest import LENGTH, UNTIL
 
 col = pl.col
 
 
-def watched(prepared: PreparedRun) -> PreparedRun:
+def watched(prepared: SumoPreparedRun) -> SumoPreparedRun:
     """The same run with an SSM device in every vehicle."""
     settings = SumocfgSettings(
         until=UNTIL,
@@ -43,7 +44,7 @@ def watched(prepared: PreparedRun) -> PreparedRun:
 
 
 @pytest.fixture(scope="module")
-def whole(long: PreparedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(long: SumoPreparedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
     one_piece = replace(long, plan=replace(long.plan, slice_length=None))
     result = run_prepared(watched(one_piece), tmp_path_factory.mktemp("critical") / "run")
     assert result.status == "completed"
@@ -95,7 +96,7 @@ def test_time_to_collision_is_that_of_the_trajectories(whole: Path):
 
 @pytest.mark.slow
 def test_a_run_in_slices_and_another_time_has_its_conflicts_as_well(
-    long: PreparedRun, whole: Path, tmp_path: Path
+    long: SumoPreparedRun, whole: Path, tmp_path: Path
 ):
     sliced = watched(long)
     one, other = (run_prepared(sliced, tmp_path / name).folder for name in ("one", "other"))
@@ -117,7 +118,7 @@ def test_a_run_in_slices_and_another_time_has_its_conflicts_as_well(
     assert len(over) >= 1
 
 
-def test_nothing_is_measured_that_was_not_asked_for(long: PreparedRun, tmp_path: Path):
+def test_nothing_is_measured_that_was_not_asked_for(long: SumoPreparedRun, tmp_path: Path):
     one_piece = replace(long, plan=replace(long.plan, slice_length=None, until=20.0))
     result = run_prepared(one_piece, tmp_path / "run")
     assert read_conflicts(result.folder) is None

@@ -16,7 +16,8 @@ from odscen.runs.recorded import read_lanes, read_trajectories, read_trips
 from odscen.sumo.outputs.lane_measures import lane_table
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
-from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
+from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.conftest import BIN, SLICE, UNTIL, Prepare
 
 col = pl.col
@@ -25,7 +26,7 @@ STANDS = 0.1
 
 
 @pytest.fixture(scope="module")
-def folder(long: PreparedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(long: SumoPreparedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run in four slices."""
     result = run_prepared(long, tmp_path_factory.mktemp("measured") / "run")
     assert result.status == "completed"
@@ -207,7 +208,7 @@ def test_a_run_without_anybody_has_neither_lanes_nor_trips(
 
 @pytest.mark.slow
 def test_queues_of_the_mesoscopic_model_are_measured_across_slices_too(
-    long: PreparedRun, tmp_path: Path
+    long: SumoPreparedRun, tmp_path: Path
 ) -> None:
     settings = SumocfgSettings(until=UNTIL, step_length=0.5, seed=7, measures=True, meso=True)
     files = {**long.sumo_files, "scenario.sumocfg": sumo_config(settings)}

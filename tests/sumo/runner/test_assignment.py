@@ -11,7 +11,7 @@ from lxml import etree
 
 from odscen.app.maps import LoadedMap, load_map
 from odscen.app.running.reports import write_report
-from odscen.app.running.runs import check_run, prepare_run
+from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.maps.store import Workspace
 from odscen.records.assignment_steps import Assignment, AssignmentStep
 from odscen.records.run_plan import Plan
@@ -22,6 +22,7 @@ from odscen.sumo.realize.realization import realize
 from odscen.sumo.runner.assignment import AssignedRoutes, assign_routes
 from odscen.sumo.runner.long_runs import resume
 from odscen.sumo.runner.run_jobs import run_prepared
+from tests.reporters import Listener
 from tests.sumo.runner.test_long_runs import TOWN, killed, results
 
 pytestmark = pytest.mark.slow(together=True)
@@ -125,12 +126,12 @@ def test_a_run_keeps_how_its_routes_were_found_and_shows_it(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:
     wanted = {**BY_TIME, "iterations": 2}
-    heard: list[AssignmentStep] = []
+    listener = Listener()
     checked = check_run(workspace, scenario(town, wanted), name="run", out=tmp_path)
-    run = run_prepared(prepare_run(checked, iterated=heard.append), tmp_path / "run")
+    run = carry_out(checked, prepare_run(checked, reporter=listener), reports=False)
     text = (run.folder / ASSIGNMENT_FILE).read_text(encoding="utf-8")
     kept = Assignment.from_json(text)
-    assert kept.steps == tuple(heard)
+    assert [step.words for step in kept.steps] == listener.words
     assert run.to_dict()["files"]["assignment"].endswith(ASSIGNMENT_FILE)
     page = write_report(run.folder, run.summary).read_text(encoding="utf-8")
     assert "Routes by travel time" in page

@@ -11,10 +11,10 @@ import pytest
 from odscen.runs import layout
 from odscen.sumo.runner import forked_worker
 from odscen.sumo.runner.left_results import left_results
-from odscen.sumo.runner.run_folder import write_run_folder
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.runner.worker_process import run_worker
 from odscen.sumo.worker.protocol import Left
+from tests.reporters import EachProgress
 from tests.sumo.conftest import Prepare
 
 pytestmark = pytest.mark.skipif(
@@ -27,7 +27,7 @@ RECORDS = (layout.TRAJECTORIES_FILE, layout.TRIPS_FILE, layout.EVENTS_FILE, layo
 def made(prepare: Prepare, folder: Path, *, forked: bool) -> dict[str, bytes]:
     """Records of a run whose process was forked, or started."""
     folder.mkdir()
-    write_run_folder(prepare(), folder)
+    prepare().write(folder)
     ended = run_worker(folder, forked=forked)
     assert ended.error is None
     return {name: (folder / name).read_bytes() for name in RECORDS}
@@ -54,7 +54,7 @@ def test_results_that_are_left_to_us_are_those_that_the_process_makes(
     fresh = made(prepare, tmp_path / "fresh", forked=True)
     folder = tmp_path / "raw"
     folder.mkdir()
-    write_run_folder(prepare(), folder)
+    prepare().write(folder)
     asked = []
 
     def results(left: Left) -> None:
@@ -70,14 +70,14 @@ def test_results_that_are_left_to_us_are_those_that_the_process_makes(
 def test_records_that_results_cannot_be_made_of_fail_their_run(
     prepare: Prepare, tmp_path: Path
 ) -> None:
-    write_run_folder(prepare(), tmp_path)
+    prepare().write(tmp_path)
 
     def torn(left: Left) -> None:
         (tmp_path / layout.TRIPINFO_FILE).write_text("<tripinfos><tripinfo", encoding="utf-8")
         left_results(tmp_path, left)
 
     ended = run_worker(tmp_path, forked=True, results=torn)
-    assert ended.done is None
+    assert ended.sim_seconds is None
     assert ended.error is not None
     assert ended.error.startswith("SUMO has not written")
 
@@ -89,12 +89,12 @@ def test_a_crash_of_sumo_ends_one_run_and_leaves_the_next_alone(
     before = server_pid()
     broken = tmp_path / "broken"
     broken.mkdir()
-    write_run_folder(prepare(), broken)
+    prepare().write(broken)
     net = broken / layout.SUMO_FOLDER / layout.NET_FILE
     net.unlink()
     net.write_text("<net></net>", encoding="utf-8")
     ended = run_worker(broken, forked=True)
-    assert ended.done is None
+    assert ended.sim_seconds is None
     assert ended.error is not None
     assert "SIGSEGV" in ended.error
     assert made(prepare, tmp_path / "after", forked=True) == good
@@ -117,7 +117,7 @@ def test_a_server_that_dies_during_a_run_costs_nothing(prepare: Prepare, tmp_pat
             killed.append(server_pid())
             os.kill(killed[0], signal.SIGKILL)
 
-    result = run_prepared(prepare(), tmp_path / "run", progress=kill)
+    result = run_prepared(prepare(), tmp_path / "run", reporter=EachProgress(kill))
     assert killed
     assert result.status == "completed"
 

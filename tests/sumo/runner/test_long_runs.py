@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
 import signal
 from dataclasses import replace
@@ -12,23 +14,35 @@ import pytest
 
 from bench.kills import traffic
 from odscen.app.running.runs import check_file, prepare_run
-from odscen.base.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
+from odscen.base.errors import (
+    ConflictError,
+    DamagedError,
+    InputError,
+    NotFoundError,
+    SimulationError,
+    WorkspaceError,
+)
 from odscen.figures.judging.expectations import parse_expectation
 from odscen.figures.measures.summary import actors_from_json
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.maps.store import Workspace
 from odscen.records.run_events import EventKind, events_from_json
 from odscen.runs import checkpoint, layout, run_status
 from odscen.runs.layout import RECORDED
+from odscen.runs.new_run import run_lock
 from odscen.runs.parts import check_room
 from odscen.runs.recorded import read_trajectories, recorded_files, trajectory_files
+from odscen.runs.reporter import Progress
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_sums import seal_start
 from odscen.sumo.runner import forecast, forked_worker
 from odscen.sumo.runner.allocator import fast_allocator
 from odscen.sumo.runner.live_run import Live
-from odscen.sumo.runner.long_runs import resume, run_lock
-from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
-from odscen.sumo.worker.protocol import Command, Pace, Progress
+from odscen.sumo.runner.long_runs import resume
+from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.run_jobs import run_prepared
+from odscen.sumo.worker.protocol import Command, Pace
+from tests.reporters import EachProgress, Listener
 from tests.sumo.conftest import SLICE, TYPES, UNTIL, start_killed_workers
 
 TOWN = Path(__file__).parents[3] / "maps" / "town_5x5.xodr"
@@ -36,7 +50,7 @@ TOWN_SLICE, TOWN_SLICES = 120.0, 3
 
 
 @pytest.fixture(scope="module")
-def whole(long: PreparedRun, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+def whole(long: SumoPreparedRun, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """Results of the run that nobody interrupts, by file."""
     result = run_prepared(long, tmp_path_factory.mktemp("whole") / "run")
     assert result.status == "completed"
@@ -50,7 +64,7 @@ def results(run: Path) -> dict[str, bytes]:
 
 
 def killed(
-    long: PreparedRun, run: Path, monkeypatch: pytest.MonkeyPatch, **environment: int
+    long: SumoPreparedRun, run: Path, monkeypatch: pytest.MonkeyPatch, **environment: int
 ) -> str:
     """Run, interrupted by ``killed_worker``; what the runner says of it."""
     with monkeypatch.context() as patch:
@@ -62,7 +76,7 @@ def killed(
 
 
 def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
-    long: PreparedRun, tmp_path: Path
+    long: SumoPreparedRun, tmp_path: Path
 ) -> None:
     settings = RunSettings(expectations=(parse_expectation("inserted==90"),))
     result = run_prepared(replace(long, settings=settings), tmp_path / "run")
@@ -78,7 +92,7 @@ def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
 
 
 def test_the_parts_read_as_one_table_without_a_gap_or_a_row_twice(
-    long: PreparedRun, tmp_path: Path
+    long: SumoPreparedRun, tmp_path: Path
 ) -> None:
     run_prepared(long, tmp_path / "run")
     files = trajectory_files(tmp_path / "run")
@@ -94,7 +108,7 @@ def test_the_parts_read_as_one_table_without_a_gap_or_a_row_twice(
 
 
 def test_a_table_with_too_many_rows_is_read_with_every_nth_record(
-    long: PreparedRun, tmp_path: Path
+    long: SumoPreparedRun, tmp_path: Path
 ) -> None:
     run_prepared(long, tmp_path / "run")
     everything = read_trajectories(tmp_path / "run")
@@ -117,7 +131,7 @@ KILLS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("who", "change"), KILLS)
 def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_bytes(
-    long: PreparedRun,
+    long: SumoPreparedRun,
     whole: dict[str, bytes],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -129,12 +143,12 @@ def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_
     assert "SIGKILL" in error
     assert f"odscen resume {run}" in error
     before = {file.name: file.read_bytes() for file in trajectory_files(run)}
-    told: list[str] = []
-    result = resume(run, tell=told.append)
+    listener = Listener()
+    result = resume(run, reporter=listener)
     assert result.status == "completed"
     assert results(run) == whole
     assert all(whole[f"trajectories/{name}"] == content for name, content in before.items())
-    assert len(told) == 1
+    assert len(listener.words) == 1
 
 
 @pytest.mark.slow
@@ -159,7 +173,7 @@ def test_a_town_resumed_after_any_slice_ends_with_the_bytes_of_the_run_left_alon
 
 @pytest.mark.parametrize("change", [8, 40, 59])
 def test_a_run_of_which_only_the_completing_process_is_killed_says_so_and_resumes(
-    long: PreparedRun,
+    long: SumoPreparedRun,
     whole: dict[str, bytes],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -174,7 +188,7 @@ def test_a_run_of_which_only_the_completing_process_is_killed_says_so_and_resume
 
 
 def test_slices_whose_processes_cannot_be_forked_are_the_same_bytes(
-    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = tmp_path / "run"
     assert killed(long, run, monkeypatch, SLICES_BY_EXEC=1) == ""
@@ -182,7 +196,7 @@ def test_slices_whose_processes_cannot_be_forked_are_the_same_bytes(
 
 
 def test_slices_below_the_process_that_forks_for_all_runs_are_the_same_bytes(
-    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path
+    long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path
 ) -> None:
     forked_worker.get_ready()
     try:
@@ -194,7 +208,7 @@ def test_slices_below_the_process_that_forks_for_all_runs_are_the_same_bytes(
 
 
 def test_a_slice_whose_parent_is_killed_ends_and_the_run_resumes(
-    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path
+    long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path
 ) -> None:
     """Killed as the system does when memory runs out: one process, without a word."""
     run = tmp_path / "run"
@@ -206,7 +220,7 @@ def test_a_slice_whose_parent_is_killed_ends_and_the_run_resumes(
             killed_at.append(host)
             os.kill(host, signal.SIGKILL)
 
-    result = run_prepared(long, run, progress=kill)
+    result = run_prepared(long, run, reporter=EachProgress(kill))
     assert "ended by signal SIGKILL" in str(result.summary["error"])
     assert not children(None, str(run))
     resume(run)
@@ -228,7 +242,7 @@ def children(parent: int | None, words: str) -> list[int]:
 
 
 def test_what_was_written_is_completed_when_the_simulation_crashes(
-    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Killed when the third slice has been simulated; the second may not be complete then."""
     run = tmp_path / "run"
@@ -237,7 +251,7 @@ def test_what_was_written_is_completed_when_the_simulation_crashes(
 
 
 def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
-    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = tmp_path / "run"
     killed(long, run, monkeypatch, KILL_AFTER_SLICE=2)
@@ -247,17 +261,17 @@ def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
     content = bytearray(state.read_bytes())
     content[len(content) // 2] ^= 0xFF
     state.write_bytes(content)
-    told: list[str] = []
-    resume(run, tell=told.append)
-    assert told[0].startswith(
+    listener = Listener()
+    resume(run, reporter=listener)
+    assert listener.words[0].startswith(
         f"slice {last} is damaged: slices/000{last}/state.xml.gz: expected sha256 "
     )
-    assert told[1] == f"resumes at {(last - 1) * SLICE:g} s, after slice {last - 1}"
+    assert listener.words[1] == f"resumes at {(last - 1) * SLICE:g} s, after slice {last - 1}"
     assert results(run) == whole
 
 
 def test_a_full_disk_ends_in_a_clear_message_and_a_run_that_resumes(
-    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sizes = {name: len(content) for name, content in whole.items() if "part" in name}
     assert sizes["trajectories/part-0001.parquet"] < sizes["trajectories/part-0002.parquet"]
@@ -272,7 +286,7 @@ def test_a_full_disk_ends_in_a_clear_message_and_a_run_that_resumes(
 
 
 def test_too_little_memory_is_named_with_what_to_do_and_the_run_resumes(
-    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The simulation gets 20 MB, less than SUMO needs; with glibc's allocator it says so."""
     run = tmp_path / "run"
@@ -285,7 +299,7 @@ def test_too_little_memory_is_named_with_what_to_do_and_the_run_resumes(
 
 @pytest.mark.parametrize("change", [1, 5, 9])
 def test_killed_while_it_is_resumed_a_run_still_ends_with_the_same_bytes(
-    long: PreparedRun,
+    long: SumoPreparedRun,
     whole: dict[str, bytes],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -321,7 +335,7 @@ def test_a_disk_without_room_for_another_slice_stops_the_run_before_anything_is_
 
 
 def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
-    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = tmp_path / "run"
     killed(long, run, monkeypatch, KILL_AT=9)
@@ -341,7 +355,7 @@ def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
 
 
 def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_starts(
-    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     expected = forecast.forecast(long.plan, long.sumo_files, every=None)
     monkeypatch.setattr(
@@ -352,7 +366,7 @@ def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_starts(
     assert not (tmp_path / "run").exists()
 
 
-def test_the_forecast_holds_for_a_run_like_this(long: PreparedRun, tmp_path: Path) -> None:
+def test_the_forecast_holds_for_a_run_like_this(long: SumoPreparedRun, tmp_path: Path) -> None:
     expected = forecast.forecast(long.plan, long.sumo_files, every=None)
     result = run_prepared(long, tmp_path / "run")
     held = max(one["memory_mb"] for one in result.summary["slices"]["done"])
@@ -365,7 +379,7 @@ def test_the_forecast_holds_for_a_run_like_this(long: PreparedRun, tmp_path: Pat
 
 
 def test_watching_goes_on_across_slices_and_changes_nothing(
-    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path
+    long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path
 ) -> None:
     live = Live(Pace())
     times: list[float] = []
@@ -384,7 +398,7 @@ def test_watching_goes_on_across_slices_and_changes_nothing(
 
 
 def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
-    long: PreparedRun, tmp_path: Path
+    long: SumoPreparedRun, tmp_path: Path
 ) -> None:
     live = Live(Pace())
 
@@ -393,7 +407,7 @@ def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
             live.command(Command("stop"))
 
     live.command(Command("speed", 100.0))
-    result = run_prepared(long, tmp_path / "run", live=live, progress=stop)
+    result = run_prepared(long, tmp_path / "run", live=live, reporter=EachProgress(stop))
     assert result.status == "completed"
     assert result.summary["stopped"]
     end = result.summary["sim_seconds"]
@@ -404,7 +418,7 @@ def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
 
 
 def test_whoever_waits_for_room_at_a_boundary_is_not_lost(
-    long: PreparedRun, tmp_path: Path
+    long: SumoPreparedRun, tmp_path: Path
 ) -> None:
     """The number of vehicles in the queue is more than can start before the boundary."""
     cars = "".join(
@@ -425,7 +439,7 @@ def test_whoever_waits_for_room_at_a_boundary_is_not_lost(
 
 
 def test_whoever_does_not_come_back_with_a_saved_state_is_told(
-    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """SUMO is made to forget a car; the run is resumed in a worker that is told so."""
     run = tmp_path / "run"
@@ -445,8 +459,53 @@ def test_whoever_does_not_come_back_with_a_saved_state_is_told(
 
 @pytest.mark.skipif(fast_allocator() is None, reason="there is no faster allocator here")
 def test_the_allocator_makes_no_difference_to_results(
-    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LD_PRELOAD", "")
     run_prepared(long, tmp_path / "run")
     assert results(tmp_path / "run") == whole
+
+
+def test_whatever_of_its_start_is_changed_deleted_or_added_an_interrupted_run_is_not_resumed(
+    long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=1)
+    started = [*run.glob("sumo/*"), run / layout.PLAN_FILE, run / layout.SETTINGS_FILE]
+    assert {"net.net.xml", "routes.rou.xml", "scenario.sumocfg"} <= {one.name for one in started}
+    for file in started:
+        content = file.read_bytes()
+        for changed in (content[:-2] + b" " + content[-1:], content + b" ", None):
+            file.unlink() if changed is None else file.write_bytes(changed)
+            with pytest.raises(DamagedError, match=re.escape(file.name)):
+                resume(run)
+        file.write_bytes(content)
+    for name in ("closures.add.xml", "stops.add.xml", "behaviour.json"):
+        (run / "sumo" / name).write_text("{}", encoding="utf-8")
+        with pytest.raises(DamagedError, match=name):
+            resume(run)
+        (run / "sumo" / name).unlink()
+    assert resume(run).status == "completed"
+
+
+@pytest.mark.parametrize("stored", ["command", "name"])
+def test_code_that_only_the_folder_names_is_not_executed(
+    long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stored: str
+) -> None:
+    """Not even where whoever wrote it has written the checksums, too."""
+    run, mark = tmp_path / "run", tmp_path / "executed"
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=1)
+    source = f"from pathlib import Path\nPath({str(mark)!r}).touch()\nModel = 1\n"
+    (tmp_path / "model.py").write_text(source, encoding="utf-8")
+    door = (
+        {"command": f"touch {mark}"}
+        if stored == "command"
+        else {"name": f"{tmp_path}/model.py:Model"}
+    )
+    (run / "sumo" / "behaviour.json").write_text(json.dumps(door), encoding="utf-8")
+    seal_start(run)
+    with pytest.raises(InputError, match="name it again"):
+        resume(run)
+    with pytest.raises(InputError, match="not what drives this run"):
+        resume(run, behaviour=BehaviourDoor(name="idm"))
+    assert not mark.exists()

@@ -18,7 +18,6 @@ from odscen.convert.building.network import build_network
 from odscen.figures.measures.summary import actors_from_json
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.query import node_id
-from odscen.maps.asset_catalogue import shipped_assets
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.records.run_plan import Plan
@@ -28,6 +27,7 @@ from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.edits.actor_edits import add_actor
 from odscen.scenario.sampling.sampler import sample_scenario
+from odscen.simulators.assets import shipped_assets
 from odscen.sumo.realize.sumo_map import SumoMap, pos_per_metre
 from odscen.sumo.realize.usable import usable_places
 from odscen.sumo.runner.prepare import prepare

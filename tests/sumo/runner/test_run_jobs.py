@@ -1,10 +1,7 @@
 from __future__ import annotations
 
-import _thread
 import json
-import signal
 import subprocess
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,16 +9,17 @@ from typing import TYPE_CHECKING
 import polars as pl
 import pytest
 
-from odscen.base.errors import InputError, WorkspaceError
 from odscen.figures.judging.expectations import parse_expectation
 from odscen.figures.measures.summary import actors_from_json
 from odscen.records.run_events import EventKind, events_from_json
 from odscen.runs.run_settings import RunSettings
-from odscen.sumo.runner.run_jobs import PreparedRun, RunJob, run_many, run_prepared
+from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.run_jobs import run_prepared
+from tests.reporters import EachProgress, Listener
 from tests.sumo.conftest import BIN, Prepare
 
 if TYPE_CHECKING:
-    from odscen.sumo.worker.protocol import Progress
+    from odscen.runs.reporter import Progress
 
 SAME_EVERYWHERE = (
     "trajectories.parquet",
@@ -134,7 +132,7 @@ def test_a_network_that_sumo_cannot_read_or_crashes_on_is_a_failed_run(
     good = prepare()
     bad_net = tmp_path / "bad.net.xml"
     bad_net.write_text(net)
-    bad = PreparedRun(good.plan, good.sumo_files, bad_net)
+    bad = SumoPreparedRun(plan=good.plan, sumo_files=good.sumo_files, net=bad_net)
     result = run_prepared(bad, tmp_path / "run")
     assert result.status == "failed"
     assert reason in result.summary["error"]
@@ -156,13 +154,14 @@ def test_an_interrupted_run_leaves_no_folder(prepare: Prepare, tmp_path: Path) -
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_prepared(prepare(), tmp_path / "runs" / "run", progress=interrupt)
+        run_prepared(prepare(), tmp_path / "runs" / "run", reporter=EachProgress(interrupt))
     assert list((tmp_path / "runs").iterdir()) == []
 
 
 def test_progress_is_told_and_never_runs_backwards(prepare: Prepare, tmp_path: Path) -> None:
-    seen: list[Progress] = []
-    run_prepared(prepare(), tmp_path / "run", progress=seen.append)
+    listener = Listener()
+    run_prepared(prepare(), tmp_path / "run", reporter=listener)
+    seen = listener.progress
     assert seen
     assert [p.time for p in seen] == sorted(p.time for p in seen)
     assert all(0 <= p.share <= 1 and p.planned == 5 for p in seen)
@@ -174,76 +173,6 @@ def test_expectations_are_judged_and_decide_the_exit_code(prepare: Prepare, tmp_
     result = run_prepared(judged, tmp_path / "run")
     assert [v["passed"] for v in result.summary["expectations"]] == [True, False]
     assert result.exit_code == 1
-
-
-def test_several_runs_come_back_in_order_whatever_order_they_end_in(
-    prepare: Prepare, tmp_path: Path
-) -> None:
-    jobs = [
-        RunJob(f"run{i}", lambda cars=4 - i: prepare(cars=cars), tmp_path / f"run{i}")
-        for i in range(3)
-    ]
-    ended: list[str] = []
-    results = run_many(jobs, processes=2, done=lambda job, _result: ended.append(job.name))
-    assert [r.summary["actors"]["planned"] for r in results] == [5, 4, 3]
-    assert sorted(ended) == ["run0", "run1", "run2"]
-    assert [r.folder.name for r in results] == ["run0", "run1", "run2"]
-
-
-def test_a_run_that_cannot_be_prepared_ends_the_others_and_tells_its_reason(
-    prepare: Prepare, tmp_path: Path
-) -> None:
-    def broken() -> PreparedRun:
-        raise WorkspaceError("no such map")
-
-    jobs = [
-        RunJob("broken", broken, tmp_path / "broken"),
-        *(RunJob(f"r{i}", prepare, tmp_path / f"r{i}") for i in range(4)),
-    ]
-    with pytest.raises(WorkspaceError, match="no such map"):
-        run_many(jobs, processes=1)
-    assert not (tmp_path / "r3").exists()
-
-
-def test_a_run_that_cannot_be_prepared_is_left_out_where_somebody_is_told(
-    prepare: Prepare, tmp_path: Path
-) -> None:
-    def broken() -> PreparedRun:
-        raise InputError("no such place")
-
-    jobs = [
-        RunJob("broken", broken, tmp_path / "broken"),
-        RunJob("good", lambda: prepare(cars=2), tmp_path / "good"),
-    ]
-    told: dict[str, str] = {}
-    results = run_many(jobs, refused=lambda job, error: told.update({job.name: str(error)}))
-    assert told == {"broken": "no such place"}
-    assert [result.folder.name for result in results] == ["good"]
-
-
-def test_ctrl_c_ends_the_preparation_of_a_run(
-    prepare: Prepare, tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
-    seen: list[str] = []
-
-    def endless() -> PreparedRun:
-        try:
-            for step in range(6000):
-                time.sleep(0.01)
-                if step == 50:  # when the main thread waits for this one
-                    _thread.interrupt_main()
-            seen.append("prepared")
-        finally:
-            seen.append("ended")
-        return prepare()
-
-    # In the background of a script it would be ignored.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
-    with pytest.raises(KeyboardInterrupt):
-        run_many([RunJob("large", endless, tmp_path / "runs" / "large")])
-    assert seen == ["ended"]
-    assert not (tmp_path / "runs").exists()
 
 
 def test_finish_adds_files_before_the_folder_appears(prepare: Prepare, tmp_path: Path) -> None:

@@ -17,13 +17,13 @@ from tests.sumo.story_case import document, node_at, prepared, read, walk_node_a
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.sumo.runner.run_jobs import PreparedRun
+    from odscen.sumo.runner.run_folder import SumoPreparedRun
 
 TOWN = "town_5x5"
 SLICE, UNTIL = 6.0, 24.0
 
 
-def story() -> PreparedRun:
+def story() -> SumoPreparedRun:
     """At 6 s a child is on the road, a car brakes, another is between two lanes; rules wait."""
     actors: list[dict[str, Any]] = [
         {

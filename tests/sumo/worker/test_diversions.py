@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.records.run_events import Event
-    from odscen.sumo.runner.run_jobs import PreparedRun
+    from odscen.sumo.runner.run_folder import SumoPreparedRun
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def traffic(loaded: LoadedMap, *measures: dict[str, Any], **fields: Any) -> Scen
     )
 
 
-def prepared(workspace: Workspace, one: Scenario, folder: Path, **settings: Any) -> PreparedRun:
+def prepared(workspace: Workspace, one: Scenario, folder: Path, **settings: Any) -> SumoPreparedRun:
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "scenario.json"
     file.write_text(dumps(one), encoding="utf-8")

@@ -11,7 +11,6 @@ from odscen.records.outcomes import StopReason
 from odscen.records.run_events import EventKind, events_from_json
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner.forked_worker import expect_runs
-from odscen.sumo.runner.run_folder import write_run_folder
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.runner.worker_process import run_worker
 from odscen.sumo.worker import jams
@@ -94,7 +93,7 @@ def test_a_light_that_never_turns_green_is_named_with_place_and_time(
 
     text = (tmp_path / "run" / "events.json").read_text()
     (alone := tmp_path / "alone").mkdir()
-    write_run_folder(run, alone)
+    run.write(alone)
     assert run_worker(alone).error is None
     assert (alone / "events.json").read_text() == text
     events = events_from_json(text)

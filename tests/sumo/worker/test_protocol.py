@@ -3,7 +3,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.sumo.worker.protocol import Done, Failed, Message, Progress, decode, encode
+from odscen.runs.reporter import Progress
+from odscen.sumo.worker.protocol import Done, Failed, Message, decode, encode
 
 NUMBERS = st.floats(0, 1e6)
 COUNTS = st.integers(0, 10**6)

@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from odscen.app import editing
 from odscen.maps.store import Workspace
-from odscen.web import active_runs, history
+from odscen.web import active_runs, drafts
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
 from tests.web.conftest import CROSSING, finished, wait_for
@@ -25,7 +26,8 @@ def far(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestC
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("the server has read a document itself")
 
-    monkeypatch.setattr(history, "loads", refuse)
+    for module in (editing, drafts):
+        monkeypatch.setattr(module, "loads", refuse)
     with TestClient(create_app(workspace, hosts=HOSTS, large=1)) as opened:
         yield opened
 

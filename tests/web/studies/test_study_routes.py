@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 from starlette.testclient import TestClient
 
-from odscen.experiments.studies.study_report import study_groups
+from odscen.experiments.study_page import study_groups
 from odscen.maps.store import Workspace
 from tests.web.conftest import wait_for
 

@@ -11,8 +11,7 @@ from starlette.testclient import TestClient
 
 from odscen.app.running.runs import run
 from odscen.app.scenarios import SUFFIX
-from odscen.experiments.sweeps.sweep_estimate import estimate
-from odscen.experiments.sweeps.sweep_folder import SweepSettings, begin_sweep
+from odscen.experiments.sweeps import SweepSettings, begin_sweep, estimate
 from odscen.runs.finished_run import Run
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings

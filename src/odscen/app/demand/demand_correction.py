@@ -40,12 +40,22 @@ def correct_matrix(
 
     Parameters
     ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario; it is not changed.
     trust
-        See :func:`odscen.sumo.calibrate.matrix_correction.corrected`.
+        How much counts are trusted against the matrix; see
+        :func:`odscen.sumo.calibrate.matrix_correction.corrected`.
     rounds
         How often routes are found; without travel times one round is all there is.
     iterated
         Called after each iteration of the assignment.
+
+    Returns
+    -------
+    CorrectedMatrix
+        The scenario with corrected matrices, and how well counts are met before and after.
 
     Raises
     ------

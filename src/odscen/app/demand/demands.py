@@ -48,7 +48,7 @@ MOST_TRIPS = 1e7
 """Of a day, as of a matrix of the document."""
 
 
-def import_table(
+def import_demand(
     workspace: Workspace,
     scenario: Scenario,
     file: Path,
@@ -58,10 +58,16 @@ def import_table(
     day: str | None = None,
     **fields: Any,
 ) -> Scenario:
-    """Read a table into a scenario.
+    """Read a table of demand into a scenario.
 
     Parameters
     ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario; it is not changed.
+    file
+        CSV, with the columns that docs/demand.md names.
     kind
         ``od``, ``inputs``, ``counts``, ``profile`` or ``zones``.
     name
@@ -71,6 +77,11 @@ def import_table(
         Day profile of a matrix without times.
     fields
         Further fields of the part, such as ``mix``.
+
+    Returns
+    -------
+    Scenario
+        With the table in its demand.
 
     Raises
     ------
@@ -97,7 +108,7 @@ def import_text(
 ) -> Scenario:
     """Read the text of a table into a scenario, all of it or nothing.
 
-    Parameters as in :func:`import_table`.
+    Parameters as in :func:`import_demand`.
 
     Raises
     ------
@@ -190,7 +201,30 @@ def choose_routes(workspace: Workspace, scenario: Scenario, **fields: Any) -> Sc
 def add_background(
     workspace: Workspace, scenario: Scenario, *, name: str, **fields: Any
 ) -> Scenario:
-    """Add background traffic; ``fields`` are those of ``Background``, such as ``per_km``."""
+    """Add background traffic: trips between random places of the region.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario; it is not changed.
+    name
+        Of this part of the demand; one of that name is replaced.
+    fields
+        As ``demand.background`` of the document has them: ``trips`` in all or ``per_km`` of lane,
+        ``begin`` and ``end`` (s), ``mix`` and others.
+
+    Returns
+    -------
+    Scenario
+        With the traffic in its demand.
+
+    Raises
+    ------
+    ScenarioError
+        If a field is not possible.
+    """
     graph = map_of(workspace, scenario).sumo.graph
     return edits.set_background(scenario, graph, background=name, **fields)
 
@@ -203,7 +237,35 @@ def whole_day(
     day: str = "weekday",
     seed: int = 0,
 ) -> tuple[Scenario, Load]:
-    """Make 24 hours of traffic on a whole map, from midnight on; see :func:`town_day`."""
+    """Make 24 hours of traffic on a whole map, from midnight on, as much as its junctions carry.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    map_name
+        Its name.
+    trips
+        Of the day; fewer are made where the junctions do not carry them.
+    day
+        Day profile by which they depart.
+    seed
+        Of the scenario.
+
+    Returns
+    -------
+    tuple of Scenario and Load
+        The scenario, and how much it asks of the busiest approach to a junction.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such map.
+    ScenarioError
+        If the map is in several pieces.
+    InputError
+        If there is no such day, or no trips are possible, or so many.
+    """
     loaded = load_map(workspace.map(map_name))
     scenario = edits.new_scenario(loaded.sumo.graph, name=f"{day} on {map_name}", seed=seed)
     return with_whole_day(loaded, scenario, trips=trips, day=day)
@@ -241,32 +303,39 @@ def with_whole_day(
     return scenario, load
 
 
-def fit(workspace: Workspace, what: Path) -> CountFits:
+def fit_counts(workspace: Workspace, path: Path) -> CountFits:
     """Hold traffic against the counts of its scenario: as planned, or as a run had it.
 
     Parameters
     ----------
-    what
+    workspace
+        Has the map.
+    path
         A scenario file, or the folder of a run.
+
+    Returns
+    -------
+    CountFits
+        Each count with the vehicles that pass and its GEH.
 
     Raises
     ------
     InputError
         If the scenario has no counts, or the run no trajectories.
     """
-    folder = what if what.is_dir() else None
-    scenario = read_scenario(what if folder is None else folder / SCENARIO_FILE)
+    folder = path if path.is_dir() else None
+    scenario = read_scenario(path if folder is None else folder / SCENARIO_FILE)
     if not scenario.demand.counts:
         raise InputError(
             "the scenario has no counts; import some with: odscen demand import --counts",
-            file=str(what),
+            file=str(path),
         )
     loaded = map_of(workspace, scenario)
     if folder is None:
         return planned_fit(scenario, loaded.sumo)
     trajectories = trajectory_files(folder)
     if not trajectories:
-        raise InputError("the run has no trajectories to count in", file=str(what))
+        raise InputError("the run has no trajectories to count in", file=str(path))
     return run_fit(scenario, loaded.sumo, pl.scan_parquet(trajectories))
 
 

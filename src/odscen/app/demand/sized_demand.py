@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.app.maps import map_of
-from odscen.app.running.runs import check_run, prepare_run
+from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.base.errors import InputError, NotFoundError
 from odscen.figures.measures.usability import UsabilityLevel
 from odscen.runs.recording import Recording
+from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.demand.scaled_demand import (
     excerpt,
@@ -31,7 +32,6 @@ from odscen.scenario.demand.scaled_demand import (
 )
 from odscen.scenario.document.scenario_document import Background
 from odscen.sumo.calibrate.town_day import carried_background
-from odscen.sumo.runner.run_jobs import run_prepared
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from odscen.maps.store import Workspace
     from odscen.records.run_plan import Plan
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.worker.protocol import OnProgress, Progress
 
 MARGIN = 1.1
 """Times the promised demand that is tried."""
@@ -232,7 +232,8 @@ class _Trials:
             )
             prepared = prepare_run(checked)
             try:
-                run = run_prepared(prepared, checked.folder, progress=_limit(prepared.plan))
+                limit = _BacklogLimit(prepared.plan)
+                run = carry_out(checked, prepared, reporter=limit, reports=False)
                 level, headline = (run.usability[key] for key in ("level", "headline"))
                 # Whether it was noticed in time is a matter of the machine, the words are not.
                 waiting = _most_waiting(run, prepared.plan.until)
@@ -257,16 +258,16 @@ class _BacklogError(Exception):
     """A trial has so many road users who cannot depart that it need not be run to its end."""
 
 
-def _limit(plan: Plan) -> OnProgress:
-    """Stop a run with a backlog above :data:`BACKLOG`."""
-    departs = np.sort([actor.depart for actor in plan.actors])
+class _BacklogLimit(Reporter):
+    """Stops a run with a backlog above :data:`BACKLOG`."""
 
-    def stop(progress: Progress) -> None:
-        due = int(np.searchsorted(departs, progress.time))
-        if due - progress.departed > BACKLOG * len(departs):
+    def __init__(self, plan: Plan) -> None:
+        self._departs = np.sort([actor.depart for actor in plan.actors])
+
+    def advanced(self, progress: Progress) -> None:
+        due = int(np.searchsorted(self._departs, progress.time))
+        if due - progress.departed > BACKLOG * len(self._departs):
             raise _BacklogError
-
-    return stop
 
 
 def _most_waiting(run: Run, until: float) -> int:

@@ -32,7 +32,7 @@ WITHIN = 30.0
 """Metres that a stop of a feed may be from its lane."""
 
 
-def import_feed(
+def import_transit(
     workspace: Workspace,
     scenario: Scenario,
     file: Path,
@@ -45,10 +45,23 @@ def import_feed(
 
     Parameters
     ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario; it is not changed.
     file
-        A zip archive, or the folder of its tables.
-    routes, within
-        As of :func:`odscen.formats.gtfs_lines.place_feed`.
+        A GTFS feed: a zip archive, or the folder of its tables.
+    day
+        Day of service; needed where the feed has a calendar.
+    routes
+        Names of routes that are wanted; all of them if empty.
+    within
+        Metres that a stop may be from its lane.
+
+    Returns
+    -------
+    tuple of Scenario and PlacedFeed
+        The scenario, and what of the feed was left out, and why.
 
     Raises
     ------

@@ -9,29 +9,65 @@
 
 from __future__ import annotations
 
+import threading
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from odscen.app.running.runs import check_given, prepare_run, report_run
+from odscen.app.running.interruptible import Interruptible
+from odscen.app.running.runs import carry_out, check_given, prepare_run
 from odscen.app.scenarios import scenario_name
+from odscen.base.errors import InputError
+from odscen.runs.reporter import SILENT, Progress, Reporter
 from odscen.runs.run_settings import AS_DESIGNED
-from odscen.sumo.runner.run_jobs import RunJob
-from odscen.sumo.runner.run_jobs import run_many as run_jobs
+from odscen.sumo.runner.forked_worker import expect_runs
+from odscen.sumo.runner.run_folder import SumoPreparedRun
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
+    from concurrent.futures import Future
     from pathlib import Path
 
-    from odscen.app.maps import LoadedMap
     from odscen.app.running.runs import CheckedRun
-    from odscen.base.errors import InputError
     from odscen.maps.store import Workspace
-    from odscen.records.assignment_steps import AssignmentStep
     from odscen.runs.finished_run import Run
     from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import PreparedRun
-    from odscen.sumo.worker.protocol import Progress
+
+_LISTEN = 0.2
+"""Wall seconds after which a wait looks for Ctrl-C."""
+_GRACE = 2.0
+"""Wall seconds in which a run that is prepared may come to where it is stopped in good order."""
+
+
+class _StoppedError(Exception):
+    """Another run of the same call has failed to start, or the user has interrupted."""
+
+
+class _StoppableReporter(Reporter):
+    """Passes on what is reported of one of several runs, and ends it with the others."""
+
+    def __init__(self, own: Reporter, name: str, stopping: threading.Event) -> None:
+        self._own, self._name, self._stopping = own, name, stopping
+
+    def started(self) -> None:
+        self._own.started()
+
+    def advanced(self, progress: Progress) -> None:
+        if self._stopping.is_set():  # ends the worker process of the run too
+            raise _StoppedError
+        self._own.advanced(progress)
+
+    def said(self, words: str) -> None:
+        named = words.startswith(f"{self._name}: ")
+        self._own.said(words if named else f"{self._name}: {words}")
+
+    def finished(self, run: Run) -> None:
+        self._own.finished(run)
+
+    @property
+    def cancelled(self) -> bool:
+        return self._stopping.is_set() or self._own.cancelled
 
 
 def run_all(
@@ -40,10 +76,8 @@ def run_all(
     processes: int = 1,
     reports: bool = True,
     figures: bool = True,
-    progress: Callable[[RunJob, Progress], None] | None = None,
-    done: Callable[[RunJob, Run], None] | None = None,
-    refused: Callable[[RunJob, InputError], None] | None = None,
-    tell: Callable[[str], None] | None = None,
+    reporter: Reporter = SILENT,
+    refused: Callable[[str, InputError], None] | None = None,
 ) -> tuple[Run, ...]:
     """Prepare and carry out several runs.
 
@@ -55,23 +89,56 @@ def run_all(
         Whether reports are written.
     figures
         Whether figures of runs without a report are computed at once, see :func:`run_many`.
-    progress, done
-        Called from the threads that wait for the runs, ``done`` in the order in which they end.
+    reporter
+        Its :meth:`~odscen.runs.reporter.Reporter.of_run` hears of each run, by its name, from the
+        threads that wait for the runs; ``finished`` in the order in which they end.
     refused
-        Called with a run that cannot be prepared, and why; the others go on. Without it, the first
-        such run ends all.
-    tell
-        Called with what the user should know before a long run, and after each iteration of routes.
+        Called with the name of a run that cannot be prepared, and why; the others go on. Without
+        it, the first such run ends all.
 
     Returns
     -------
     tuple of Run
         In the order of ``runs``, without those refused.
     """
-    jobs = [_job(run, report=reports, figures=figures, tell=tell) for run in runs]
-    return run_jobs(
-        jobs, processes=processes, progress=progress, done=done, refused=refused, tell=tell
-    )
+    stopping, preparing = threading.Event(), Interruptible()
+    expect_runs(len(runs))
+
+    def carry_out_one(run: CheckedRun) -> Run | None:
+        own = _StoppableReporter(reporter.of_run(run.name), run.name, stopping)
+        try:
+            with preparing.computing():
+                prepared = prepare_run(run, reporter=own)
+            if isinstance(prepared, SumoPreparedRun) and prepared.plan.slice_length is not None:
+                own.said(str(prepared.expected))
+            return carry_out(run, prepared, reporter=own, reports=reports, figures=figures)
+        except InputError as error:
+            if refused is None:
+                raise
+            refused(run.name, error)
+            return None
+
+    with ThreadPoolExecutor(max_workers=max(1, processes)) as pool:
+        futures: list[Future[Run | None]] = []
+        try:
+            futures.extend(pool.submit(carry_out_one, run) for run in runs)
+            # Polars has system calls go on after Ctrl-C (pola-rs/polars, issue 21739): a wait
+            # without a timeout would hear of it when it is over.
+            running = set(futures)
+            while running:
+                ended, running = wait(running, timeout=_LISTEN, return_when=FIRST_EXCEPTION)
+                for future in ended:
+                    future.result()
+            results = (future.result() for future in futures)
+            return tuple(run for run in results if run is not None)
+        except BaseException:
+            stopping.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            try:  # runs come to where they stop; what is large and being prepared is broken off
+                wait(futures, timeout=_GRACE)
+            finally:
+                preparing.break_off()
+            raise
 
 
 def run_many(
@@ -84,11 +151,9 @@ def run_many(
     processes: int = 1,
     reports: bool = True,
     figures: bool = True,
-    progress: Callable[[RunJob, Progress], None] | None = None,
-    done: Callable[[RunJob, Run], None] | None = None,
-    tell: Callable[[str], None] | None = None,
+    reporter: Reporter = SILENT,
 ) -> tuple[Run, ...]:
-    """Check scenarios, run them in SUMO, several at a time, and write their reports.
+    """Check scenarios, run them, several at a time, and write their reports.
 
     Parameters
     ----------
@@ -112,10 +177,8 @@ def run_many(
         computed from its records when it is opened: by ``run.summary`` and ``run.figures``,
         ``odscen report``, the page, comparisons. Where something is expected of a run they are
         computed at once.
-    progress, done
-        Called from the threads that wait for the runs, ``done`` in the order in which they end.
-    tell
-        Called with what the user should know before a long run.
+    reporter
+        See :func:`run_all`.
 
     Returns
     -------
@@ -137,35 +200,10 @@ def run_many(
     for scenario in scenarios:
         own = _own_name(scenario_name(scenario), names)
         checked = check_given(workspace, scenario, name=own, out=out, settings=settings)
+        for problem in checked.unsupported:
+            reporter.of_run(own).said(f"{own}: {problem.message}")
         runs += [checked] if seeds is None else [_with_seed(checked, seed) for seed in seeds]
-    return run_all(
-        runs,
-        processes=processes,
-        reports=reports,
-        figures=figures,
-        progress=progress,
-        done=done,
-        tell=tell,
-    )
-
-
-def _job(
-    run: CheckedRun, *, report: bool, figures: bool, tell: Callable[[str], None] | None
-) -> RunJob:
-    kept: list[LoadedMap] = []  # the map may be removed while the run goes on
-
-    def get_ready() -> PreparedRun:
-        kept.append(run.map)
-        return prepare_run(run, iterated=None if tell is None else iterated)
-
-    def iterated(step: AssignmentStep) -> None:
-        if tell is not None:
-            tell(f"{run.name}: {step.words}")
-
-    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        report_run(folder, summary, kept.pop())
-
-    return RunJob(run.name, get_ready, run.folder, finish if report else None, figures)
+    return run_all(runs, processes=processes, reports=reports, figures=figures, reporter=reporter)
 
 
 def _with_seed(run: CheckedRun, seed: int) -> CheckedRun:

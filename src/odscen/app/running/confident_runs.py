@@ -22,14 +22,16 @@ from odscen.app.scenarios import scenario_name
 from odscen.base.errors import InputError, NotFoundError
 from odscen.figures.measures.registry import names_of, run_figure
 from odscen.records.outcomes import RunStatus
+from odscen.runs.reporter import SILENT
 from odscen.runs.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Reporter
     from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.scenario_document import Scenario
 
@@ -160,7 +162,7 @@ def run_until_confident(
     out: Path | None = None,
     processes: int = 1,
     reports: bool = True,
-    tell: Callable[[str], None] | None = None,
+    reporter: Reporter = SILENT,
 ) -> tuple[tuple[Run, ...], Confidence]:
     """Run a scenario with more and more seeds until the interval of a figure is narrow enough.
 
@@ -176,8 +178,8 @@ def run_until_confident(
         Seeds in all, at most.
     reports
         Whether each run gets its report.
-    tell
-        Called with how far it is, after each round.
+    reporter
+        Hears of each run, and after each round how far it is.
 
     Returns
     -------
@@ -196,7 +198,7 @@ def run_until_confident(
     while True:
         done += run_many(
             workspace, [scenario], settings=settings, seeds=batch, out=out, processes=processes,
-            reports=reports, figures=reports, tell=tell,
+            reports=reports, figures=reports, reporter=reporter,
         )  # fmt: skip
         found = confidence_of(
             [_value(run, figure) for run in done],
@@ -204,8 +206,7 @@ def run_until_confident(
             figure=figure,
             scenario=scenario_name(scenario),
         )
-        if tell is not None:
-            tell(f"{found.scenario}: {found.words}")
+        reporter.said(f"{found.scenario}: {found.words}")
         missing = min(found.needed or most, most) - len(done)
         if found.enough or len(done) >= most or not any(map(_completed, done)):
             return tuple(done), found

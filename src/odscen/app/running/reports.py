@@ -32,6 +32,7 @@ from odscen.runs import layout
 from odscen.runs.deferred_figures import whole_summary
 from odscen.runs.finished_run import Run
 from odscen.runs.measured import read_parking, read_run_data
+from odscen.runs.new_run import run_lock
 from odscen.runs.recorded import (
     read_conflicts,
     read_light_states,
@@ -41,7 +42,6 @@ from odscen.runs.recorded import (
 from odscen.runs.run_status import unfinished
 from odscen.runs.run_sums import damaged_in, seal_again
 from odscen.sumo.outputs.corridor_traces import corridor_traces
-from odscen.sumo.runner.long_runs import run_lock
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -9,16 +9,18 @@ from odscen.app.maps import load_map
 from odscen.app.removal import removed_map
 from odscen.app.running.reports import write_report
 from odscen.base.errors import InputError
+from odscen.runs.reporter import SILENT
 from odscen.sumo.runner import long_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
 
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Reporter
     from odscen.sumo.runner.worker_process import Companion
-    from odscen.sumo.worker.protocol import OnProgress
 
 
 def resume(
@@ -26,9 +28,9 @@ def resume(
     run: Path,
     *,
     time_limit: float | None = None,
-    progress: OnProgress | None = None,
-    tell: Callable[[str], None] | None = None,
+    reporter: Reporter = SILENT,
     live: Companion | None = None,
+    behaviour: BehaviourDoor | None = None,
 ) -> Run:
     """Resume an interrupted run and write its report.
 
@@ -40,12 +42,12 @@ def resume(
         Its folder, or its name in the workspace.
     time_limit
         Wall seconds after which it is interrupted again.
-    progress
-        Called in this thread, a few times a second.
-    tell
-        Called with where it goes on, and what is damaged.
+    reporter
+        Hears where it goes on, what is damaged, and how far it is, in this thread.
     live
         Makes it a run that can be watched and steered.
+    behaviour
+        What drives instead of SUMO, named again where it is a program, a module or a file.
 
     Returns
     -------
@@ -58,6 +60,8 @@ def resume(
         If there is no such run.
     ConflictError
         If it has ended, or is going on.
+    InputError
+        If it is driven by code that only its folder names.
     """
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
@@ -68,6 +72,13 @@ def resume(
         write_report(folder, summary, loaded=None if entry is None else load_map(entry))
 
     folder = run if run.is_dir() else workspace.runs / run
-    return long_runs.resume(
-        folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish, live=live
+    result = long_runs.resume(
+        folder,
+        reporter=reporter,
+        time_limit=time_limit,
+        finish=finish,
+        live=live,
+        behaviour=behaviour,
     )
+    reporter.finished(result)
+    return result

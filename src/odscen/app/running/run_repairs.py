@@ -25,9 +25,10 @@ from odscen.runs import layout
 from odscen.runs.checkpoint import last_number, read_checkpoint
 from odscen.runs.ended import read_summary
 from odscen.runs.measured import read_run_data, write_figures
+from odscen.runs.new_run import run_lock
 from odscen.runs.run_status import read_status, unfinished, write_status
 from odscen.runs.run_sums import damaged_in, seal_again, seal_run, seal_start, without_sums
-from odscen.sumo.runner.long_runs import about, run_lock
+from odscen.sumo.runner.long_runs import about
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

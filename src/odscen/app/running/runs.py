@@ -1,6 +1,6 @@
 """A scenario is run: checked, prepared, simulated, reported. The only place that does it.
 
-The command line, the page, suites of tests, and CARLA beside or instead of SUMO all go this way:
+The command line, the page and suites of tests all go this way, with whichever simulator:
 :func:`check_run`, then :func:`prepare_run`, then :func:`carry_out`; or :func:`run`, which does all
 of it, and :mod:`~odscen.app.running.batches` for several. What a run is to be like is one
 :class:`~odscen.runs.run_settings.RunSettings` from here down to SUMO's process.
@@ -8,35 +8,42 @@ of it, and :mod:`~odscen.app.running.batches` for several. What a run is to be l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario, scenario_name
-from odscen.base.errors import in_file
+from odscen.base.errors import InputError, OdscenError, in_file
 from odscen.figures.judging.criteria import criteria_problems
+from odscen.runs.new_run import SimulationOutcome, claimed_folder, run_in_new_folder
+from odscen.runs.reporter import SILENT, Reporter
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.problems import refuse_errors
-from odscen.sumo.runner.assignment import prepare_assigned
+from odscen.simulators.base import Simulator
+from odscen.simulators.installed import open_simulator
+from odscen.sumo.realize.run_map import RunMap
+from odscen.sumo.runner.run_folder import SumoPreparedRun
 from odscen.sumo.runner.run_jobs import run_prepared
-from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour
+from odscen.sumo.runner.sumo_simulator import SumoSimulator
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Iterator, Mapping
 
     from odscen.app.maps import LoadedMap
-    from odscen.maps.asset_catalogue import Assets
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
-    from odscen.records.assignment_steps import AssignmentStep
     from odscen.runs.finished_run import Run
+    from odscen.runs.new_run import Finish, PreparedRun
     from odscen.runs.run_settings import RunSettings
+    from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import PreparedRun
-    from odscen.sumo.runner.worker_process import Companion, Ended
-    from odscen.sumo.worker.protocol import OnProgress
+    from odscen.simulators.assets import Assets
+    from odscen.simulators.base import AnySimulator
+    from odscen.sumo.runner.worker_process import Companion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +66,10 @@ class CheckedRun:
         The run's folder, made by :func:`carry_out`.
     settings
         How it is run.
+    simulator
+        What plays it.
+    unsupported
+        What the simulator does not do of it; no error is among them.
     """
 
     name: str
@@ -67,11 +78,18 @@ class CheckedRun:
     assets: Assets
     folder: Path
     settings: RunSettings
+    simulator: AnySimulator
+    unsupported: tuple[Problem, ...] = ()
 
     @property
     def map(self) -> LoadedMap:
         """The map, loaded when it is needed."""
         return load_map(self.entry)
+
+    @property
+    def run_map(self) -> RunMap:
+        """The map as the simulator is given it."""
+        return run_map(self.entry, self.assets)
 
 
 def check_run(
@@ -82,6 +100,7 @@ def check_run(
     out: Path | None = None,
     settings: RunSettings = AS_DESIGNED,
     entry: MapEntry | None = None,
+    simulator: AnySimulator | None = None,
 ) -> CheckedRun:
     """Check a scenario that is to be run.
 
@@ -95,6 +114,8 @@ def check_run(
         How it is run.
     entry
         The map; the one of the workspace that the scenario names if not given.
+    simulator
+        What plays it, instead of the one that the settings name.
 
     Raises
     ------
@@ -103,17 +124,51 @@ def check_run(
     NotFoundError
         If the workspace does not have its map.
     InputError
-        If the behaviour model of the settings cannot be made.
+        If there is no such simulator, or it cannot follow the settings.
     """
-    if settings.behaviour is not None:
-        open_behaviour(settings.behaviour, 0)  # what cannot be made is refused before the run
+    if simulator is None:
+        simulator = open_simulator(settings.simulator, settings.simulator_options)
+    simulator.check_settings(settings)
     if entry is None:
         entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
     loaded, assets = load_map(entry), workspace.assets()
     parking = loaded.sumo.parking
     found = check(scenario, loaded.sumo.graph, assets, loaded.lights, parking=parking)
     refuse_errors((*found, *criteria_problems(scenario)))
-    return CheckedRun(name, scenario, entry, assets, (out or workspace.runs) / name, settings)
+    unsupported = unsupported_parts(simulator, scenario, run_map(entry, assets))
+    refuse_errors(unsupported)
+    folder = (out or workspace.runs) / name
+    return CheckedRun(name, scenario, entry, assets, folder, settings, simulator, unsupported)
+
+
+def run_map(entry: MapEntry, assets: Assets) -> RunMap:
+    """A map of the catalogue as simulators are given it."""
+    return RunMap(entry.name, entry.sha256, load_map(entry).sumo, assets, entry.checked)
+
+
+def unsupported_parts(
+    simulator: AnySimulator, scenario: Scenario, on: RunMap
+) -> tuple[Problem, ...]:
+    """What a simulator does not do of a scenario.
+
+    Raises
+    ------
+    InputError
+        If it breaks while it says so.
+    """
+    with _guarded(simulator):
+        return tuple(simulator.unsupported(scenario, on))
+
+
+@contextmanager
+def _guarded(simulator: AnySimulator) -> Iterator[None]:
+    """Name the simulator in what its code raises."""
+    try:
+        yield
+    except OdscenError:
+        raise
+    except Exception as error:  # whatever code from outside may raise
+        raise InputError(f"it failed: {error!r}", element=simulator.label) from error
 
 
 def check_file(
@@ -123,6 +178,7 @@ def check_file(
     name: str | None = None,
     out: Path | None = None,
     settings: RunSettings = AS_DESIGNED,
+    simulator: AnySimulator | None = None,
 ) -> CheckedRun:
     """Read and check a scenario that is to be run; parameters as of :func:`check_run`.
 
@@ -141,20 +197,21 @@ def check_file(
     scenario, name = read_scenario(path), name or scenario_name(path)
     entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
     with in_file(str(path)):
-        return check_run(workspace, scenario, name=name, out=out, settings=settings, entry=entry)
+        return check_run(
+            workspace, scenario, name=name, out=out, settings=settings, entry=entry,
+            simulator=simulator,
+        )  # fmt: skip
 
 
-def prepare_run(
-    run: CheckedRun, *, iterated: Callable[[AssignmentStep], None] | None = None
-) -> PreparedRun:
+def prepare_run(run: CheckedRun, *, reporter: Reporter = SILENT) -> PreparedRun:
     """Make everything that a run is made of; nothing is written yet.
 
     Where the scenario wants routes by travel time, they are found by runs of their own first.
 
     Parameters
     ----------
-    iterated
-        Called after each of these runs.
+    reporter
+        Hears of each of these runs.
 
     Raises
     ------
@@ -162,10 +219,20 @@ def prepare_run(
         With every actor and flow whose spawn or goal is not usable.
     SimulationError
         If a run that routes are found by fails.
+    InputError
+        If a simulator from outside breaks.
     """
-    net, sumo_map = run.entry.checked("net"), run.map.sumo
-    return prepare_assigned(
-        run.scenario, sumo_map, net, run.assets, settings=run.settings, on_step=iterated
+    with _guarded(run.simulator):
+        prepared: PreparedRun = run.simulator.prepare(
+            run.scenario, run.run_map, run.settings, reporter
+        )
+    if isinstance(prepared, SumoPreparedRun):
+        return prepared
+    lines = tuple(problem.message for problem in run.unsupported)
+    return replace(
+        prepared,
+        problems=(*prepared.problems, *lines),
+        about={"driven_by": run.simulator.label, **prepared.about},
     )
 
 
@@ -173,10 +240,10 @@ def carry_out(
     run: CheckedRun,
     prepared: PreparedRun,
     *,
-    progress: OnProgress | None = None,
-    ended: Callable[[Path], None] | None = None,
+    reporter: Reporter = SILENT,
     live: Companion | None = None,
-    simulate: Callable[[Path], Ended] | None = None,
+    reports: bool = True,
+    figures: bool = True,
 ) -> Run:
     """Simulate what has been prepared, and write its results and its report.
 
@@ -184,20 +251,18 @@ def carry_out(
     ----------
     prepared
         From :func:`prepare_run`.
-    progress
-        Called in this thread, a few times a second.
-    ended
-        Called with the folder when the simulation has completed, before the report is written: the
-        place for further files.
     live
-        Makes it a run that can be watched and steered, or that goes in step with another simulator.
-    simulate
-        Runs what is in a folder and writes the results there, instead of SUMO's worker.
+        Makes it a run that can be watched and steered; of SUMO only.
+    reports
+        Whether it gets its report.
+    figures
+        Whether figures of a run without a report are computed at once, see
+        :func:`odscen.app.running.batches.run_many`.
 
     Returns
     -------
     Run
-        Of a run that has completed or failed: what goes wrong inside SUMO does not raise.
+        Of a run that has completed or failed: what goes wrong inside a simulator does not raise.
 
     Raises
     ------
@@ -207,15 +272,47 @@ def carry_out(
         If a run that has not ended is in the folder.
     """
     loaded = run.map  # the map may be removed while the run goes on
+    finish: Finish | None = None
+    if reports:
 
-    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        if ended is not None:
-            ended(folder)
-        report_run(folder, summary, loaded)
+        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+            # A run without a report does not wait for its imports.
+            from odscen.app.running.reports import write_report
 
-    return run_prepared(
-        prepared, run.folder, progress=progress, finish=finish, live=live, simulate=simulate
-    )
+            write_report(folder, summary, loaded=loaded)
+
+    if type(run.simulator) is SumoSimulator and isinstance(prepared, SumoPreparedRun):
+        # SUMO's runs can go in slices, be watched and be resumed.
+        result = run_prepared(
+            prepared, run.folder, reporter=reporter, finish=finish, live=live, figures=figures
+        )
+    else:
+        with claimed_folder(run.folder):
+            result = run_in_new_folder(
+                prepared,
+                run.folder,
+                lambda folder: _simulate(run.simulator, prepared, folder, reporter),
+                finish=finish,
+                figures=figures,
+            )
+    reporter.finished(result)
+    return result
+
+
+def _simulate(
+    simulator: AnySimulator, prepared: PreparedRun, folder: Path, reporter: Reporter
+) -> SimulationOutcome:
+    """Let a simulator run; code from outside that breaks is a failed run."""
+    begin = time.perf_counter()
+    reporter.started()
+    try:
+        outcome: SimulationOutcome = simulator.run(prepared, folder, reporter)
+    except OdscenError:
+        raise
+    except Exception as error:
+        seconds = time.perf_counter() - begin
+        return SimulationOutcome(None, None, seconds, error=f"{simulator.label}: {error!r}")
+    return outcome
 
 
 def check_given(
@@ -225,12 +322,17 @@ def check_given(
     name: str | None = None,
     out: Path | None = None,
     settings: RunSettings = AS_DESIGNED,
+    simulator: AnySimulator | None = None,
 ) -> CheckedRun:
     """Check a scenario, or its file; parameters and errors of :func:`check_run`, `check_file`."""
-    if isinstance(scenario, Path):
-        return check_file(workspace, scenario, name=name, out=out, settings=settings)
     name = name or scenario_name(scenario)
-    return check_run(workspace, scenario, name=name, out=out, settings=settings)
+    if isinstance(scenario, Path):
+        return check_file(
+            workspace, scenario, name=name, out=out, settings=settings, simulator=simulator
+        )
+    return check_run(
+        workspace, scenario, name=name, out=out, settings=settings, simulator=simulator
+    )
 
 
 def run(
@@ -238,11 +340,12 @@ def run(
     scenario: Scenario | Path,
     *,
     settings: RunSettings = AS_DESIGNED,
+    simulator: str | AnySimulator | None = None,
     name: str | None = None,
     out: Path | None = None,
-    progress: OnProgress | None = None,
+    reporter: Reporter = SILENT,
 ) -> Run:
-    """Check a scenario, run it in SUMO in a process of its own, and write its report.
+    """Check a scenario, run it, and write its report; SUMO has a process of its own.
 
     Parameters
     ----------
@@ -252,12 +355,16 @@ def run(
         The scenario, or its file.
     settings
         How it is run.
+    simulator
+        What plays it: a name of those there are, or a
+        :class:`~odscen.simulators.base.Simulator`. The one of the settings if not given: SUMO,
+        unless they say otherwise.
     name
         Of the run's folder; the scenario's if not given. A finished run of that name is replaced.
     out
         Folder that gets the run's folder; the workspace's ``runs`` if not given.
-    progress
-        Called in this thread, a few times a second.
+    reporter
+        Hears how far it is, in this thread.
 
     Returns
     -------
@@ -269,7 +376,7 @@ def run(
     ScenarioError
         If the scenario has errors.
     InputError
-        If the file cannot be read.
+        If the file cannot be read, or there is no such simulator.
     NotFoundError
         If the workspace does not have its map.
     ConflictError
@@ -277,12 +384,12 @@ def run(
     WorkspaceError
         If the folder cannot be written, or the disk cannot hold the run.
     """
-    checked = check_given(workspace, scenario, name=name, out=out, settings=settings)
-    return carry_out(checked, prepare_run(checked), progress=progress)
-
-
-def report_run(folder: Path, summary: Mapping[str, Any], loaded: LoadedMap) -> None:
-    """Write the report; a run without one does not wait for its imports."""
-    from odscen.app.running.reports import write_report
-
-    write_report(folder, summary, loaded=loaded)
+    made = simulator if isinstance(simulator, Simulator) else None
+    if isinstance(simulator, str):
+        settings = replace(settings, simulator=simulator)
+    checked = check_given(
+        workspace, scenario, name=name, out=out, settings=settings, simulator=made
+    )
+    for problem in checked.unsupported:
+        reporter.said(problem.message)
+    return carry_out(checked, prepare_run(checked, reporter=reporter), reporter=reporter)

@@ -148,6 +148,10 @@ def coordinate_signals(
 
     Parameters
     ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file; it is not changed.
     junctions
         Lights in driving order.
     along
@@ -158,6 +162,11 @@ def coordinate_signals(
         Progression speed, m/s; the speed limits if not given.
     cycle
         Seconds; the longest of the lights if not given.
+
+    Returns
+    -------
+    Coordination
+        The scenario with the new times, and the bands in which one drives without a stop.
 
     Raises
     ------

@@ -110,6 +110,10 @@ def time_signals(
 
     Parameters
     ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file; it is not changed.
     junctions
         Lights; all if empty.
     begin, end
@@ -118,6 +122,11 @@ def time_signals(
         Base saturation flow: passenger cars an hour and lane that drive straight on.
     bounds
         Shortest and longest cycle, seconds.
+
+    Returns
+    -------
+    TimedSignals
+        The scenario with the new times, and each light before and after.
 
     Raises
     ------

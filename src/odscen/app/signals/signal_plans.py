@@ -25,15 +25,24 @@ if TYPE_CHECKING:
 _DAY = 86_400.0
 
 
-def lights_of(
+def signal_programs(
     workspace: Workspace, scenario: Scenario | Path, *, whole_day: bool = False
 ) -> tuple[LightProgram, ...]:
-    """What each traffic light shows in a scenario.
+    """Tell what each traffic light shows in a scenario.
 
     Parameters
     ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file; it is not changed.
     whole_day
         Show all plans of the day, also those that do not begin while the scenario lasts.
+
+    Returns
+    -------
+    tuple of LightProgram
+        In the order of the map: each light with its plans, and their phases (s).
 
     Raises
     ------
@@ -52,7 +61,19 @@ def lights_of(
 
 
 def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:
-    """SUMO's additional file with the programs that a scenario gives to lights.
+    """Write the programs that a scenario gives to lights, as SUMO's additional file.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file; it is not changed.
+
+    Returns
+    -------
+    str
+        The XML.
 
     Raises
     ------
@@ -92,12 +113,19 @@ def import_signals(
 
     Parameters
     ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file; it is not changed.
+    file
+        Additional file of SUMO with ``tlLogic``.
     junctions
         Lights, by OpenDRIVE junction or SUMO's id; all that the file and the map have if empty.
 
     Returns
     -------
-    The scenario, and in words what was taken otherwise than the file says it.
+    tuple of Scenario and tuple of str
+        The scenario, and in words what was taken otherwise than the file says it.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
-from odscen.app.signals.signal_plans import lights_of
+from odscen.app.signals.signal_plans import signal_programs
 from odscen.base.errors import InputError, NotFoundError
 from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.sumo.realize.lights.actuated.detector_places import lane_lines
@@ -95,7 +95,7 @@ def signal_sheets(
 
     scenario = given_scenario(scenario)
     drawing = map_of(workspace, scenario).drawing
-    lights = chosen_lights(lights_of(workspace, scenario, whole_day=True), junctions)
+    lights = chosen_lights(signal_programs(workspace, scenario, whole_day=True), junctions)
     if not lights:
         raise InputError(f"map {scenario.map.name!r} has no traffic lights")
     found: dict[str, str] = {}

@@ -3,33 +3,163 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
 
 from odscen.app.running.runs import carry_out, check_file, prepare_run
+from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.mirror.cosim_report import CosimReport
 from odscen.carla.mirror.mirrored import MirroredPlan
 from odscen.carla.mirror.run_witnesses import RunWitnesses
 from odscen.carla.mirror.step_clock import FollowedTicks, OwnTicks
 from odscen.carla.mirror.step_show import StepShow
 from odscen.carla.server.carla_server import Server
+from odscen.carla.server.client import Address
 from odscen.carla.server.interruption import interrupts
 from odscen.carla.server.server_map import ensure_map
 from odscen.convert.lane_table.light_heads import Heads
+from odscen.convert.lane_table.table_json import table_from_json
+from odscen.runs.reporter import SILENT
 from odscen.runs.run_settings import AS_DESIGNED
+from odscen.simulators.base import Simulator
+from odscen.sumo.realize.run_map import RunMap
 from odscen.sumo.runner.elevation import ElevationLookup
 from odscen.sumo.runner.in_step import InStep
+from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.runner.run_jobs import simulate
+from odscen.sumo.runner.sumo_simulator import SumoSimulator
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.mirror.step_clock import StepClock
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
+    from odscen.runs.new_run import SimulationOutcome
+    from odscen.runs.reporter import Reporter
     from odscen.runs.run_settings import RunSettings
-    from odscen.sumo.worker.protocol import OnProgress
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.simulators.base import SimulatedMap
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MirroredRun(SumoPreparedRun):
+    """A run of SUMO with what a CARLA server has to be told of it."""
+
+    scenario: Scenario
+    on: RunMap
+
+
+class CarlaMirror(Simulator[MirroredRun]):
+    """SUMO, shown actor for actor on a CARLA server.
+
+    Parameters
+    ----------
+    address
+        Of the server, ``HOST:PORT``.
+
+    Attributes
+    ----------
+    report
+        What has come of the last run.
+    """
+
+    label = "CARLA, mirrored"
+    options: ClassVar = {
+        "type": "object",
+        "properties": {
+            "address": {
+                "type": "string",
+                "title": "Address of the CARLA server",
+                "default": "127.0.0.1:2000",
+            }
+        },
+    }
+
+    def __init__(self, address: str = "127.0.0.1:2000") -> None:
+        self.mirroring = CosimOptions(address=Address.parse(address))
+        self.report = CosimReport(address)
+
+    @classmethod
+    def with_options(cls, options: CosimOptions) -> CarlaMirror:
+        """Make one that mirrors in a certain way.
+
+        Raises
+        ------
+        InputError
+            If options contradict each other.
+        """
+        options.check()
+        made = cls(str(options.address))
+        made.mirroring = options
+        return made
+
+    def check_settings(self, settings: RunSettings) -> None:
+        """Refuse what SUMO refuses."""
+        SumoSimulator().check_settings(settings)
+
+    def prepare(
+        self, scenario: Scenario, on: SimulatedMap, settings: RunSettings, reporter: Reporter
+    ) -> MirroredRun:
+        """Prepare a run of SUMO; it is always in one piece."""
+        if not isinstance(on, RunMap):
+            raise TypeError("SUMO runs on maps of the catalogue, which have its network")
+        whole = replace(settings, slice_length=None)
+        made = SumoSimulator().prepare(scenario, on, whole, reporter)
+        values = {name: getattr(made, name) for name in SumoPreparedRun.__dataclass_fields__}
+        return MirroredRun(**values, scenario=scenario, on=on)
+
+    def run(self, prepared: MirroredRun, folder: Path, reporter: Reporter) -> SimulationOutcome:
+        """Let SUMO drive, and the server show each step.
+
+        Whatever happens to the server: if that fails, SUMO stops and what it did so far is kept.
+
+        Raises
+        ------
+        CarlaError
+            If the server is not there or does not fit; nothing has run then.
+        """
+        options, plan, on = self.mirroring, prepared.plan, prepared.on
+        report = self.report = CosimReport(str(options.address))
+        with (
+            interrupts() as interrupted,
+            Server(options.address, follows=options.follow) as server,
+            ExitStack() as stack,
+        ):
+            xodr = on.file("xodr").read_bytes().decode()
+            may_load = options.load_map and not options.follow
+            report.map = ensure_map(server, on.name, xodr, load=may_load)
+            clock = _clock(server, options, plan.step_length)
+            report.warnings = server.warnings
+            mirrored = MirroredPlan.on(server, prepared.scenario, on, plan, options)
+            report.sizes = mirrored.sizes
+            show = StepShow(
+                server,
+                mirrored,
+                Heads(on.sumo.lights),
+                clock,
+                report,
+                interrupted,
+                carla_signals=options.carla_signals,
+            )
+            table = table_from_json(on.file("lane_table").read_bytes())
+            in_step = InStep(
+                plan,
+                ElevationLookup(on.graph, table),
+                show.on_step,
+                placed=mirrored.ego.row if mirrored.ego else None,
+            )
+            show.stop, show.outside = in_step.stop, in_step.show_outside
+            witnesses = RunWitnesses(stack, server, folder, on, plan, mirrored, options, show)
+            if options.on_step is not None:
+                show.on_shown = options.on_step
+            outcome = simulate(prepared, folder, reporter=reporter, live=in_step)
+            if outcome.sim_seconds is not None:
+                witnesses.write(folder)
+            show.conclude()
+        report.left_behind = server.left_behind
+        witnesses.conclude(report)
+        return outcome
 
 
 def cosim(
@@ -39,12 +169,9 @@ def cosim(
     *,
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
-    progress: OnProgress | None = None,
+    reporter: Reporter = SILENT,
 ) -> tuple[Run, CosimReport]:
-    """Run a scenario in SUMO and show it on a CARLA server.
-
-    The run folder is that of :func:`odscen.app.running.runs.run`, whatever happens to the server:
-    if that fails, SUMO stops and what it did so far is kept.
+    """Run a scenario in SUMO and show it on a CARLA server, see :class:`CarlaMirror`.
 
     Parameters
     ----------
@@ -56,8 +183,8 @@ def cosim(
         How it is run; always in one piece.
     out
         Folder that gets the run's folder; the workspace's ``runs`` if not given.
-    progress
-        Called in this thread, a few times a second.
+    reporter
+        Hears how far it is, in this thread.
 
     Raises
     ------
@@ -66,41 +193,10 @@ def cosim(
     CarlaError
         If the server is not there or does not fit; nothing has run then.
     """
-    options.check()
-    run = check_file(workspace, path, out=out, settings=replace(settings, slice_length=None))
-    prepared = prepare_run(run)
-    report = CosimReport(str(options.address))
-    with (
-        interrupts() as interrupted,
-        Server(options.address, follows=options.follow) as server,
-        ExitStack() as stack,
-    ):
-        xodr = run.entry.read("xodr").decode()
-        may_load = options.load_map and not options.follow
-        report.map = ensure_map(server, run.entry.name, xodr, load=may_load)
-        clock = _clock(server, options, prepared.plan.step_length)
-        report.warnings = server.warnings
-        mirrored = MirroredPlan.on(server, run, prepared.plan, options)
-        report.sizes = mirrored.sizes
-        heads = Heads(run.map.sumo.lights)
-        show = StepShow(
-            server, mirrored, heads, clock, report, interrupted, carla_signals=options.carla_signals
-        )
-        in_step = InStep(
-            prepared.plan,
-            ElevationLookup(run.map.sumo.graph, run.entry.lane_table()),
-            show.on_step,
-            placed=mirrored.ego.row if mirrored.ego else None,
-        )
-        show.stop, show.outside = in_step.stop, in_step.show_outside
-        witnesses = RunWitnesses(stack, server, run, prepared.plan, mirrored, options, show)
-        if options.on_step is not None:
-            show.on_shown = options.on_step
-        result = carry_out(run, prepared, progress=progress, ended=witnesses.ended, live=in_step)
-        show.conclude()
-    report.left_behind = server.left_behind
-    witnesses.conclude(report)
-    return result, report
+    mirror = CarlaMirror.with_options(options)
+    run = check_file(workspace, path, out=out, settings=settings, simulator=mirror)
+    result = carry_out(run, prepare_run(run), reporter=reporter)
+    return result, mirror.report
 
 
 def _clock(server: Server, options: CosimOptions, step_length: float) -> StepClock:

@@ -15,7 +15,7 @@ from odscen.sumo.worker.protocol import ForeignUser
 if TYPE_CHECKING:
     from odscen.carla.server.blueprints import Shape
     from odscen.carla.server.carla_server import Server
-    from odscen.maps.asset_catalogue import Assets
+    from odscen.simulators.assets import Assets
 
 _BODIES = ("vehicle.", "walker.")
 _STILL = 0.01

@@ -22,11 +22,12 @@ from odscen.carla.server.environment import vehicle_lights, weather_parameters
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.app.running.runs import CheckedRun
     from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.server.blueprints import Shape
     from odscen.carla.server.carla_server import Server
     from odscen.records.run_plan import Plan
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.run_map import RunMap
 
 
 WAKE = 0.9
@@ -70,7 +71,9 @@ class MirroredPlan:
     sizes: dict[str, float]
 
     @classmethod
-    def on(cls, server: Server, run: CheckedRun, plan: Plan, options: CosimOptions) -> MirroredPlan:
+    def on(
+        cls, server: Server, scenario: Scenario, on: RunMap, plan: Plan, options: CosimOptions
+    ) -> MirroredPlan:
         """Choose bodies, under the scenario's sky; none is spawned yet.
 
         Raises
@@ -78,9 +81,9 @@ class MirroredPlan:
         InputError
             If the ego is to be driven in CARLA and there is none.
         """
-        sky = weather_parameters(run.scenario.environment, run.assets)
+        sky = weather_parameters(scenario.environment, on.assets)
         server.set_weather(sky)
-        blueprints = choose_blueprints(plan.actors, run.assets, server.library())
+        blueprints = choose_blueprints(plan.actors, on.assets, server.library())
         shapes = server.shapes(blueprints)
         sizes = size_differences(plan.actors, blueprints, shapes)
         ego = _external_ego(plan, server, blueprints) if options.external_ego else None
@@ -88,7 +91,7 @@ class MirroredPlan:
         if free:
             server.roles.add(HEROES[0])
         walks = np.array([actor.person for actor in plan.actors], dtype=np.bool_)
-        ground = WalkingGround(server, walks, lambda: LaneSurface.of(run.entry.read("xodr")))
+        ground = WalkingGround(server, walks, lambda: LaneSurface.of(on.file("xodr").read_bytes()))
         mirror = Mirror(
             plan,
             blueprints,
@@ -105,7 +108,7 @@ class MirroredPlan:
         if options.foreign is not None:
             hero = ego.hero if ego else None
             foreign = ForeignActors(
-                server, plan.net_offset, run.assets, options.foreign, left_out=hero
+                server, plan.net_offset, on.assets, options.foreign, left_out=hero
             )
         wheels = doors = None
         if not options.sensed_speed and options.wheel_calls:

@@ -12,12 +12,12 @@ from odscen.carla.mirror.parity_recorder import StateRecorder
 from odscen.carla.mirror.tick_hook import ShownActors, call_hook
 from odscen.carla.sensors.camera import first_view, watch_from_above
 from odscen.carla.sensors.sensor_recording import SensorRecording
+from odscen.drawing.map_drawing import MapDrawing
 from odscen.runs import layout
 
 if TYPE_CHECKING:
     from contextlib import ExitStack
 
-    from odscen.app.running.runs import CheckedRun
     from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.mirror.cosim_report import CosimReport
     from odscen.carla.mirror.mirrored import MirroredPlan
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from odscen.carla.server.batch import ActorPlace
     from odscen.carla.server.carla_server import Server
     from odscen.records.run_plan import Plan
+    from odscen.sumo.realize.run_map import RunMap
     from odscen.sumo.runner.in_step import Step
 
 
@@ -44,13 +45,14 @@ class RunWitnesses:
         self,
         stack: ExitStack,
         server: Server,
-        run: CheckedRun,
+        folder: Path,
+        on: RunMap,
         plan: Plan,
         mirrored: MirroredPlan,
         options: CosimOptions,
         show: StepShow,
     ) -> None:
-        self._server, self._run, self._plan, self._mirrored = server, run, plan, mirrored
+        self._server, self._on, self._plan, self._mirrored = server, on, plan, mirrored
         self._recorder: StateRecorder | None = None
         self._camera: Camera | None = None
         self._sensors: SensorRecording | None = None
@@ -65,13 +67,13 @@ class RunWitnesses:
             )
             show.views.append(self._above_ego)
         if options.sensors:
-            self._attach_sensors(stack, options, show)
+            self._attach_sensors(stack, folder, options, show)
         if options.hook is not None:
             ids = [actor.id for actor in plan.actors]
             shown = ShownActors(server.world, ids, mirrored.mirror.actors)
             show.hooks.append(partial(call_hook, options.hook, server.world, shown))
 
-    def ended(self, folder: Path) -> None:
+    def write(self, folder: Path) -> None:
         """Write what they have seen into the run's folder.
 
         Raises
@@ -80,7 +82,8 @@ class RunWitnesses:
             If a sensor's file could not be written.
         """
         if self._recorder is not None:
-            self._recorder.write(folder, self._run.map.drawing)
+            drawing = MapDrawing.from_json(self._on.file("drawing").read_bytes())
+            self._recorder.write(folder, drawing)
         if self._sensors is not None:
             self._sensors.close()
             if self._seen.is_dir():
@@ -93,10 +96,10 @@ class RunWitnesses:
         if self._sensors is not None:
             report.sensors = dict(self._sensors.counts)
 
-    def _attach_sensors(self, stack: ExitStack, options: CosimOptions, show: StepShow) -> None:
-        parent = self._run.folder.parent
-        parent.mkdir(parents=True, exist_ok=True)
-        staging = stack.enter_context(TemporaryDirectory(dir=parent, prefix=".sensors-"))
+    def _attach_sensors(
+        self, stack: ExitStack, folder: Path, options: CosimOptions, show: StepShow
+    ) -> None:
+        staging = stack.enter_context(TemporaryDirectory(dir=folder.parent, prefix=".sensors-"))
         self._seen = Path(staging) / layout.SENSORS_FOLDER
         self._sensors = SensorRecording(self._server, options.sensors, self._seen)
         stack.callback(self._sensors.detach)

@@ -11,13 +11,10 @@ import signal
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, ClassVar
 
 from odscen.app.running.runs import carry_out, check_file, prepare_run
 from odscen.base.errors import CarlaError, InputError
-from odscen.base.frames import XodrPose, xodr_to_sumo
 from odscen.carla.native.native_plan import native_actors
 from odscen.carla.native.native_worker import NativeJob, Note, Shot, Tick, work
 from odscen.carla.sensors.camera import first_view
@@ -26,12 +23,16 @@ from odscen.carla.server.carla_server import Server
 from odscen.carla.server.client import Address
 from odscen.carla.server.environment import weather_parameters
 from odscen.carla.server.interruption import interrupts
-from odscen.figures.measures.summary import actor_outcomes, actors_to_json
-from odscen.records.run_events import Event, EventKind, events_to_json
+from odscen.records.run_events import EventKind
 from odscen.runs import layout
+from odscen.runs.new_run import SimulationOutcome
+from odscen.runs.reporter import SILENT, Progress
 from odscen.runs.run_settings import AS_DESIGNED
-from odscen.sumo.runner.worker_process import Ended
-from odscen.sumo.worker.protocol import Done, Failed, Progress
+from odscen.scenario.document.problems import warning
+from odscen.simulators.base import RoutedRun, Simulator
+from odscen.simulators.positions import write_records, write_trajectories
+from odscen.sumo.realize.run_map import RunMap
+from odscen.sumo.worker.protocol import Done, Failed
 
 if TYPE_CHECKING:
     import threading
@@ -39,15 +40,17 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from pathlib import Path
 
-    from odscen.app.running.runs import CheckedRun
+    import numpy as np
+
     from odscen.carla.native.native_worker import Told
     from odscen.maps.store import Workspace
-    from odscen.records.run_plan import Plan
+    from odscen.records.run_events import Event
     from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Reporter
     from odscen.runs.run_settings import RunSettings
-    from odscen.scenario.document.rules_document import StoryRule
+    from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.worker.protocol import OnProgress
+    from odscen.simulators.base import SimulatedMap
 
 LOG_FILE = "carla.log"
 USUAL_TICK = 0.05
@@ -109,6 +112,113 @@ class NativeReport:
     interrupted: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NativeRun(RoutedRun):
+    """A planned run with what CARLA has to be told of it."""
+
+    scenario: Scenario
+    on: RunMap
+
+
+class CarlaNative(Simulator[NativeRun]):
+    """CARLA alone: its Traffic Manager and its walkers, without SUMO.
+
+    Parameters
+    ----------
+    address
+        Of the server, ``HOST:PORT``.
+    physics
+        Whether vehicles have their own physics.
+
+    Attributes
+    ----------
+    report
+        What is to be known of the last run.
+    """
+
+    label = "CARLA alone"
+    options: ClassVar = {
+        "type": "object",
+        "properties": {
+            "address": {
+                "type": "string",
+                "title": "Address of the CARLA server",
+                "default": "127.0.0.1:2000",
+            },
+            "physics": {
+                "type": "boolean",
+                "title": "Vehicles have physics",
+                "default": True,
+            },
+        },
+    }
+
+    def __init__(self, address: str = "127.0.0.1:2000", physics: bool = True) -> None:
+        self.driving = NativeOptions(address=Address.parse(address), physics=physics)
+        self.report = NativeReport()
+
+    @classmethod
+    def with_options(cls, options: NativeOptions) -> CarlaNative:
+        """Make one that drives in a certain way.
+
+        Raises
+        ------
+        MissingDependencyError
+            If pictures are wanted and cannot be made.
+        """
+        if options.pictures.any or options.on_picture:
+            options.pictures.check()
+        made = cls()
+        made.driving = options
+        return made
+
+    def unsupported(self, scenario: Scenario, on: SimulatedMap) -> tuple[Problem, ...]:
+        """List what CARLA alone does not do of a scenario."""
+        del on
+        return tuple(warning("not_in_carla", where, words) for where, words in left_out(scenario))
+
+    def prepare(
+        self, scenario: Scenario, on: SimulatedMap, settings: RunSettings, reporter: Reporter
+    ) -> NativeRun:
+        """Plan the run: SUMO has no part in it, and there are no files of its own."""
+        del reporter
+        if not isinstance(on, RunMap):
+            raise TypeError("runs in CARLA are planned on maps of the catalogue")
+        routed = on.routed_run(scenario, replace(settings, slice_length=None))
+        values = {name: getattr(routed, name) for name in RoutedRun.__dataclass_fields__}
+        values["about"] = {**routed.about, "meso": False, "driven_by": "carla"}
+        return NativeRun(**values, scenario=scenario, on=on)
+
+    def run(self, prepared: NativeRun, folder: Path, reporter: Reporter) -> SimulationOutcome:
+        """Let CARLA drive; Ctrl-C ends it between two ticks, and what it did so far is kept."""
+        options, plan, on = self.driving, prepared.plan, prepared.on
+        report = self.report = NativeReport()
+        usual = min(plan.step_length, USUAL_TICK) if options.physics else USUAL_TICK
+        job = NativeJob(
+            address=options.address,
+            plan=plan,
+            assets=on.assets,
+            actors=native_actors(prepared.scenario, on.graph, plan),
+            delta=options.tick or usual,
+            map_name=on.name,
+            xodr=on.file("xodr").read_bytes().decode(),
+            log=folder / LOG_FILE,
+            view=first_view(plan, options.pictures),
+            weather=weather_parameters(prepared.scenario.environment, on.assets),
+            load_map=options.load_map,
+            physics=options.physics,
+            pictures=options.pictures,
+            watched=options.on_picture is not None,
+        )
+        with interrupts() as interrupted:
+            follower = _Follower(job, folder, report, reporter, options.on_picture)
+            outcome = follower.run(interrupted)
+            report.interrupted = interrupted.is_set()
+        for words in report.notes:
+            reporter.said(words)
+        return outcome
+
+
 def run_native(
     workspace: Workspace,
     path: Path,
@@ -116,12 +226,9 @@ def run_native(
     *,
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
-    progress: OnProgress | None = None,
-    tell: Callable[[str], None] | None = None,
+    reporter: Reporter = SILENT,
 ) -> tuple[Run, NativeReport]:
-    """Let CARLA's Traffic Manager and walkers run a scenario.
-
-    Ctrl-C ends it between two ticks, and what it did so far is kept.
+    """Let CARLA's Traffic Manager and walkers run a scenario, see :class:`CarlaNative`.
 
     Parameters
     ----------
@@ -133,10 +240,9 @@ def run_native(
         How it is run; always in one piece.
     out
         Folder that gets the run's folder; the workspace's ``runs`` if not given.
-    progress
-        Called in this thread with each tick.
-    tell
-        Called before the run with each part of the scenario that CARLA will not do.
+    reporter
+        Hears, in this thread, of each part of the scenario that CARLA will not do, of each tick,
+        and of what else is to be known.
 
     Raises
     ------
@@ -145,81 +251,29 @@ def run_native(
     MissingDependencyError
         If pictures are wanted and cannot be made.
     """
-    if options.pictures.any or options.on_picture:
-        options.pictures.check()
-    run = check_file(workspace, path, out=out, settings=replace(settings, slice_length=None))
-    if tell is not None:
-        for words in left_out(run.scenario):
-            tell(words)
-    prepared = prepare_run(run)
-    plan = prepared.plan
-    report = NativeReport()
-
-    def simulate(folder: Path) -> Ended:
-        job = _job(run, plan, options, log=folder / LOG_FILE)
-        with interrupts() as interrupted:
-            follower = _Follower(job, folder, report, progress, options.on_picture)
-            ended = follower.run(interrupted)
-            report.interrupted = interrupted.is_set()
-        return ended
-
-    # SUMO has no part in this: no files of its own, and no routes that it could not find.
-    actors = tuple(replace(actor, problem=None) for actor in plan.actors)
-    prepared = replace(
-        prepared,
-        plan=replace(plan, actors=actors),
-        sumo_files={},
-        problems=(),
-        notes=(),
-        about={**prepared.about, "driven_by": "carla"},
-    )
-    return carry_out(run, prepared, simulate=simulate), report
+    native = CarlaNative.with_options(options)
+    run = check_file(workspace, path, out=out, settings=settings, simulator=native)
+    for problem in run.unsupported:
+        reporter.said(problem.message)
+    return carry_out(run, prepare_run(run), reporter=reporter), native.report
 
 
-def left_out(scenario: Scenario) -> list[str]:
-    """What CARLA alone does not do of a scenario, in words: a line for each part and rule."""
-    parts = [
-        *_actors_parts(scenario),
-        *(f"measure {one.id} ({one.kind})" for one in scenario.measures),
-        *(f"rule {one.id} of {one.actor}: {_actions(one)}" for one in scenario.rules),
-    ]
-    if scenario.demand.parking.begin or scenario.demand.parking.end:
-        parts.append("parking at the begin and end of trips")
-    return [f"CARLA alone does not do {words}" for words in parts]
-
-
-def _actors_parts(scenario: Scenario) -> list[str]:
-    """One line for each field of actors that only SUMO acts on, with the actors that have it."""
+def left_out(scenario: Scenario) -> list[tuple[str, str]]:
+    """What CARLA alone does not do of a scenario: where each part and rule is, and words for it."""
     having = {
         "crosses_anywhere": [one.id for one in scenario.actors if one.crosses_anywhere],
         "ignores_red": [one.id for one in scenario.actors if one.ignores_red],
         "initial_speed": [one.id for one in scenario.actors if one.initial_speed is not None],
     }
-    return [f"{name} of {', '.join(ids)}" for name, ids in having.items() if ids]
-
-
-def _actions(rule: StoryRule) -> str:
-    return ", ".join(one.kind for item in rule.then for one in item.parts)
-
-
-def _job(run: CheckedRun, plan: Plan, options: NativeOptions, *, log: Path) -> NativeJob:
-    return NativeJob(
-        address=options.address,
-        plan=plan,
-        assets=run.assets,
-        actors=native_actors(run.scenario, run.map.sumo.graph, plan),
-        delta=options.tick
-        or (min(plan.step_length, USUAL_TICK) if options.physics else USUAL_TICK),
-        map_name=run.entry.name,
-        xodr=run.entry.read("xodr").decode(),
-        log=log,
-        view=first_view(plan, options.pictures),
-        weather=weather_parameters(run.scenario.environment, run.assets),
-        load_map=options.load_map,
-        physics=options.physics,
-        pictures=options.pictures,
-        watched=options.on_picture is not None,
-    )
+    parts = [("actors", f"{name} of {', '.join(ids)}") for name, ids in having.items() if ids]
+    for index, measure in enumerate(scenario.measures):
+        parts.append((f"measures[{index}]", f"measure {measure.id} ({measure.kind})"))
+    for index, rule in enumerate(scenario.rules):
+        actions = ", ".join(action.kind for item in rule.then for action in item.parts)
+        parts.append((f"rules[{index}]", f"rule {rule.id} of {rule.actor}: {actions}"))
+    if scenario.demand.parking.begin or scenario.demand.parking.end:
+        parts.append(("demand.parking", "parking at the begin and end of trips"))
+    return [(where, f"CARLA alone does not do {words}") for where, words in parts]
 
 
 class _Follower:
@@ -230,13 +284,13 @@ class _Follower:
         job: NativeJob,
         folder: Path,
         report: NativeReport,
-        progress: OnProgress | None,
+        reporter: Reporter,
         on_picture: Callable[[bytes], None] | None,
     ) -> None:
         self._job = job
         self._folder = folder
         self._notes = report.notes
-        self._progress = progress
+        self._reporter = reporter
         self._on_picture = on_picture
         self._events: list[Event] = []
         self._times: list[float] = []
@@ -244,7 +298,7 @@ class _Follower:
         self._own: tuple[int, ...] = ()
         self._silent = 0.0
 
-    def run(self, interrupted: threading.Event) -> Ended:
+    def run(self, interrupted: threading.Event) -> SimulationOutcome:
         """Run the worker to its end, whatever that is; what it reported until then is written."""
         start = time.perf_counter()
         context = multiprocessing.get_context("spawn")
@@ -262,20 +316,22 @@ class _Follower:
                 process.join()
         if last is None:
             self._clear_up()
-        self._write()
+        plan = self._job.plan
+        write_records(plan, self._events, self._folder)
+        trajectories = self._folder / layout.TRAJECTORIES_FILE
+        write_trajectories(plan, self._times, self._rows, trajectories)
         seconds = time.perf_counter() - start
         if isinstance(last, Done):
-            return Ended(last, seconds, None)
-        if isinstance(last, Failed):
-            return Ended(None, seconds, last.reason)
-        return Ended(None, seconds, self._crash(process.exitcode or 0))
+            return SimulationOutcome(last.sim_seconds, last.steps, seconds, stopped=last.stopped)
+        failure = last.reason if isinstance(last, Failed) else self._crash(process.exitcode or 0)
+        return SimulationOutcome(None, None, seconds, error=failure)
 
     def _follow(self, pipe: Connection, interrupted: threading.Event) -> Done | Failed | None:
         last: Done | Failed | None = None
         asked = False
         heard = time.monotonic()
         while True:
-            if interrupted.is_set() and not asked:
+            if (interrupted.is_set() or self._reporter.cancelled) and not asked:
                 asked = True
                 with suppress(OSError):  # it has just ended
                     pipe.send("stop")
@@ -309,14 +365,12 @@ class _Follower:
         self._notes += tick.notes
         self._times.append(tick.time)
         self._rows.append(tick.rows)
-        if self._progress is not None:
-            plan = self._job.plan
-            count = [event.kind for event in self._events].count
-            departed, arrived = count(EventKind.DEPARTED), count(EventKind.ARRIVED)
-            planned = len(plan.actors)
-            self._progress(
-                Progress(tick.time, plan.until, tick.running, departed, arrived, planned)
-            )
+        plan = self._job.plan
+        count = [event.kind for event in self._events].count
+        departed, arrived = count(EventKind.DEPARTED), count(EventKind.ARRIVED)
+        self._reporter.advanced(
+            Progress(tick.time, plan.until, tick.running, departed, arrived, len(plan.actors))
+        )
 
     def _clear_up(self) -> None:
         """Take away what a worker that has died has left, if its server answers in time."""
@@ -344,37 +398,3 @@ class _Follower:
                 f"gone away or has not answered for {job.address.timeout:g} s; see {LOG_FILE}"
             )
         return f"the process that drives CARLA ended with exit code {code}; see {LOG_FILE}"
-
-    def _write(self) -> None:
-        plan = self._job.plan
-        events = tuple(sorted(self._events, key=lambda event: event.time))
-        outcomes = actor_outcomes(plan, events)
-        folder = self._folder
-        (folder / layout.EVENTS_FILE).write_text(events_to_json(events), encoding="utf-8")
-        (folder / layout.ACTORS_FILE).write_text(actors_to_json(outcomes), encoding="utf-8")
-        write_trajectories(plan, self._times, self._rows, folder / layout.TRAJECTORIES_FILE)
-
-
-def write_trajectories(plan: Plan, times: list[float], rows: list[np.ndarray], file: Path) -> None:
-    """Write states per tick in the columns and the frame that SUMO's own recording has."""
-    import polars as pl
-
-    table = np.concatenate([np.empty((0, 7)), *rows])
-    index = table[:, 0].astype(np.int64)
-    length = np.array([actor.length for actor in plan.actors])
-    _, x, y, z, hdg, pitch, speed = table.T
-    front = xodr_to_sumo(
-        XodrPose(x, y, z, hdg, pitch), length=length[index], net_offset=plan.net_offset
-    )
-    names = [actor.id for actor in plan.actors]
-    pl.DataFrame(
-        {
-            "timestep_time": np.repeat(np.array(times), [len(part) for part in rows]),
-            "vehicle_id": pl.Series([names[row] for row in index], dtype=pl.String),
-            "vehicle_x": np.asarray(front.x),
-            "vehicle_y": np.asarray(front.y),
-            "vehicle_z": np.asarray(front.z),
-            "vehicle_angle": np.asarray(front.angle_deg),
-            "vehicle_speed": speed,
-        }
-    ).write_parquet(file)

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from odscen.carla.native.native_plan import NativeActor
     from odscen.carla.sensors.camera import Camera
     from odscen.carla.server.client import Address
-    from odscen.maps.asset_catalogue import Assets
     from odscen.records.run_events import Event
     from odscen.records.run_plan import Plan
+    from odscen.simulators.assets import Assets
 
 NO_NAVIGATION = (
     "the world has no navigation mesh: pedestrians are led along their routes and do not look "

@@ -20,6 +20,7 @@ from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.served.served_run import ServedJob
 from odscen.carla.server.client import Address
 from odscen.maps.store import Workspace
+from odscen.runs.reporter import Reporter
 from odscen.sumo.worker.output_capture import captured_output
 from odscen.sumo.worker.protocol import (
     Done,
@@ -36,6 +37,7 @@ from odscen.sumo.worker.steering import Steering
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from odscen.runs.reporter import Progress
     from odscen.sumo.runner.in_step import Step
     from odscen.sumo.worker.protocol import Message
 
@@ -78,7 +80,7 @@ def run(job: ServedJob, send: Callable[[Message, bytes], None]) -> Done | Failed
             on_picture=lambda jpeg: send(ShotMessage(len(jpeg)), jpeg),
         ),
         settings=job.settings,
-        progress=lambda message: send(message, b""),
+        reporter=_ProgressSender(send),
     )
     troubles = dict.fromkeys((report.error, *report.left_behind, result.summary["error"]))
     if any(troubles):
@@ -90,6 +92,16 @@ def run(job: ServedJob, send: Callable[[Message, bytes], None]) -> Done | Failed
         time.perf_counter() - start,
         stopped=steering.stopped,
     )
+
+
+class _ProgressSender(Reporter):
+    """Sends how far the run is."""
+
+    def __init__(self, send: Callable[[Message, bytes], None]) -> None:
+        self._send = send
+
+    def advanced(self, progress: Progress) -> None:
+        self._send(progress, b"")
 
 
 class _PageFollower:

@@ -12,8 +12,8 @@ from odscen.base.errors import CarlaError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.maps.asset_catalogue import Assets, Blueprint
     from odscen.records.run_plan import PlannedActor
+    from odscen.simulators.assets import Assets, Blueprint
 
 ALIKE = 0.25
 """Metres that bodies may differ more than the best one's and still be as good a choice."""

@@ -9,8 +9,8 @@ from odscen.carla.server.batch import FOG, LOW_BEAM, POSITION
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.maps.asset_catalogue import Assets
     from odscen.scenario.document.scenario_document import Environment
+    from odscen.simulators.assets import Assets
 
 DUSK = 5.0
 """Degrees of the sun above the horizon below which one drives with lights."""

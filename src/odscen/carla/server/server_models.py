@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.categories import Body, Category
-from odscen.maps.asset_catalogue import Assets, Blueprint
+from odscen.simulators.assets import Assets, Blueprint
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -1,1 +1,1 @@
-"""Regression gates: suites of scenarios, held against expectations and baselines (R58)."""
+"""What pytest loads of odscen: a fixture that runs scenarios, and scenario files as tests."""

@@ -29,7 +29,7 @@ from odscen.scenario.document.validation import validation_problems
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from odscen.scenario.document.document_parts import Part
     from odscen.scenario.document.scenario_document import Scenario
@@ -123,12 +123,13 @@ def _without_default(schema: dict[str, Any]) -> None:
     schema.pop("default", None)
 
 
-MESSAGES = tuple(_message(name, entry.function) for name, entry in EDIT_ENTRIES.items())
+EDIT_MESSAGES = {name: _message(name, entry.function) for name, entry in EDIT_ENTRIES.items()}
+"""Messages of all edits, by the name of the edit."""
 
 if TYPE_CHECKING:
     AnyEdit = EditBase
 else:
-    AnyEdit = Annotated[reduce(operator.or_, MESSAGES), Field(discriminator="kind")]
+    AnyEdit = Annotated[reduce(operator.or_, EDIT_MESSAGES.values()), Field(discriminator="kind")]
 
 
 _READER: TypeAdapter[EditBase] = TypeAdapter(AnyEdit)
@@ -151,3 +152,9 @@ def read_edit(data: Mapping[str, Any]) -> EditBase:
         raise ScenarioError(
             f"this edit cannot be read: {problems[0]}", problems=problems[1:]
         ) from err
+
+
+def edits_label(edits: Sequence[EditBase]) -> str:
+    """What undo calls several edits that are one step."""
+    more = len(edits) - 1
+    return f"{edits[0].label} and {more} more" if more else edits[0].label

@@ -65,8 +65,11 @@ def _row(conflict: etree._Element, net_offset: tuple[float, float]) -> dict[str,
             continue
         row[name] = None if value == "NA" else float(value)
         if value != "NA" and not placed:
-            x, y = measure.get("position", "").split(",")[:2]
-            row["x"], row["y"] = float(x) - net_offset[0], float(y) - net_offset[1]
             row["kind"] = _KINDS.get(int(measure.get("type", "9")), "crossing")
+            # Bodies that overlap from the start have a value, and `NA` for a place.
+            position = measure.get("position", "NA").split(",")
+            if len(position) > 1:
+                row["x"] = float(position[0]) - net_offset[0]
+                row["y"] = float(position[1]) - net_offset[1]
             placed = True
     return row

@@ -41,7 +41,6 @@ from odscen.sumo.realize.route_choice.travel_times import (
 from odscen.sumo.realize.route_paths import CostRouter
 from odscen.sumo.realize.traffic_measures.measure_actions import measure_actions
 from odscen.sumo.runner.prepare import prepare
-from odscen.sumo.runner.run_folder import write_run_folder
 from odscen.sumo.runner.worker_process import run_worker
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.road_users.free_flow import ModelSizes
     from odscen.sumo.realize.sumo_map import SumoMap
-    from odscen.sumo.runner.run_folder import PreparedRun
+    from odscen.sumo.runner.run_folder import SumoPreparedRun
 
 
 _SETTLED = 0.05
@@ -92,7 +91,7 @@ def prepare_assigned(
     *,
     settings: RunSettings,
     on_step: Callable[[AssignmentStep], None] | None = None,
-) -> PreparedRun:
+) -> SumoPreparedRun:
     """Prepare a run; where the scenario wants routes by travel time, they are found first.
 
     Parameters and errors as of :func:`assign_routes`.
@@ -160,9 +159,9 @@ def assign_routes(
         prepared = prepare(scenario, sumo_map, net, assets, settings=plain, assigned=search.paths())
         with tempfile.TemporaryDirectory(prefix="odscen-routes-") as name:
             folder = Path(name)
-            write_run_folder(prepared, folder)
+            prepared.write(folder)
             ended = run_worker(folder, time_limit=settings.time_limit, forked=True)
-            if ended.done is None:
+            if ended.sim_seconds is None:
                 raise SimulationError(f"iteration {iteration} of the assignment: {ended.error}")
             times = search.measured(folder)
             outcome = _outcome(folder, vehicles=sum(not one.person for one in prepared.plan.actors))

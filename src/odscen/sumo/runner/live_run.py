@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING, Any
 
+from odscen.runs.reporter import Progress
 from odscen.sumo.worker.protocol import (
     Command,
     Detectors,
@@ -19,7 +20,6 @@ from odscen.sumo.worker.protocol import (
     Incidents,
     Lights,
     Pace,
-    Progress,
     ShotMessage,
     encode,
 )
@@ -106,6 +106,12 @@ class Live:
     def ended(self) -> bool:
         """Whether the worker has ended."""
         return self._ended
+
+    @property
+    def stop_wanted(self) -> bool:
+        """Whether it was to stop before it had a worker."""
+        with self._lock:
+            return any(command.do == "stop" for command in self._early)
 
     # For watchers
 

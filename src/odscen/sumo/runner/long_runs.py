@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.checksums import unsealed
 from odscen.base.errors import ConflictError, InputError, NotFoundError
-from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.to_disk import write_whole
 from odscen.figures.judging.expectations import parse_expectation
@@ -29,47 +28,45 @@ from odscen.runs.checkpoint import (
 )
 from odscen.runs.finished_run import Run
 from odscen.runs.found_files import found_files
+from odscen.runs.new_run import make_summary, run_lock
+from odscen.runs.reporter import SILENT
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_status import (
     going,
-    read_status,
     unfinished,
     write_status,
 )
 from odscen.runs.run_sums import (
     check_run_files,
+    refuse_additions,
     seal_interrupted,
     seal_run,
     seal_start,
     unseal_interrupted,
 )
 from odscen.sumo.runner.forked_worker import is_ready
-from odscen.sumo.runner.run_folder import (
-    PreparedRun,
-    make_summary,
-    write_run_folder,
-)
+from odscen.sumo.runner.run_folder import SumoPreparedRun
 from odscen.sumo.runner.worker_process import run_worker
+from odscen.sumo.worker.behaviour.behaviour_doors import is_installed, read_behaviour
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextlib import AbstractContextManager
     from pathlib import Path
 
-    from odscen.sumo.runner.run_folder import Finish
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
+    from odscen.runs.new_run import Finish
+    from odscen.runs.reporter import Reporter
     from odscen.sumo.runner.worker_process import Companion
-    from odscen.sumo.worker.protocol import OnProgress
 
 FORMAT = "odscen-run-settings"
 VERSION = 1
 
 
 def run_long(
-    prepared: PreparedRun,
+    prepared: SumoPreparedRun,
     out: Path,
     lock: int,
     *,
-    progress: OnProgress | None = None,
+    reporter: Reporter = SILENT,
     finish: Finish | None = None,
     live: Companion | None = None,
 ) -> Run:
@@ -83,22 +80,22 @@ def run_long(
         If the folder cannot be written.
     """
     with new_folder(out) as folder:
-        write_run_folder(prepared, folder)
+        prepared.write(folder)
         _write_settings(prepared, folder)
         write_status(folder, prepared.plan, None)
         seal_start(folder)
     with disk_errors(f"run folder {out}", advice=_again(out)):
-        return _resume_from(prepared, out, lock, progress, finish, live)
+        return _resume_from(prepared, out, lock, reporter, finish, live)
 
 
 def resume(
     folder: Path,
     *,
-    progress: OnProgress | None = None,
-    tell: Callable[[str], None] | None = None,
+    reporter: Reporter = SILENT,
     time_limit: float | None = None,
     finish: Finish | None = None,
     live: Companion | None = None,
+    behaviour: BehaviourDoor | None = None,
 ) -> Run:
     """Go on with an interrupted run from its last complete slice.
 
@@ -106,8 +103,11 @@ def resume(
 
     Parameters
     ----------
-    tell
-        Called with what the user should know: where it goes on, and which slices are damaged.
+    reporter
+        Hears where it goes on, and which slices are damaged, too.
+    behaviour
+        What drives instead of SUMO, named again where the run has a program, a socket or a file:
+        what a folder says is data, and is not executed for that.
     time_limit
         Wall seconds after which it is interrupted again.
 
@@ -119,6 +119,8 @@ def resume(
         If it has ended already, or is going on.
     DamagedError
         If what it starts from is not as it was written.
+    InputError
+        If it is driven by code that is named in its folder alone, or by another than is named now.
     """
     _refuse_absent(folder)
     with disk_errors(f"run folder {folder}", advice=_again(folder)), run_lock(folder) as lock:
@@ -127,43 +129,15 @@ def resume(
         check_run_files(folder)
         unsealed(folder / layout.STATUS_FILE)
         prepared = _restore(folder, time_limit)
+        _refuse_unnamed_code(folder, behaviour)
         number, problems = survey(folder)
-        if tell is not None:
-            for problem in problems:
-                tell(problem)
-            begin = read_checkpoint(folder, number).time if number else 0.0
-            tell(f"resumes at {begin:g} s, after slice {number}" if number else "begins anew")
+        for problem in problems:
+            reporter.said(problem)
+        begin = read_checkpoint(folder, number).time if number else 0.0
+        reporter.said(f"resumes at {begin:g} s, after slice {number}" if number else "begins anew")
         unseal_interrupted(folder)  # first: it may be killed in between
         (folder / layout.SUMMARY_FILE).unlink(missing_ok=True)
-        return _resume_from(prepared, folder, lock, progress, finish, live)
-
-
-def run_lock(folder: Path) -> AbstractContextManager[int]:
-    """Hold the lock of a run folder, which need not be there.
-
-    Raises
-    ------
-    ConflictError
-        If another process works on it; says which, and since when.
-    """
-    return locked(folder, what=f"run {folder.name!r}")
-
-
-def refuse_interrupted(out: Path) -> None:
-    """Refuse to replace a run that can be resumed: hours may be in it.
-
-    Raises
-    ------
-    ConflictError
-        If there is one in ``out``, or one that is going on.
-    """
-    status = read_status(out)
-    if status is not None:
-        at = f"it is at {status['time']:g} s" if status else "its status.json is damaged"
-        raise ConflictError(
-            f"run {out.name!r} has not ended ({at}); "
-            f"odscen resume {out} resumes it; delete the folder to begin anew"
-        )
+        return _resume_from(prepared, folder, lock, reporter, finish, live)
 
 
 def interrupted(runs: Path) -> list[str]:
@@ -183,17 +157,18 @@ def about(folder: Path) -> dict[str, Any]:
 
 
 def _resume_from(
-    prepared: PreparedRun,
+    prepared: SumoPreparedRun,
     folder: Path,
     lock: int,
-    progress: OnProgress | None,
+    reporter: Reporter,
     finish: Finish | None,
     live: Companion | None,
 ) -> Run:
     limit = prepared.settings.time_limit
+    reporter.started()
     ended = run_worker(
         folder,
-        progress=progress,
+        progress=reporter.advanced,
         time_limit=limit,
         live=live,
         keep=(lock,),
@@ -202,7 +177,7 @@ def _resume_from(
     clear_parts(folder)  # a torn one takes room that what follows may need
     summary = make_summary(prepared, folder, ended)
     summary["slices"] = _slices(folder)
-    if ended.done is None:
+    if ended.sim_seconds is None:
         kept = summary["slices"]["time"]
         summary["error"] = (
             f"{summary['error']}\nWhat happened up to {kept:g} s is kept; "
@@ -212,7 +187,7 @@ def _resume_from(
         finish(folder, summary)
     summary["files"] = found_files(folder)
     write_whole(folder / layout.SUMMARY_FILE, summary_to_json(summary))
-    if ended.done is None:
+    if ended.sim_seconds is None:
         seal_interrupted(folder)
     else:
         seal_run(folder)
@@ -258,10 +233,11 @@ def _clear(folder: Path) -> None:
     shutil.rmtree(folder / layout.SLICES_FOLDER, ignore_errors=True)
 
 
-def _write_settings(prepared: PreparedRun, folder: Path) -> None:
+def _write_settings(prepared: SumoPreparedRun, folder: Path) -> None:
     settings = {
         "format": FORMAT,
         "version": VERSION,
+        "sealed": "whole",
         "problems": list(prepared.problems),
         "notes": list(prepared.notes),
         "about": dict(prepared.about),
@@ -271,7 +247,32 @@ def _write_settings(prepared: PreparedRun, folder: Path) -> None:
     (folder / layout.SETTINGS_FILE).write_text(text, encoding="utf-8")
 
 
-def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
+def _refuse_unnamed_code(folder: Path, named: BehaviourDoor | None) -> None:
+    """Refuse to execute what only the folder names: it may come from anybody."""
+    path = folder / layout.SUMO_FOLDER / layout.BEHAVIOUR_FILE
+    if not path.is_file():
+        if named is not None:
+            raise InputError("SUMO drives this run; no behaviour model is resumed in it")
+        return
+    stored = read_behaviour(path.read_text(encoding="utf-8"))
+    if named is not None and (
+        (named.name, named.command, named.socket) != (stored.name, stored.command, stored.socket)
+        or (named.options and dict(named.options) != dict(stored.options))
+    ):
+        raise InputError(
+            f"it is not what drives this run, which is {stored.shown!r} with "
+            f"{dict(stored.options) or 'no options'}",
+            element=named.shown,
+        )
+    if named is None and not is_installed(stored):
+        option = "--behaviour-cmd" if stored.command is not None else "--behaviour"
+        raise InputError(
+            f"this run is driven by code that its folder names; name it again if you trust it: "
+            f"odscen resume {folder} {option} {stored.name or stored.command or stored.socket!r}"
+        )
+
+
+def _restore(folder: Path, time_limit: float | None) -> SumoPreparedRun:
     """Read what is left to know of the run; all else is in its files."""
     path = folder / layout.SETTINGS_FILE
     try:
@@ -281,8 +282,10 @@ def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
                 f"format {data['format']!r} version {data['version']!r} is not a run to resume",
                 file=str(path),
             )
+        if data.get("sealed") == "whole":  # earlier versions left some files without checksums
+            refuse_additions(folder)
         expectations = tuple(parse_expectation(text) for text in data["expectations"])
-        return PreparedRun(
+        return SumoPreparedRun(
             plan=Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8")),
             sumo_files={},
             net=folder / layout.SUMO_FOLDER / layout.NET_FILE,

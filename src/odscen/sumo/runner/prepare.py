@@ -12,7 +12,7 @@ from odscen.scenario.document.json_form import dumps
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.sumo_lane_places import lane_places
 from odscen.sumo.runner.forecast import forecast
-from odscen.sumo.runner.run_folder import PreparedRun
+from odscen.sumo.runner.run_folder import SumoPreparedRun
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,7 +41,7 @@ def prepare(
     settings: RunSettings = AS_DESIGNED,
     assigned: Mapping[str, Int32Array] | None = None,
     assignment_json: str | None = None,
-) -> PreparedRun:
+) -> SumoPreparedRun:
     """Realize a scenario and put together what its run folder will hold.
 
     Parameters
@@ -67,7 +67,7 @@ def prepare(
     """
     realization = realize(scenario, sumo_map, assets, settings=settings, assigned=assigned)
     plan = realization.plan
-    return PreparedRun(
+    return SumoPreparedRun(
         plan=plan,
         sumo_files=_with_behaviour(realization.files, settings.behaviour),
         net=net,

@@ -11,12 +11,13 @@ import sys
 import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from odscen.base.errors import SimulationError
 from odscen.base.system_errors import ADVICE, NO_MEMORY, system_words
 from odscen.runs.layout import LOG_FILE, PLAN_FILE
+from odscen.runs.new_run import SimulationOutcome
+from odscen.runs.reporter import Progress
 from odscen.sumo.runner.forked_worker import ForkedWorker, worker_environment
 from odscen.sumo.worker.protocol import (
     Command,
@@ -26,7 +27,6 @@ from odscen.sumo.worker.protocol import (
     FrameMessage,
     MoreRules,
     Outside,
-    Progress,
     ShotMessage,
     State,
     decode,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from odscen.sumo.worker.protocol import Left, Lockstep, Message, OnProgress, Pace
+    from odscen.sumo.worker.protocol import Left, Lockstep, Message, Pace
 
 WORKER = "odscen.sumo.worker.simulate"
 
@@ -67,36 +67,16 @@ class Companion(Protocol):
         """Learn that the worker has ended, however it did."""
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """How a worker process ended.
-
-    Attributes
-    ----------
-    done
-        What it reported at its end; ``None`` if the simulation failed.
-    wall_seconds
-        From starting the process to its end.
-    error
-        Why the run failed, with SUMO's own words where it said any. Together with ``done`` it was
-        the run's companion that failed.
-    """
-
-    done: Done | None
-    wall_seconds: float
-    error: str | None
-
-
 def run_worker(
     folder: Path,
     *,
-    progress: OnProgress | None = None,
+    progress: Callable[[Progress], None] | None = None,
     time_limit: float | None = None,
     live: Companion | None = None,
     keep: tuple[int, ...] = (),
     forked: bool = False,
     results: Callable[[Left], None] | None = None,
-) -> Ended:
+) -> SimulationOutcome:
     """Run the simulation prepared in ``folder``.
 
     Never raises for what happens inside the process: a crash, an error of SUMO's or running out of
@@ -154,13 +134,23 @@ def run_worker(
     if isinstance(last, Done) and not process.returncode and results is not None:
         last = _with_results(last, results)
     if isinstance(last, Done) and not process.returncode:
-        return Ended(last, seconds, live.failure if live else None)
+        return SimulationOutcome(
+            last.sim_seconds,
+            last.steps,
+            seconds,
+            error=live.failure if live else None,
+            stopped=last.stopped,
+            work_seconds=last.wall_seconds,
+        )
     if late.is_set():
-        return Ended(None, seconds, f"stopped after the time limit of {time_limit:g} s")
+        words = f"stopped after the time limit of {time_limit:g} s"
+        return SimulationOutcome(None, None, seconds, error=words)
     said = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
     words = sumo_words(folder)
     reason = _with_lack(folder, said, words)
-    return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
+    if words:
+        reason = f"{reason}\n{words}"
+    return SimulationOutcome(None, None, seconds, error=reason)
 
 
 def _with_results(done: Done, make: Callable[[Left], None]) -> Done | Failed:
@@ -208,7 +198,7 @@ def _started(
 
 def _follow(
     process: subprocess.Popen[bytes] | ForkedWorker,
-    progress: OnProgress | None,
+    progress: Callable[[Progress], None] | None,
     live: Companion | None,
 ) -> Done | Failed | None:
     """Pass on what the worker says; return the last thing it said of its end."""

@@ -9,31 +9,10 @@ no one can watch sends :class:`Progress` and its end only.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, NamedTuple
 
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a run is: simulated seconds, counts of vehicles and persons.
-
-    ``time_left`` is about how many wall seconds it will take at full speed; ``None`` if unknown.
-    """
-
-    time: float
-    until: float
-    running: int
-    departed: int
-    arrived: int
-    planned: int
-    time_left: float | None = None
-
-    @property
-    def share(self) -> float:
-        """Share done, 0 to 1: of the time, or of the arrivals if those are further on."""
-        arrivals = self.arrived / self.planned if self.planned else 0.0
-        return min(1.0, max(self.time / self.until, arrivals))
+from odscen.runs.reporter import Progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +208,6 @@ Message = (
     | State
     | ShotMessage
 )
-OnProgress = Callable[[Progress], None]
 
 _KINDS: dict[str, type[Message | Command | EgoPose | Outside | MoreRules]] = {
     "progress": Progress,

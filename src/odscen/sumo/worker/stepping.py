@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from odscen.runs.reporter import Progress
 from odscen.sumo.worker.diversions import Diversions
 from odscen.sumo.worker.lockstep import LockstepWatch
-from odscen.sumo.worker.protocol import Progress
 from odscen.sumo.worker.recorder import Recorder
 
 if TYPE_CHECKING:

@@ -22,6 +22,7 @@ from odscen.app.scenarios import read_scenario
 from odscen.base.error_data import error_to_data
 from odscen.base.errors import OdscenError
 from odscen.maps.store import Workspace
+from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import Scenario
@@ -36,7 +37,7 @@ from odscen.sumo.worker.protocol import (
 from odscen.web.wire.live_messages import introduction
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from odscen.sumo.worker.protocol import Message
 
@@ -64,6 +65,16 @@ class _Relay(Live):
         os.kill(os.getpid(), signal.SIGTERM)
 
 
+class _WordsReporter(Reporter):
+    """Passes on how far routes have been found."""
+
+    def __init__(self, say: Callable[[Mapping[str, Any]], None]) -> None:
+        self._say = say
+
+    def said(self, words: str) -> None:
+        self._say({"preparing": words})
+
+
 def main() -> int:
     """Do the job; 0 when the run has ended, however it did."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -87,7 +98,7 @@ def main() -> int:
         if not name:
             return 0
         run = replace(checked, name=name, folder=workspace.runs / name)
-        prepared = prepare_run(run, iterated=lambda step: say({"preparing": step.words}))
+        prepared = prepare_run(run, reporter=_WordsReporter(say))
         Path(job["introduction"]).write_text(introduction(prepared.plan), encoding="utf-8")
         say({"slice_length": prepared.plan.slice_length})
         said_all = True

@@ -42,7 +42,7 @@ def file(run: str, name: str, shared: Shared) -> Response:
 def fit(run: str, shared: Shared) -> RunFit:
     """How well a finished run meets the counts of its scenario."""
     folder = shared.runs.kept.whole(run)
-    found = demands.fit(shared.workspace, folder)
+    found = demands.fit_counts(shared.workspace, folder)
     scenario = read_scenario(folder / SCENARIO_FILE)
     graph = shared.map_of(scenario).sumo.graph
     points = place_points(graph, [row.place for row in found.rows])

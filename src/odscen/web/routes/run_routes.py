@@ -76,7 +76,8 @@ def list_runs(shared: Shared, scenario: str | None = None) -> list[RunInfo]:
 @router.post("", status_code=202)
 def start(wish: NewRun, shared: Shared) -> RunStarted:
     """Run a scenario as it is now."""
-    if shared.large is not None and shared.large.is_large(wish.scenario) and not wish.carla:
+    alone = not wish.carla and wish.simulator is None
+    if alone and shared.large is not None and shared.large.is_large(wish.scenario):
         return RunStarted(run=shared.runs.start_large(wish.scenario, wish))
     draft = shared.drafts.get(wish.scenario)
     return RunStarted(run=shared.runs.start(draft.name, draft.scenario, wish))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 import orjson
 from fastapi import APIRouter, File, Form, Query, UploadFile
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -24,6 +25,7 @@ from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.problems import Problem
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.edits import new_scenario
+from odscen.scenario.edits.edit_messages import AnyEdit, edits_label
 from odscen.scenario.edits.roi_edits import eligible_segments, removable_segments
 from odscen.scenario.forms.graph_form import to_graphml
 from odscen.scenario.placing.region import NodePlace as GraphPlace
@@ -33,7 +35,6 @@ from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.road_users.planned_positions import planned_positions
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.runner.network_fit import place_fit
-from odscen.web.edit_requests import EditRequest
 from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import (
     CopyName,
@@ -79,6 +80,27 @@ _FILE: Responses = {
 OnlyChanges = Annotated[
     bool, Query(description="Answer with what has changed, in place of all, and without problems.")
 ]
+
+_MOST_EDITS = 5000
+"""In one request."""
+
+
+class EditRequest(BaseModel):
+    """Edits of one version: all of them or none, and one step for undo.
+
+    ``label`` says in words what they do together; needed only where there are several.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    version: Annotated[int, Field(ge=0, lt=2**53)]
+    edits: Annotated[list[AnyEdit], Field(min_length=1, max_length=_MOST_EDITS)]
+    label: Annotated[str, Field(min_length=1, max_length=80)] | None = None
+
+    @property
+    def step_label(self) -> str:
+        """What undo and redo call this."""
+        return self.label or edits_label(self.edits)
 
 
 @router.get("")
@@ -180,7 +202,9 @@ def edit(
             scenario = apply_edit(one, scenario, loaded)
         return scenario
 
-    changed = shared.drafts.change(name, request.version, request.words, change)
+    changed = shared.drafts.change(
+        name, request.version, request.step_label, change, edits=request.edits
+    )
     return _changed(shared, changed, changes=changes)
 
 

@@ -14,7 +14,7 @@ from odscen.app.scenarios import read_scenario
 from odscen.app.signals.green_waves import coordinate_signals
 from odscen.app.signals.program_editing import stretch_cycle, take_over_program
 from odscen.app.signals.signal_optimisation import time_signals
-from odscen.app.signals.signal_plans import export_signals, lights_of, take_signals
+from odscen.app.signals.signal_plans import export_signals, signal_programs, take_signals
 from odscen.app.signals.signal_views import (
     chosen_lights,
     detector_lanes,
@@ -90,7 +90,7 @@ _Calls = dict[str, list[tuple[float, float]]]
 def of_scenario(name: str, junction: str, shared: Shared) -> LightProgramInfo:
     """What a light is told to show in a scenario, with all plans of the day."""
     scenario = shared.drafts.get(name).scenario
-    lights = lights_of(shared.workspace, scenario, whole_day=True)
+    lights = signal_programs(shared.workspace, scenario, whole_day=True)
     light = chosen_lights(lights, [junction])[0]
     info = _program(light, scenario, shared, {})
     loaded = shared.map_of(scenario)
@@ -193,7 +193,7 @@ def light_of_run(run: str, junction: str, shared: Shared) -> LightProgramInfo:
     folder = _finished(run, shared)
     if folder is None:
         scenario = shared.runs.active(run).scenario
-        lights = lights_of(shared.workspace, scenario)
+        lights = signal_programs(shared.workspace, scenario)
         return _program(chosen_lights(lights, [junction])[0], scenario, shared, {})
     scenario = read_scenario(folder / layout.SCENARIO_FILE)
     text = (folder / layout.LIGHTS_FILE).read_text(encoding="utf-8")

@@ -11,11 +11,18 @@ from typing import TYPE_CHECKING
 from odscen.app.scenarios import SUFFIX
 from odscen.base.atomic_folders import discard
 from odscen.base.errors import ConflictError, InputError, NotFoundError
-from odscen.experiments.studies.executors import LocalExecutor
-from odscen.experiments.studies.study_folder import PAGE_FILE, STUDY_FILE, TABLE_FILE, read_study
-from odscen.experiments.studies.study_plan import StudyPlan
-from odscen.experiments.studies.study_report import SHOWN_FIGURES, write_study_page
-from odscen.experiments.studies.study_runs import begin_study_of, carry_out_study, study_state
+from odscen.experiments.plan import StudyPlan
+from odscen.experiments.studies import (
+    PAGE_FILE,
+    STUDY_FILE,
+    TABLE_FILE,
+    begin_study_of,
+    carry_out_study,
+    read_study,
+    study_state,
+)
+from odscen.experiments.study_page import SHOWN_FIGURES, write_study_page
+from odscen.experiments.work import LocalExecutor
 from odscen.maps.folder_names import check_name, plain_name
 from odscen.scenario.document.validation import validated
 from odscen.web.studies.study_messages import MOST_PAGE_RUNS, StudyInfo, StudyProblem
@@ -25,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from odscen.experiments.studies.study_runs import StudyState
+    from odscen.experiments.studies import StudyState
     from odscen.maps.store import Workspace
     from odscen.web.studies.study_messages import ResumeStudy, StudyStatus, StudyWish
 

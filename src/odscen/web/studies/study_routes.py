@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
-from odscen.experiments.studies.study_report import SHOWN_FIGURES, figures_had, study_groups
+from odscen.experiments.study_page import SHOWN_FIGURES, figures_had, study_groups
 from odscen.figures.measures.registry import run_figure
 from odscen.web.services import Shared
 from odscen.web.studies.study_messages import (
@@ -24,7 +24,7 @@ from odscen.web.wire.media_types import ANY_FILE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.experiments.studies.study_report import StudyGroup
+    from odscen.experiments.study_page import StudyGroup
 
 router = APIRouter(prefix="/api/studies")
 

@@ -11,20 +11,26 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.atomic_folders import discard
 from odscen.base.errors import ConflictError, InputError, NotFoundError
-from odscen.experiments.sweeps.sweep_cases import opened_case
-from odscen.experiments.sweeps.sweep_estimate import PATIENCE, estimate
-from odscen.experiments.sweeps.sweep_folder import (
+from odscen.experiments.sweeps import (
+    PAGE_FILE,
+    PATIENCE,
     SWEEP_FILE,
+    TABLE_FILE,
     SweepSettings,
     begin_sweep,
+    estimate,
+    limits_of,
+    opened_case,
     read_plan,
     read_sweep,
+    read_table,
+    refuse_unknown,
     settings_from_dict,
+    sweep,
 )
-from odscen.experiments.sweeps.sweep_runs import refuse_unknown, sweep
-from odscen.experiments.sweeps.sweep_table import PAGE_FILE, TABLE_FILE, limits_of, read_table
 from odscen.maps.folder_names import check_name
 from odscen.runs import layout
+from odscen.runs.reporter import Reporter
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
 from odscen.web.studies.under_way import OneAtATime, UnderWay
 from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
@@ -32,8 +38,9 @@ from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.experiments.sweeps.sweep_table import Sweep
+    from odscen.experiments.sweeps import Sweep
     from odscen.maps.store import Workspace
+    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
     from odscen.web.sweeps.sweep_messages import SweepState, SweepWish
@@ -43,6 +50,17 @@ _FILES = re.compile(
     rf"|runs/case-\d+/{re.escape(layout.REPORT_FILE)}"
 )
 """What of a sweep can be downloaded."""
+
+
+class _SweepReporter(Reporter):
+    """Ends runs whose sweep has been stopped."""
+
+    def __init__(self, sweep: UnderWay) -> None:
+        self._sweep = sweep
+
+    def advanced(self, progress: Progress) -> None:
+        del progress
+        self._sweep.check()
 
 
 class Sweeps:
@@ -232,7 +250,7 @@ class Sweeps:
                 settings=settings,
                 processes=processes,
                 tell=lambda _words: known.check(),
-                progress=lambda _job, _message: known.check(),
+                reporter=_SweepReporter(known),
                 done=done,
             )
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
 from odscen.base.errors import ConflictError, InputError
-from odscen.experiments.cases.sweep_rows import UNITS
+from odscen.experiments.sweep_rows import UNITS
 from odscen.scenario.document.json_form import dumps
 from odscen.web.messages import ScenarioState
 from odscen.web.routes.scenario_routes import state_of

@@ -26,6 +26,10 @@ class ChosenBehaviour(RequestBody):
     options: Annotated[dict[str, OptionValue], Field(max_length=100)] = Field(default_factory=dict)
 
 
+class ChosenSimulator(ChosenBehaviour):
+    """An installed simulator by its name, and options that differ from its usual ones."""
+
+
 class NewRun(RequestBody):
     """Run a scenario as it is now.
 
@@ -34,6 +38,7 @@ class NewRun(RequestBody):
     Places of road users are recorded ``every`` so many seconds, ``None`` with each step, unless
     ``trajectories`` is false. With ``carla`` it is shown on the CARLA server too, step by step, and
     recorded whole. Vehicles are driven by a ``behaviour`` model, ``None`` for SUMO's drivers.
+    A ``simulator`` plays it instead of SUMO.
     """
 
     scenario: Name
@@ -46,6 +51,7 @@ class NewRun(RequestBody):
     every: Annotated[float, Field(gt=0, le=3600)] | None = None
     carla: bool = False
     behaviour: ChosenBehaviour | None = None
+    simulator: ChosenSimulator | None = None
 
 
 class GoOn(RequestBody):

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import PreparedRun
+    from odscen.sumo.runner.run_folder import SumoPreparedRun
 
 STAY = {"kind": "uniform", "low": 60, "high": 200}
 
 
-def prepared(scenario: Scenario, folder: Path, **options: Any) -> PreparedRun:
+def prepared(scenario: Scenario, folder: Path, **options: Any) -> SumoPreparedRun:
     folder.mkdir(exist_ok=True)
     net = folder / "net.net.xml"
     net.write_bytes(parking_town().net_xml)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import Int32Array
     from odscen.base.categories import Body
+    from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.placing.region import Region
@@ -224,33 +225,61 @@ class RoadUserWriter:
     def _planned(
         self, user: RoadUser, body: Body, behaviour: Driver, planned: _PlannedRoute
     ) -> PlannedActor:
-        graph = self._graph.walks if user.person else self._graph.lanes
-        name = walk_node_id if user.person else node_id
-        spawn = user.spawn
-        hdg = float(graph.hdg[spawn])
-        appears = user.id in self.demand.held
-        return PlannedActor(
-            id=user.id,
-            category=user.category.value,
-            spawn=name(self._graph, spawn),
-            goal=name(self._graph, user.goal),
-            depart=self.until if appears else user.depart,
-            length=body.length,
-            width=body.width,
-            x=float(graph.x[spawn]) - math.sin(hdg) * user.design.lateral_offset,
-            y=float(graph.y[spawn]) + math.cos(hdg) * user.design.lateral_offset,
-            z=float(graph.z[spawn]),
-            hdg=hdg,
-            speed=user.speed,
-            speed_factor=behaviour.speed_factor,
+        return planned_actor(
+            self._graph,
+            user,
+            body,
+            behaviour,
             route_length=planned.length,
             free_flow_time=planned.free_flow_time,
-            model=user.design.model,
-            flow=user.flow,
-            ego=user.design.ego,
             problem=planned.problem,
             informed=self._ways.informed(user),
-            begins_in=user.begins.area if user.begins else None,
-            ends_in=user.ends.area if user.ends else None,
-            appears=appears,
+            appears_at=self.until if user.id in self.demand.held else None,
         )
+
+
+def planned_actor(
+    graph: MapGraph,
+    user: RoadUser,
+    body: Body,
+    behaviour: Driver,
+    *,
+    route_length: float,
+    free_flow_time: float | None,
+    problem: str | None,
+    informed: bool = False,
+    appears_at: float | None = None,
+) -> PlannedActor:
+    """Line of a road user in the plan of a run.
+
+    ``appears_at`` is the end of the run, s, of one that a rule lets appear.
+    """
+    nodes = graph.walks if user.person else graph.lanes
+    name = walk_node_id if user.person else node_id
+    spawn = user.spawn
+    hdg = float(nodes.hdg[spawn])
+    return PlannedActor(
+        id=user.id,
+        category=user.category.value,
+        spawn=name(graph, spawn),
+        goal=name(graph, user.goal),
+        depart=user.depart if appears_at is None else appears_at,
+        length=body.length,
+        width=body.width,
+        x=float(nodes.x[spawn]) - math.sin(hdg) * user.design.lateral_offset,
+        y=float(nodes.y[spawn]) + math.cos(hdg) * user.design.lateral_offset,
+        z=float(nodes.z[spawn]),
+        hdg=hdg,
+        speed=user.speed,
+        speed_factor=behaviour.speed_factor,
+        route_length=route_length,
+        free_flow_time=free_flow_time,
+        model=user.design.model,
+        flow=user.flow,
+        ego=user.design.ego,
+        problem=problem,
+        informed=informed,
+        begins_in=user.begins.area if user.begins else None,
+        ends_in=user.ends.area if user.ends else None,
+        appears=appears_at is not None,
+    )

@@ -10,6 +10,7 @@ The page chooses among these and those that ship; it cannot name a module or a p
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.learning.named_objects import named_object
 from odscen.learning.offered_models import installed_names, offered_models
 from odscen.learning.offered_options import values_for
+from odscen.runs.layout import BEHAVIOUR_FILE
 from odscen.sumo.worker.behaviour.piped_driver import PipedDriver, SocketDriver
 
 if TYPE_CHECKING:
@@ -69,6 +71,26 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
             raise InputError(f"it has no method `{method}`", element=name)
     model: BehaviourModel = made
     return model
+
+
+def read_behaviour(text: str) -> BehaviourDoor:
+    """Where the model of a run comes from, as its folder says.
+
+    Raises
+    ------
+    InputError
+        If that cannot be read.
+    """
+    try:
+        return BehaviourDoor(**json.loads(text))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"it names no behaviour model: {error}", file=BEHAVIOUR_FILE) from error
+
+
+def is_installed(door: BehaviourDoor) -> bool:
+    """Whether a model ships or belongs to an installed package, and is no code of a folder."""
+    other = door.command is not None or door.socket is not None
+    return not other and door.name in installed_names(GROUP, _SHIPPED)
 
 
 def installed_behaviours() -> tuple[OfferedModel, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import weakref
 from typing import TYPE_CHECKING, Any
@@ -11,11 +10,11 @@ import numpy as np
 
 from odscen.base.errors import InputError, OdscenError, SimulationError
 from odscen.base.frames import angle_deg_from_hdg
-from odscen.learning.behaviour.behaviour_model import BehaviourDoor, DrivingKind
+from odscen.learning.behaviour.behaviour_model import DrivingKind
 from odscen.learning.behaviour.checked_action import CheckedAction
 from odscen.runs.layout import BEHAVIOUR_FILE, SUMO_FOLDER
 from odscen.scenario.document.named_random import stream
-from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour
+from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour, read_behaviour
 from odscen.sumo.worker.behaviour.road_sight import RoadSight
 
 if TYPE_CHECKING:
@@ -64,7 +63,7 @@ class BehaviourRun:
             If it cannot be made.
         """
         text = (run / SUMO_FOLDER / BEHAVIOUR_FILE).read_text(encoding="utf-8")
-        door = BehaviourDoor(**json.loads(text))
+        door = read_behaviour(text)
         return cls(open_behaviour(door, plan.seed), plan, door.shown)
 
     def before_step(self, session: Session, taken: Collection[str]) -> None:

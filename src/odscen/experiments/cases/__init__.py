@@ -1,1 +1,0 @@
-"""Sweeps: a row for each case, the boundary between safe and not, and a page."""

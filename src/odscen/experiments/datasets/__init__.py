@@ -1,1 +1,0 @@
-"""Datasets: recordings of many runs, divided by towns, in formats that learners read."""

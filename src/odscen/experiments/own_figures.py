@@ -1,0 +1,124 @@
+"""Figures of a suite's own: a Python function of the finished run, named in the suite."""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from odscen.app.figure_functions import value_of
+from odscen.base.errors import InputError
+from odscen.experiments.tolerance import parse_tolerance
+from odscen.figures.measures.figure import Better, Figure
+from odscen.figures.measures.registry import names_of
+from odscen.scenario.document.document_parts import Label, Part
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from odscen.runs.finished_run import Run
+
+
+def _free(name: str) -> str:
+    if name in names_of("run"):
+        raise ValueError(f"{name} is a figure of odscen; give yours another name")
+    return name
+
+
+FigureName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$"), AfterValidator(_free)]
+
+
+class FigureEntry(Part):
+    """``[figures.NAME]`` of a suite; ``function`` is ``FILE.py:NAME``, relative to the suite."""
+
+    function: Annotated[str, Field(pattern=r"^[^:\x00]+\.py:[A-Za-z_][A-Za-z0-9_]*$")]
+    unit: Annotated[str, Field(max_length=20)] = ""
+    label: Label | None = None
+    better: Better = Better.NEITHER
+    tolerance: str = "2 %"
+
+
+def declared(data: Mapping[str, Any]) -> dict[str, Figure]:
+    """Figures that the text of a suite declares, before it has been validated."""
+    entries = data.get("figures")
+    found = {}
+    for name, entry in entries.items() if isinstance(entries, dict) else ():
+        given = entry if isinstance(entry, dict) else {}
+        found[name] = Figure(
+            name=name,
+            unit=str(given.get("unit", "")),
+            label=str(given.get("label") or name.replace("_", " ")),
+            definition="Defined by the suite.",
+            source=str(given.get("function", "")),
+            better=next((one for one in Better if one == given.get("better")), Better.NEITHER),
+            tolerance=str(given.get("tolerance", "2 %")),
+        )
+    return found
+
+
+def refuse_tolerances(figures: Mapping[str, Figure]) -> None:
+    """Read the tolerance of each figure.
+
+    Raises
+    ------
+    InputError
+        If one is none; names the figure.
+    """
+    for name, figure in figures.items():
+        try:
+            parse_tolerance(figure.tolerance, figure)
+        except InputError as error:
+            raise InputError(error.problem, element=f"figures.{name}.tolerance") from error
+
+
+def own_values(figures: Mapping[str, Figure], run: Run, *, beside: Path) -> dict[str, float | None]:
+    """Compute the figures of a finished run; functions are in files relative to ``beside``.
+
+    Raises
+    ------
+    InputError
+        If a function cannot be loaded, raises, or returns anything but a number or ``None``.
+    """
+    found: dict[str, float | None] = {}
+    for name, figure in figures.items():
+        file, _, function = figure.source.rpartition(":")
+
+        def call(run: Run, file: Path = beside / file, function: str = function) -> object:
+            return _function(file, function)(run)
+
+        found[name] = value_of(call, run, source=figure.source, element=f"figures.{name}")
+    return found
+
+
+def own_column(name: str, function: str, *, beside: Path) -> Callable[[Run], float | None]:
+    """Make a function of a finished run of ``FILE.py:NAME``; errors of :func:`own_values`.
+
+    Raises
+    ------
+    InputError
+        If it does not name a function of a file.
+    """
+    try:
+        FigureEntry(function=function)
+    except ValueError as error:
+        raise InputError(f"{name}={function}: give the function as FILE.py:NAME") from error
+    figure = Figure(
+        name=name, unit="", label=name, definition="", source=function, better=Better.NEITHER,
+        tolerance="2 %",
+    )  # fmt: skip
+    return lambda run: own_values({name: figure}, run, beside=beside)[name]
+
+
+@cache
+def _function(file: Path, name: str) -> Callable[[Run], object]:
+    """Load a function from a file; the file is run once."""
+    spec = importlib.util.spec_from_file_location(f"odscen_figures_{file.stem}", file)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{file} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    function: Callable[[Run], object] = getattr(module, name)
+    return function

@@ -1,1 +1,0 @@
-"""Search for critical cases: what to try next, and what has been found."""

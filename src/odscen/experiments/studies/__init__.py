@@ -1,1 +1,0 @@
-"""Studies: many runs as data, with a plan, a state and one table of results."""

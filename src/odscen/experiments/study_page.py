@@ -1,0 +1,253 @@
+"""A study as a page: means with confidence intervals, differences of variants, and failures.
+
+Of the ``n`` values of a figure with mean ``m`` and standard deviation ``s`` the interval is
+``m +- t(0.975, n - 1) s / sqrt(n)``, as of :mod:`odscen.app.running.confident_runs`. Differences
+of a variant are taken between runs of the same scenario, case and seed, so that what they share
+does not count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.app.running.confident_runs import confidence_of
+from odscen.base.errors import InputError
+from odscen.base.markup import Markup, element, join
+from odscen.base.text_files import write_text
+from odscen.experiments.studies import study_results
+from odscen.experiments.study_rows import FIGURE_COLUMNS
+from odscen.figures.measures.registry import run_figure
+from odscen.records.outcomes import RunStatus
+from odscen.reports.page_templates import html_page, html_table, page_head, report_section
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    import polars as pl
+
+    from odscen.app.running.confident_runs import Confidence
+    from odscen.experiments.studies import StudyState
+
+SHOWN_FIGURES: Final = ("mean_speed", "mean_delay", "arrived", "collided")
+MOST_ROWS: Final = 500
+"""Of a table on the page; the Parquet file has all."""
+_SHARE: Final = 0.05
+_KEYS: Final = ["scenario", "case", "seed"]
+
+
+@dataclass(frozen=True, slots=True)
+class StudyGroup:
+    """Runs of one scenario and variant that have completed, or their differences.
+
+    Attributes
+    ----------
+    figures
+        Confidence intervals by figure.
+    values
+        By figure, of the runs that have it, in the order of the study.
+    """
+
+    scenario: str
+    variant: str
+    runs: int
+    figures: Mapping[str, Confidence]
+    values: Mapping[str, Sequence[float]]
+
+    def words(self, name: str) -> str:
+        """``12.40 +- 0.31``, or a dash."""
+        one = self.figures[name]
+        if one.mean is None:
+            return "-"
+        return f"{one.mean:.2f} +- {one.half_width:.2f}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready."""
+        return {
+            "scenario": self.scenario,
+            "variant": self.variant,
+            "runs": self.runs,
+            "figures": {
+                name: {"mean": one.mean, "half_width": one.half_width, "runs": one.seeds}
+                for name, one in self.figures.items()
+            },
+        }
+
+
+def study_groups(out: Path, figures: Sequence[str]) -> tuple[list[StudyGroup], list[StudyGroup]]:
+    """Means of figures by scenario and variant, in the order of the study; then differences.
+
+    Raises
+    ------
+    InputError
+        If there is no study, or no such figure.
+    """
+    _refuse_unknown(figures)
+    own = _completed(study_results(out).table)
+    return _groups(own, figures), paired_differences(own, figures)
+
+
+def figures_had(out: Path) -> list[str]:
+    """Figures that any run of a study has, in their usual order; those of all studies without any.
+
+    Raises
+    ------
+    InputError
+        If there is no study.
+    """
+    table = _completed(study_results(out).table)
+    had = [name for name in FIGURE_COLUMNS if table[name].null_count() < table.height]
+    return had or list(SHOWN_FIGURES)
+
+
+def _refuse_unknown(figures: Iterable[str]) -> None:
+    for name in figures:
+        if run_figure(name) is None:
+            raise InputError(f"no figure of runs is called {name!r}")
+
+
+def _completed(table: pl.DataFrame) -> pl.DataFrame:
+    import polars as pl
+
+    return table.filter(pl.col("status") == str(RunStatus.COMPLETED))
+
+
+def _groups(table: pl.DataFrame, figures: Sequence[str]) -> list[StudyGroup]:
+    return [
+        StudyGroup(
+            str(scenario),
+            str(variant),
+            part.height,
+            {
+                name: confidence_of(part[name].to_list(), share=_SHARE, figure=name)
+                for name in figures
+            },
+            {name: part[name].drop_nulls().to_list() for name in figures},
+        )
+        for (scenario, variant), part in table.group_by("scenario", "variant", maintain_order=True)
+    ]
+
+
+def paired_differences(table: pl.DataFrame, figures: Sequence[str]) -> list[StudyGroup]:
+    """By how much variants differ from the first one, run by run of the same case and seed.
+
+    Parameters
+    ----------
+    table
+        Runs that have completed.
+    """
+    import polars as pl
+
+    variants = table["variant"].unique(maintain_order=True).to_list()
+    if len(variants) < 2:
+        return []
+    first = table.filter(pl.col("variant") == variants[0]).select(*_KEYS, *figures)
+    both = table.filter(pl.col("variant") != variants[0]).join(
+        first, on=_KEYS, suffix=" before", nulls_equal=True, maintain_order="left"
+    )
+    differences = [pl.col(name) - pl.col(f"{name} before") for name in figures]
+    return _groups(both.with_columns(differences), figures)
+
+
+def write_study_page(out: Path, figures: Sequence[str], file: Path) -> Path:
+    """Write the page of a study, of all runs that have ended by now.
+
+    Raises
+    ------
+    InputError
+        If there is no study, or no such figure.
+    WorkspaceError
+        If it cannot be written.
+    """
+    _refuse_unknown(figures)
+    results = study_results(out)
+    return write_text(file, study_page(results.state, results.table, figures))
+
+
+def study_page(state: StudyState, table: pl.DataFrame, figures: Sequence[str]) -> str:
+    """Page of a study; equal tables give equal text."""
+    own = _completed(table)
+    parts = [
+        _head(state),
+        _section("Means", "means", _groups(own, figures), figures, _MEANS),
+        _section("Differences", "differences", paired_differences(own, figures), figures, _PAIRS),
+        _problems(state),
+    ]
+    return html_page(f"{state.name} - study", join([part for part in parts if part]))
+
+
+_MEANS: Final = (
+    "means over all runs of a scenario and variant that completed, with their 95 % confidence "
+    "intervals; a dash where fewer than two runs have the figure."
+)
+_PAIRS: Final = (
+    "by how much a variant differs from the scenario as designed (or the first variant), as mean "
+    "and 95 % confidence interval of the differences of runs with the same case and seed: an "
+    "interval without 0 says that it matters."
+)
+_FAILURES: Final = "why runs failed, or were not possible, most frequent first."
+
+
+def _head(state: StudyState) -> Markup:
+    bad = state.ended - state.counts["completed"]
+    left = state.runs - state.ended
+    verdict = f"{bad:,} of {state.runs:,} runs failed" if bad else "All runs completed"
+    if left:
+        verdict = f"{left:,} of {state.runs:,} runs have not ended"
+    counts = ", ".join(f"{count:,} {status}" for status, count in state.counts.items() if count)
+    return page_head(
+        "Study",
+        state.name,
+        element("p", f"{state.runs:,} runs: {counts or 'none has ended'}."),
+        verdict=verdict,
+        style="bad" if bad else "fair" if left else "good",
+    )
+
+
+def _section(
+    title: str, ident: str, groups: Sequence[StudyGroup], figures: Sequence[str], explained: str
+) -> Markup | None:
+    if not groups:
+        return None
+    rows = [
+        element(
+            "tr",
+            element("th", one.scenario, scope="row"),
+            element("td", one.variant),
+            element("td", f"{one.runs:,}", class_="n"),
+            *(element("td", one.words(name), class_="n") for name in figures),
+        )
+        for one in groups[:MOST_ROWS]
+    ]
+    heads = ("Scenario", "Variant", "Runs", *map(_label, figures))
+    more = len(groups) - MOST_ROWS
+    return report_section(
+        title,
+        html_table(heads, rows, label=title),
+        element("p", f"and {more:,} more in the table") if more > 0 else None,
+        explained=explained,
+        ident=ident,
+    )
+
+
+def _label(name: str) -> str:
+    figure = run_figure(name)
+    if figure is None:
+        return name
+    return f"{figure.label}, {figure.unit}" if figure.unit else figure.label
+
+
+def _problems(state: StudyState) -> Markup | None:
+    if not state.problems:
+        return None
+    rows = [
+        element(
+            "tr",
+            element("td", f"{count:,}", class_="n"),
+            element("td", words, class_="wrap"),
+        )
+        for words, count in state.problems[:MOST_ROWS]
+    ]
+    table = html_table(("Runs", "Why"), rows, label="Failures")
+    return report_section("Failures", table, explained=_FAILURES, ident="failures")

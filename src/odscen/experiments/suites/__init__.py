@@ -1,1 +1,0 @@
-"""Suites: what they hold, their runs, and how their results are shown."""

@@ -1,0 +1,688 @@
+"""Sweeps: a scenario run with many values of its parameters, or what is missing of them.
+
+The folder: ``sweep.json`` (what is swept, and how it is judged), ``scenario.json`` (the scenario
+with its formulas), ``cases/`` (each case as a scenario of numbers only), ``runs/`` (a run folder
+for each), ``cases.parquet`` (a row for each) and ``sweep.html``.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.app.export import export
+from odscen.app.figure_functions import installed_value, is_installed
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
+from odscen.app.scenarios import SUFFIX, read_scenario, scenario_name
+from odscen.base.durations import clock
+from odscen.base.errors import ConflictError, InputError, NotFoundError, ScenarioError, in_file
+from odscen.base.folder_locks import locked
+from odscen.base.stored_files import read_document
+from odscen.base.system_errors import disk_errors
+from odscen.base.text_files import write_text
+from odscen.experiments.sweep_page import SweepShown, safe_boundary, sweep_page
+from odscen.experiments.sweep_rows import OUTCOME, limit_from_text, outcome_of
+from odscen.figures.measures.registry import run_figure
+from odscen.formats.openscenario.dialect import Dialect
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
+from odscen.records.outcomes import RunStatus
+from odscen.records.run_events import events_from_json
+from odscen.runs import layout
+from odscen.runs.finished_run import Run
+from odscen.runs.recorded import read_conflicts
+from odscen.runs.recording import Recording
+from odscen.runs.reporter import SILENT, Reporter
+from odscen.runs.run_settings import RunSettings
+from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.sweeps.sweep_plan import concrete, plan_from_data
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping, Sequence
+
+    import polars as pl
+
+    from odscen.app.running.runs import CheckedRun
+    from odscen.experiments.sweep_rows import Limit
+    from odscen.maps.store import Workspace
+    from odscen.runs.reporter import Progress
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.sweeps.sweep_plan import SweepPlan
+
+
+FORMAT: Final = "odscen-sweep"
+VERSION: Final = 1
+SWEEP_FILE, SCENARIO_FILE = "sweep.json", "scenario.json"
+
+
+@dataclass(frozen=True, slots=True)
+class SweepSettings:
+    """How a sweep is run and judged.
+
+    Attributes
+    ----------
+    safe
+        Limits that a case needs to keep to be safe, besides no collision: ``min_ttc >= 1.5``.
+    figures
+        Figures of runs that are columns as well.
+    own
+        Columns of one's own: functions of a finished run.
+    seed
+        Of every run; the scenario's if not given.
+    reports
+        Whether each run has a report.
+    openscenario
+        Version of OpenSCENARIO in which each case is written as well, ``1.0`` to ``1.3``.
+    behaviour
+        What drives vehicles instead of SUMO.
+    """
+
+    safe: Sequence[str] = ()
+    figures: Sequence[str] = ()
+    own: Mapping[str, Callable[[Run], float | None]] = field(default_factory=dict)
+    seed: int | None = None
+    reports: bool = False
+    openscenario: str | None = None
+    behaviour: BehaviourDoor | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready; columns of one's own by name."""
+        said = {
+            "safe": list(self.safe),
+            "figures": [*self.figures, *self.own],
+            "seed": self.seed,
+        }
+        return said if self.behaviour is None else said | {"behaviour": asdict(self.behaviour)}
+
+
+def settings_from_dict(data: Mapping[str, Any]) -> SweepSettings:
+    """Read what :meth:`SweepSettings.to_dict` writes, of a sweep without columns of one's own."""
+    given = data.get("behaviour")
+    return SweepSettings(
+        tuple(data["safe"]),
+        tuple(data["figures"]),
+        seed=data["seed"],
+        behaviour=None if given is None else BehaviourDoor(**given),
+    )
+
+
+def read_plan(out: Path) -> tuple[SweepPlan, dict[str, Any]]:
+    """Read what a folder varies, and how it is judged.
+
+    Raises
+    ------
+    InputError
+        If there is no sweep.
+    """
+    file = out / SWEEP_FILE
+    if not file.is_file():
+        raise InputError("no sweep is here: it has no sweep.json", file=str(out))
+    with in_file(str(file)):
+        data = read_document(file.read_bytes(), form=FORMAT, version=VERSION, what="a sweep")
+        plan, settings = data.get("plan"), data.get("settings")
+        if not isinstance(plan, dict) or not isinstance(settings, dict):
+            raise InputError("a sweep has a plan and settings, and this has none")
+        return plan_from_data(plan), settings
+
+
+def read_sweep(out: Path) -> tuple[Scenario, SweepPlan, dict[str, Any]]:
+    """Read what a folder sweeps, and how it is judged.
+
+    Raises
+    ------
+    InputError
+        If there is no sweep.
+    """
+    plan, settings = read_plan(out)
+    text = (out / SCENARIO_FILE).read_bytes()
+    return loads(text, file=str(out / SCENARIO_FILE)), plan, settings
+
+
+def begin_sweep(out: Path, scenario: Scenario, plan: SweepPlan, settings: SweepSettings) -> None:
+    """Write what is swept.
+
+    Raises
+    ------
+    ConflictError
+        If the folder holds another sweep.
+    """
+    head = {"format": FORMAT, "version": VERSION}
+    said = head | {"plan": plan.to_dict(), "settings": settings.to_dict()}
+    begin_folder(out, {SWEEP_FILE: said}, scenario, what="sweep")
+
+
+def begin_folder(
+    out: Path, said: Mapping[str, Mapping[str, Any]], scenario: Scenario, *, what: str
+) -> None:
+    """Write what the folder of a sweep or a search is about, by file, and its scenario.
+
+    Raises
+    ------
+    ConflictError
+        If the folder holds another one.
+    """
+    files = {
+        name: json.dumps(data, indent=2, ensure_ascii=False) + "\n" for name, data in said.items()
+    }
+    files[SCENARIO_FILE] = dumps(scenario)
+    there = {name: out / name for name in files if (out / name).is_file()}
+    for name, file in there.items():
+        if file.read_text(encoding="utf-8") != files[name]:
+            raise ConflictError(f"{out} holds another {what} ({name} differs); name another folder")
+    for name in files.keys() - there.keys():
+        write_text(out / name, files[name])
+
+
+TABLE_FILE: Final = "cases.parquet"
+PAGE_FILE: Final = "sweep.html"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sweep:
+    """A sweep that has been run.
+
+    Attributes
+    ----------
+    folder
+        With all files.
+    table
+        One row per case: ``case``, ``status``, ``safe``, ``detail``, the parameters, ``collision``,
+        ``impact_speed`` (m/s), ``min_ttc`` (s), ``min_pet`` (s), ``max_drac`` (m/s^2), and figures
+        that were asked for. ``safe`` is null where a case was not run.
+    boundary
+        Stretches ``((x, y), (x, y))`` of the boundary between safe cases and others, in the plane
+        of the parameters, if there are two.
+    """
+
+    folder: Path
+    table: pl.DataFrame
+    boundary: tuple[tuple[tuple[float, float], tuple[float, float]], ...]
+
+
+def limits_of(settings: SweepSettings) -> tuple[Limit, ...]:
+    """Read what a safe case keeps.
+
+    Raises
+    ------
+    InputError
+        If a figure or a column of a limit is unknown.
+    """
+    for name in settings.figures:
+        if run_figure(name) is None and not is_installed(name):
+            raise InputError(
+                f"no figure of runs is called {name!r}, and no installed package offers one"
+            )
+    columns = [*OUTCOME, *settings.figures, *settings.own]
+    return tuple(limit_from_text(text, columns) for text in settings.safe)
+
+
+def rows_of(
+    scenario: Scenario,
+    cases: Mapping[str, Mapping[str, float]],
+    out: Path,
+    *,
+    refused: Mapping[str, str],
+    settings: SweepSettings,
+    limits: Sequence[Limit],
+) -> list[dict[str, Any]]:
+    """A row for each case, from its run folder; ``refused`` are cases without, and why.
+
+    The ``status`` of a case that has not been run yet is ``waiting``.
+    """
+    watched = watched_actors(scenario)
+    rows = []
+    for name, values in cases.items():
+        row: dict[str, Any] = {"case": name, "status": "refused", "safe": None}
+        row |= {"detail": refused.get(name), **values}
+        measured = dict.fromkeys([*OUTCOME, *settings.figures, *settings.own])
+        folder = out / "runs" / name
+        if name not in refused and not (folder / layout.SUMMARY_FILE).is_file():
+            row["status"] = "waiting"
+        elif name not in refused:
+            run = Run.open(folder)
+            row["status"] = str(run.status)
+            if run.status is RunStatus.COMPLETED:
+                measured = _measured(run, settings, watched)
+                row["safe"] = not measured["collision"] and all(
+                    limit.holds(measured) for limit in limits
+                )
+            else:
+                row["detail"] = str(run.known["error"])
+        rows.append(row | measured)
+    return rows
+
+
+def watched_actors(scenario: Scenario) -> frozenset[str] | None:
+    """Whose collisions and encounters a sweep is about: egos, or actors of rules, or everybody."""
+    egos = frozenset(actor.id for actor in scenario.actors if actor.ego)
+    return egos or frozenset(rule.actor for rule in scenario.rules) or None
+
+
+def _measured(run: Run, settings: SweepSettings, watched: Collection[str] | None) -> dict[str, Any]:
+    events = events_from_json((run.folder / layout.EVENTS_FILE).read_text(encoding="utf-8"))
+    found: dict[str, Any] = dict(
+        outcome_of(events, read_conflicts(run.folder), run.trajectories, watched)
+    )
+    for name in settings.figures:
+        entry = run_figure(name)
+        found[name] = installed_value(name, run) if entry is None else run.value_of(entry)
+    return found | {name: function(run) for name, function in settings.own.items()}
+
+
+def write_table(
+    out: Path,
+    scenario: Scenario,
+    plan: SweepPlan,
+    *,
+    rows: Sequence[Mapping[str, Any]],
+    limits: Sequence[Limit],
+) -> Sweep:
+    """Write table and page of all cases."""
+    table = write_cases(out, scenario, plan.names, rows=rows, limits=limits)
+    return Sweep(out, table, _boundary(plan, rows))
+
+
+def write_cases(
+    out: Path,
+    scenario: Scenario,
+    names: Sequence[str],
+    *,
+    rows: Sequence[Mapping[str, Any]],
+    limits: Sequence[Limit],
+) -> pl.DataFrame:
+    """Write the table and the page of cases; ``names`` are the parameters that are varied."""
+    table = _as_table(rows)
+    part = out / f".{TABLE_FILE}.part"
+    table.write_parquet(part)
+    part.replace(out / TABLE_FILE)
+    shown = SweepShown(
+        scenario_name(scenario),
+        {name: scenario.parameters[name].unit for name in names},
+        ["no collision", *map(str, limits)],
+        rows,
+        {row["case"]: _links(out, row["case"]) for row in rows},
+    )
+    write_text(out / PAGE_FILE, sweep_page(shown))
+    return table
+
+
+def read_table(out: Path) -> Sweep:
+    """Read the table of a sweep; of one that has not ended, from the runs that there are.
+
+    Raises
+    ------
+    InputError
+        If there is no sweep.
+    """
+    import polars as pl
+
+    scenario, plan, said = read_sweep(out)
+    if (out / TABLE_FILE).is_file():
+        table = pl.read_parquet(out / TABLE_FILE)
+    else:
+        settings = settings_from_dict(said)
+        limits = limits_of(settings)
+        cases = named_cases(plan)
+        table = _as_table(
+            rows_of(scenario, cases, out, refused={}, settings=settings, limits=limits)
+        )
+    return Sweep(out, table, _boundary(plan, table.to_dicts()))
+
+
+def named_cases(plan: SweepPlan) -> dict[str, dict[str, float]]:
+    """Values of each case by its name, ``case-001``; names sort as the cases do."""
+    cases = plan.cases()
+    digits = max(3, len(str(len(cases))))
+    return {f"case-{number:0{digits}}": values for number, values in enumerate(cases, start=1)}
+
+
+def _as_table(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
+    import polars as pl
+
+    texts, flags = {"case", "status", "detail"}, {"safe", "collision"}
+    schema = {
+        name: pl.String if name in texts else pl.Boolean if name in flags else pl.Float64
+        for name in rows[0]
+    }
+    return pl.DataFrame(rows, schema=schema, orient="row")
+
+
+def _boundary(plan: SweepPlan, rows: Sequence[Mapping[str, Any]]) -> tuple[Any, ...]:
+    import numpy as np
+
+    if len(plan.names) != 2:
+        return ()
+    known = [row for row in rows if row["safe"] is not None]
+    points = np.array([[row[name] for name in plan.names] for row in known]).reshape(-1, 2)
+    safe = np.array([row["safe"] for row in known], dtype=bool)
+    return tuple((tuple(a), tuple(b)) for a, b in safe_boundary(points, safe).tolist())
+
+
+def _links(out: Path, case: str) -> list[tuple[str, str]]:
+    given = {
+        "scenario": f"cases/{case}{SUFFIX}",
+        "OpenSCENARIO": f"cases/{case}.xosc",
+        "report": f"runs/{case}/{layout.REPORT_FILE}",
+    }
+    return [(words, path) for words, path in given.items() if (out / path).is_file()]
+
+
+WATCHES_CLOSENESS = Recording(emissions=False, criticality=True)
+"""What of each case is recorded."""
+
+
+def sweep(
+    workspace: Workspace,
+    scenario: Scenario,
+    plan: SweepPlan,
+    out: Path,
+    *,
+    settings: SweepSettings | None = None,
+    processes: int = 1,
+    tell: Callable[[str], None] | None = None,
+    reporter: Reporter = SILENT,
+    done: Callable[[int, int], None] | None = None,
+) -> Sweep:
+    """Run every case of a plan; cases that ``out`` has from an earlier, interrupted time are kept.
+
+    Parameters
+    ----------
+    scenario
+        With the parameters.
+    out
+        Folder of the sweep.
+    processes
+        How many run at a time.
+    tell
+        Called with how many cases there are, and, after the first, with what the rest will take.
+    reporter
+        Hears of each run, from the threads that wait for runs.
+    done
+        Called from these with how many of how many have ended.
+
+    Raises
+    ------
+    InputError
+        If a parameter, limit or figure is unknown, or no case can be run.
+    ConflictError
+        If another sweep is in ``out``.
+    """
+    settings = settings or SweepSettings()
+    limits = limits_of(settings)
+    if settings.openscenario is not None:
+        Dialect.of(settings.openscenario)  # an unknown version is refused before anything runs
+    refuse_unknown(plan.names, scenario)
+    with disk_errors(f"sweep {out}"), locked(out, what=f"sweep {out.name!r}"):
+        cases = named_cases(plan)
+        begin_sweep(out, scenario, plan, settings)
+        checked, refused = checked_cases(workspace, scenario, cases, out, settings)
+        if not checked:
+            raise InputError(f"no case of the sweep can be run: {next(iter(refused.values()))}")
+        left = [run for run in checked if not has_completed(run.folder)]
+        if tell is not None:
+            tell(_first_words(len(cases), len(refused), len(left), plan))
+        _run(left, len(checked), processes, settings, tell=tell, reporter=reporter, done=done)
+        _export(workspace, checked, out / "cases", settings.openscenario)
+        rows = rows_of(scenario, cases, out, refused=refused, settings=settings, limits=limits)
+        return write_table(out, scenario, plan, rows=rows, limits=limits)
+
+
+def refuse_unknown(names: Sequence[str], scenario: Scenario) -> None:
+    """Raise :class:`InputError` if what is varied is no parameter of the scenario."""
+    for name in names:
+        if name not in scenario.parameters:
+            known = ", ".join(scenario.parameters) or "none"
+            raise InputError(f"the scenario has no parameter {name!r}; it has {known}")
+
+
+def checked_cases(
+    workspace: Workspace,
+    scenario: Scenario,
+    cases: Mapping[str, Mapping[str, float]],
+    out: Path,
+    settings: SweepSettings,
+) -> tuple[list[CheckedRun], dict[str, str]]:
+    """Each case as a run, and those that are not possible with the reason."""
+    entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
+    given = RunSettings(
+        seed=settings.seed, recording=WATCHES_CLOSENESS, behaviour=settings.behaviour
+    )
+    runs, refused = [], {}
+    for name, values in cases.items():
+        try:
+            case = concrete(scenario, values, name=name)
+            run = check_run(
+                workspace, case, name=name, out=out / "runs", settings=given, entry=entry
+            )
+        except ScenarioError as error:
+            refused[name] = "; ".join([error.problem, *error.problems])
+            continue
+        file = out / "cases" / f"{name}{SUFFIX}"
+        if not file.is_file():
+            write_text(file, dumps(case))
+        runs.append(run)
+    return runs, refused
+
+
+def _first_words(cases: int, refused: int, left: int, plan: SweepPlan) -> str:
+    words = f"{cases} cases of {', '.join(plan.names)}"
+    if refused:
+        words += f", {refused} of them not possible"
+    return f"{words}; {left} to run" if left < cases - refused else words
+
+
+def _run(
+    left: Sequence[CheckedRun],
+    count: int,
+    processes: int,
+    settings: SweepSettings,
+    *,
+    tell: Callable[[str], None] | None,
+    reporter: Reporter,
+    done: Callable[[int, int], None] | None,
+) -> None:
+    """Run the first case alone, say what the others will take, and run them."""
+    counting = _CountingReporter(reporter, count - len(left), count, done)
+    for these in (left[:1], left[1:]):
+        if not these:
+            continue
+        began = time.monotonic()
+        run_all(
+            these,
+            processes=processes,
+            reports=settings.reports,
+            figures=bool(settings.figures),
+            reporter=counting,
+        )
+        if these[0] is left[0] and len(left) > 1 and tell is not None:
+            spent = time.monotonic() - began
+            disk = sum(f.stat().st_size for f in these[0].folder.rglob("*") if f.is_file())
+            rest = len(left) - 1
+            tell(
+                f"the first took {spent:.1f} s and {disk / 1e6:.1f} MB: about "
+                f"{clock(rest * spent / processes + 59)} h and {rest * disk / 1e6:,.0f} MB for the "
+                f"other {rest}"
+            )
+
+
+class _CountingReporter(Reporter):
+    """Passes on what runs report, and counts those that have ended."""
+
+    def __init__(
+        self, own: Reporter, ended: int, count: int, done: Callable[[int, int], None] | None
+    ) -> None:
+        self._own, self._ended, self._count, self._done = own, ended, count, done
+
+    def advanced(self, progress: Progress) -> None:
+        self._own.advanced(progress)
+
+    def finished(self, run: Run) -> None:
+        self._own.finished(run)
+        self._ended += 1
+        if self._done is not None:
+            self._done(self._ended, self._count)
+
+
+def _export(
+    workspace: Workspace, runs: Sequence[CheckedRun], folder: Path, version: str | None
+) -> None:
+    """Write each case as OpenSCENARIO beside its scenario, and the map once."""
+    if version is None:
+        return
+    for run in runs:
+        file = folder / f"{run.folder.name}{SUFFIX}"
+        export(workspace, file, folder, to="openscenario", options={"version": version})
+
+
+def has_completed(folder: Path) -> bool:
+    """Whether a folder holds a run that has completed."""
+    try:
+        return Run.open(folder).status is RunStatus.COMPLETED
+    except InputError:
+        return False
+
+
+_CASE: Final = re.compile(r"case-\d{3,9}")
+_TTC: Final = "min_ttc"
+_RECORDED: Final = 3.0
+"""Seconds to which times to collision are recorded: a criterion above them has no meaning."""
+
+
+def opened_case(out: Path, case: str) -> Scenario:
+    """One case as a scenario of numbers that runs alone as it did in the sweep.
+
+    It has the seed of the sweep's runs. What the sweep calls safe of an ego become its criteria, so
+    that its result says the same: ``collided(ego) == 0`` and limits of time to collision.
+
+    Parameters
+    ----------
+    out
+        Folder of the sweep.
+    case
+        Name of the case, ``case-012``.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such case, or it is not possible.
+    InputError
+        If there is no sweep.
+    """
+    file = out / "cases" / f"{case}{SUFFIX}"
+    if not _CASE.fullmatch(case) or not file.is_file():
+        raise NotFoundError(f"case of sweep {out.name!r}", case, [])
+    whole, _, said = read_sweep(out)
+    found = read_scenario(file)
+    limits = [limit for text in said["safe"] if (limit := _of_ttc(text)) is not None]
+    criteria = list(found.criteria)
+    if any(actor.ego for actor in found.actors):
+        own = ["collided(ego) == 0", *(_criterion(limit) for limit in limits)]
+        criteria += [text for text in own if text not in criteria]
+    changes = {
+        "name": f"{whole.name[:100]}, {case}",
+        "seed": found.seed if said["seed"] is None else said["seed"],
+        "criteria": tuple(criteria),
+    }
+    return found.model_copy(update=changes)
+
+
+def _criterion(limit: Limit) -> str:
+    return f"{limit.column}(ego) {limit.op} {limit.bound:g} s"
+
+
+def _of_ttc(text: str) -> Limit | None:
+    """A limit if it is one of time to collision that a criterion can hold as well."""
+    if re.match(rf"\s*{_TTC}\s*>", text) is None:
+        return None
+    limit = limit_from_text(text, [_TTC])
+    return limit if limit.bound <= _RECORDED else None
+
+
+PATIENCE: Final = 60.0
+"""Wall seconds that the one case may take."""
+_TRIED: Final = 8
+"""Cases that are looked at until one is possible."""
+
+
+@dataclass(frozen=True, slots=True)
+class SweepEstimate:
+    """What one case has taken.
+
+    Attributes
+    ----------
+    case
+        Its name; it is one from the middle of the plan.
+    seconds
+        Wall seconds of computing.
+    disk
+        Bytes of its folder.
+    whole
+        Whether it came to its end; if not, it takes longer.
+    """
+
+    case: str
+    seconds: float
+    disk: int
+    whole: bool
+
+
+def estimate(
+    workspace: Workspace,
+    scenario: Scenario,
+    plan: SweepPlan,
+    *,
+    settings: SweepSettings,
+    patience: float = PATIENCE,
+) -> SweepEstimate:
+    """Run one case of a plan and measure it; nothing of it is kept.
+
+    Parameters
+    ----------
+    patience
+        Wall seconds after which it is given up.
+
+    Raises
+    ------
+    InputError
+        If a parameter, limit or figure is unknown, or no case that was tried is possible.
+    """
+    refuse_unknown(plan.names, scenario)
+    limits_of(settings)
+    with TemporaryDirectory(prefix="odscen-sweep-") as folder:
+        began = time.monotonic()
+        run = _possible(workspace, scenario, plan, settings, patience, Path(folder))
+        (ended,) = run_all([run], reports=False, figures=False)
+        seconds = time.monotonic() - began
+        disk = sum(file.stat().st_size for file in run.folder.rglob("*") if file.is_file())
+    whole = ended.status is RunStatus.COMPLETED
+    if not whole and seconds < patience:
+        raise InputError(f"{run.name} was tried, and has failed: {ended.known['error']}")
+    return SweepEstimate(run.name, seconds, disk, whole)
+
+
+def _possible(
+    workspace: Workspace,
+    scenario: Scenario,
+    plan: SweepPlan,
+    settings: SweepSettings,
+    patience: float,
+    out: Path,
+) -> CheckedRun:
+    """A case that can be run, as near to the middle of the plan as can be."""
+    cases = list(named_cases(plan).items())
+    nearest = sorted(range(len(cases)), key=lambda index: abs(index - len(cases) // 2))
+    given = RunSettings(seed=settings.seed, recording=WATCHES_CLOSENESS, time_limit=patience)
+    first: ScenarioError | None = None
+    for name, values in (cases[index] for index in nearest[:_TRIED]):
+        try:
+            case = concrete(scenario, values, name=name)
+            return check_run(workspace, case, name=name, out=out, settings=given)
+        except ScenarioError as error:
+            first = first or error
+    reason = "" if first is None else "; ".join([first.problem, *first.problems])
+    raise InputError(f"of the cases that were tried none is possible: {reason}")

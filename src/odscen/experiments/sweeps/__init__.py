@@ -1,1 +1,0 @@
-"""Scenarios run with many values of their parameters."""

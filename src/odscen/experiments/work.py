@@ -1,0 +1,434 @@
+"""Where runs of an experiment are carried out: in threads that wait for SUMO, or far away.
+
+An executor takes orders, which are plain data, and gives outcomes in the order in which they come.
+It loses none: an order whose worker has died is carried out again, by another worker. A worker
+writes nothing that another one reads, so an order can be lost or carried out twice.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import platform
+import tarfile
+import threading
+import time
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory, gettempdir
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from odscen.app.maps import load_map
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
+from odscen.app.variants import edited
+from odscen.base.atomic_folders import clear_leftovers, passing_folder
+from odscen.base.errors import ConflictError, InputError, MissingDependencyError
+from odscen.base.version import __version__
+from odscen.experiments.study_rows import REFUSED, outcome_row, row_of
+from odscen.records.outcomes import RunStatus
+from odscen.runs.reporter import Reporter
+from odscen.scenario.document.json_form import loads
+from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.document.validation import validated
+from odscen.scenario.edits.edit_messages import read_edit
+from odscen.scenario.sampling.sampler import sample_scenario
+from odscen.scenario.sweeps.sweep_plan import concrete
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from concurrent.futures import Future
+
+    from odscen.app.maps import LoadedMap
+    from odscen.app.running.runs import CheckedRun
+    from odscen.experiments.plan import Keep, ScenarioSource, StudyRun, StudyRuns
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
+    from odscen.runs.reporter import Progress
+    from odscen.scenario.document.scenario_document import Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class WorkOrder:
+    """Runs to be carried out one after the other, and all that they need but the maps.
+
+    Attributes
+    ----------
+    runs
+        With the values of their parameters.
+    sources
+        Scenarios by name.
+    variants
+        Edits by name of the variant.
+    keep
+        Whose run folders are given back.
+    target
+        Folder, or URL that fsspec knows, that run folders are written to instead, as ``.tar``.
+    formats
+        Formats that the recording of each run is exported to.
+    versions
+        Of the one who orders, see :func:`versions`.
+    """
+
+    runs: tuple[tuple[StudyRun, Mapping[str, float]], ...]
+    sources: Mapping[str, ScenarioSource]
+    variants: Mapping[str, tuple[Mapping[str, Any], ...]]
+    how: StudyRuns
+    keep: Keep
+    target: str | None
+    formats: tuple[str, ...]
+    versions: Mapping[str, str]
+
+
+class Outcome(NamedTuple):
+    """A run that has ended.
+
+    Attributes
+    ----------
+    row
+        Of the table; ``seconds`` of wall time beside.
+    folder
+        Its run folder as a tar file, if it is to be kept.
+    exports
+        Files of each format, by format and name.
+    """
+
+    name: str
+    row: dict[str, Any]
+    folder: bytes | None = None
+    exports: Mapping[str, Mapping[str, bytes]] | None = None
+
+
+def versions() -> dict[str, str]:
+    """Versions that decide what comes out of a run: of odscen and of SUMO."""
+    return {"odscen": __version__, "sumo": version("libsumo")}
+
+
+def refuse_other_versions(
+    wanted: Mapping[str, str],
+    *,
+    found: Mapping[str, str] | None = None,
+    where: str | None = None,
+) -> None:
+    """Refuse to work with other versions than those of whoever orders it.
+
+    Parameters
+    ----------
+    found
+        Versions of the worker; those here if not given.
+    where
+        Names the worker.
+
+    Raises
+    ------
+    ConflictError
+        Names the worker and both versions.
+    """
+    own = versions() if found is None else found
+    for name, theirs in wanted.items():
+        if own.get(name) != theirs:
+            place = where or f"the worker on {platform.node()}"
+            raise ConflictError(
+                f"{place} has {name} {own.get(name)}, the study needs {theirs}; install the same"
+            )
+
+
+def carry_out_order(
+    order: WorkOrder,
+    workspaces: Mapping[str, Workspace],
+    *,
+    stopped: Callable[[], bool] = lambda: False,
+) -> list[Outcome]:
+    """Carry out an order; what goes wrong in a run is in its row.
+
+    Parameters
+    ----------
+    workspaces
+        By name of the map, each with that map and the assets.
+    stopped
+        Asked again and again; once true, what is under way is given up.
+
+    Raises
+    ------
+    ConflictError
+        If this is not the version of odscen or SUMO that the order is for.
+    """
+    refuse_other_versions(order.versions)
+    return [_carried_out(order, *each, workspaces, stopped) for each in order.runs]
+
+
+def _carried_out(
+    order: WorkOrder,
+    run: StudyRun,
+    values: Mapping[str, float],
+    workspaces: Mapping[str, Workspace],
+    stopped: Callable[[], bool],
+) -> Outcome:
+    began = time.monotonic()
+    workspace = workspaces[order.sources[run.scenario].map_name]
+    with passing_folder(_work_folder()) as folder:
+        try:
+            checked = _checked(order, run, values, workspace, folder)
+            outcome = _simulated(order, run, checked, workspace, stopped)
+        except InputError as error:
+            outcome = Outcome(run.name, outcome_row(REFUSED, _words(error)))
+    outcome.row["seconds"] = round(time.monotonic() - began, 3)
+    return outcome
+
+
+@cache
+def _work_folder() -> Path:
+    """Where runs are carried out; what killed processes have left there is removed."""
+    folder = Path(gettempdir()) / f"odscen-studies-{os.getuid()}"
+    folder.mkdir(parents=True, exist_ok=True)
+    clear_leftovers(folder)
+    return folder
+
+
+def _words(error: InputError) -> str:
+    return "; ".join([str(error), *getattr(error, "problems", ())])
+
+
+def _checked(
+    order: WorkOrder,
+    run: StudyRun,
+    values: Mapping[str, float],
+    workspace: Workspace,
+    out: Path,
+) -> CheckedRun:
+    source = order.sources[run.scenario]
+    entry = _entry(workspace, source)
+    loaded = load_map(entry)
+    scenario = _document(source, loaded)
+    if edits := order.variants.get(run.variant, ()):
+        scenario = edited(scenario, [read_edit(dict(one)) for one in edits], loaded)
+    if values:
+        scenario = concrete(scenario, values, name=run.name)
+    name = run.name.replace("/", "-")
+    return check_run(
+        workspace, scenario, name=name, out=out, settings=order.how.settings(run.seed), entry=entry
+    )
+
+
+@lru_cache(maxsize=16)
+def _entry_of(workspace: Workspace, name: str, sha256: str) -> MapEntry:
+    return workspace.map_for(name, sha256)
+
+
+def _entry(workspace: Workspace, source: ScenarioSource) -> MapEntry:
+    return _entry_of(workspace, source.map_name, source.map_sha256)
+
+
+def _document(source: ScenarioSource, loaded: LoadedMap) -> Scenario:
+    if source.text is not None:
+        return _read(source.text, source.name)
+    return _sampled(source.name, loaded, source.seed, json.dumps(source.config or {}))
+
+
+@lru_cache(maxsize=4)
+def _sampled(name: str, loaded: LoadedMap, seed: int, config: str) -> Scenario:
+    """Sample a scenario, once for all of its seeds and variants."""
+    return sample_scenario(
+        loaded.sumo.graph,
+        validated(SamplingConfig, json.loads(config)),
+        seed=seed,
+        name=name,
+        usable=loaded.usable,
+    )
+
+
+@lru_cache(maxsize=4)
+def _read(text: str, name: str) -> Scenario:
+    return loads(text, file=name)
+
+
+def _simulated(
+    order: WorkOrder,
+    run: StudyRun,
+    checked: CheckedRun,
+    workspace: Workspace,
+    stopped: Callable[[], bool],
+) -> Outcome:
+    refusals: list[str] = []
+    ended = run_all(
+        [checked],
+        reports=False,
+        reporter=_StudyReporter(stopped),
+        refused=lambda _name, error: refusals.append(_words(error)),
+    )
+    if not ended:
+        return Outcome(run.name, outcome_row(REFUSED, refusals[0]))
+    (result,) = ended
+    row, failed = row_of(result), result.status is RunStatus.FAILED
+    kept = None
+    if order.keep == "all" or (order.keep == "failed" and failed):
+        kept = packed(result.folder)
+        if order.target is not None:
+            put(order.target, f"{run.name}.tar", kept)
+            kept = None
+    exports = None
+    if order.formats and not failed:
+        try:
+            exports = _exported(order.formats, workspace, result)
+        except InputError as error:
+            row = outcome_row(REFUSED, f"cannot be exported: {_words(error)}")
+    return Outcome(run.name, row, kept, exports)
+
+
+class GivenUpError(Exception):
+    """The study has been stopped, and what is under way with it."""
+
+
+class _StudyReporter(Reporter):
+    """Ends a run whose study has been stopped."""
+
+    def __init__(self, stopped: Callable[[], bool]) -> None:
+        self._stopped = stopped
+
+    def advanced(self, progress: Progress) -> None:
+        del progress
+        if self._stopped():
+            raise GivenUpError
+
+
+def _exported(
+    formats: tuple[str, ...], workspace: Workspace, result: Run
+) -> dict[str, dict[str, bytes]]:
+    from odscen.app.export import export_run
+
+    found = {}
+    for one in formats:
+        with TemporaryDirectory(prefix="odscen-export-") as name:
+            files = export_run(workspace, result.folder, Path(name), to=one)
+            found[one] = {file.relative_to(name).as_posix(): file.read_bytes() for file in files}
+    return found
+
+
+def packed(folder: Path) -> bytes:
+    """A folder as a tar file; the same files give the same bytes."""
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.PAX_FORMAT) as archive:
+        for path in sorted(folder.rglob("*")):
+            if path.is_file():
+                content = path.read_bytes()
+                archive.addfile(
+                    member(path.relative_to(folder).as_posix(), len(content)), io.BytesIO(content)
+                )
+    return buffer.getvalue()
+
+
+def member(name: str, size: int) -> tarfile.TarInfo:
+    """Head of a file in a tar file, without times and owners."""
+    info = tarfile.TarInfo(name)
+    info.size, info.mode = size, 0o644
+    return info
+
+
+def unpacked(content: bytes, folder: Path) -> None:
+    """Write the files of a tar file into a folder, nothing outside of it."""
+    with tarfile.open(fileobj=io.BytesIO(content)) as archive:
+        archive.extractall(folder, filter="data")
+
+
+def put(target: str, name: str, content: bytes) -> None:
+    """Write a file whole to a folder or a URL; again, it is the same file.
+
+    Raises
+    ------
+    MissingDependencyError
+        If it is a URL and fsspec is not installed.
+    """
+    if "://" not in target:
+        from odscen.base.text_files import write_file
+
+        write_file(Path(target) / name, content)
+        return
+    try:
+        import fsspec
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{target} needs fsspec: pip install 'odscen[dask]'"
+        ) from error
+    with fsspec.open(f"{target.rstrip('/')}/{name}", "wb", auto_mkdir=True) as file:
+        file.write(content)
+
+
+_LISTEN = 0.2
+"""Wall seconds after which a wait looks for Ctrl-C."""
+
+
+class Orders(Protocol):
+    """Gives the next order."""
+
+    def next(self, most: int) -> WorkOrder | None:
+        """An order of at most so many runs; ``None`` when there are no more."""
+
+
+class Executor(Protocol):
+    """Carries out orders."""
+
+    def outcomes(self, orders: Orders) -> Iterator[list[Outcome]]:
+        """Outcomes of each order, when it has been carried out."""
+
+
+def _import_what_threads_share() -> None:
+    """Import what is otherwise imported at its first use, by several threads at a time.
+
+    Where two of them wait for each other's imports, Python gives one a module that is half there.
+    """
+    for name in ("numpy.ma", "polars"):
+        import_module(name)
+
+
+@dataclass(frozen=True, slots=True)
+class LocalExecutor:
+    """Carries out orders on this machine, one run of SUMO in a process each.
+
+    Attributes
+    ----------
+    workspace
+        Has the maps.
+    processes
+        How many run at a time.
+    check
+        Called now and then while runs are waited for; what it raises ends them.
+    """
+
+    workspace: Workspace
+    processes: int = 1
+    check: Callable[[], None] | None = None
+    _stop: threading.Event = field(default_factory=threading.Event)
+
+    def outcomes(self, orders: Orders) -> Iterator[list[Outcome]]:
+        """Outcomes of each order, of one run, when it has been carried out."""
+        _import_what_threads_share()
+        with ThreadPoolExecutor(max_workers=max(1, self.processes)) as pool:
+            running: set[Future[list[Outcome]]] = set()
+            try:
+                while True:
+                    while len(running) < self.processes + 1 and (order := orders.next(1)):
+                        running.add(pool.submit(self._work, order))
+                    if not running:
+                        return
+                    ended, running = wait(running, timeout=_LISTEN, return_when=FIRST_COMPLETED)
+                    if self.check is not None:
+                        self.check()
+                    for future in ended:
+                        yield future.result()
+            finally:
+                self._stop.set()
+                pool.shutdown(wait=False, cancel_futures=True)
+
+    def _work(self, order: WorkOrder) -> list[Outcome]:
+        if self._stop.is_set():
+            raise GivenUpError
+        places: Mapping[str, Workspace] = {
+            source.map_name: self.workspace for source in order.sources.values()
+        }
+        return carry_out_order(order, places, stopped=self._stop.is_set)

@@ -1,0 +1,1 @@
+"""What plays a scenario, whichever it is: the seam, those there are, and records from positions."""

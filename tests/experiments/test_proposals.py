@@ -1,0 +1,61 @@
+"""Methods of search: the same seed asks the same, and TPE goes where it was told that it is bad."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from odscen.base.errors import InputError, MissingDependencyError
+from odscen.experiments.proposals import proposer_of
+
+
+def places_of(method: str, *, seed: int = 3, runs: int = 40) -> np.ndarray:
+    """Places that are asked when (0.8, 0.2) is the worst."""
+    proposer = proposer_of(method, axes=2, runs=runs, seed=seed)
+    found = []
+    for _ in range(runs // 4):
+        places = proposer.ask(4)
+        proposer.tell([-float(np.hypot(*(place - [0.8, 0.2]))) for place in places])
+        found.append(places)
+    return np.concatenate(found)
+
+
+def test_a_latin_hypercube_has_one_case_in_each_part_of_each_range() -> None:
+    places = places_of("latin")
+    for axis in places.T:
+        assert sorted((axis * 40).astype(int)) == list(range(40))
+
+
+def test_the_same_seed_asks_the_same_and_another_does_not() -> None:
+    for method in ("random", "latin"):
+        np.testing.assert_array_equal(places_of(method), places_of(method))
+        assert not np.array_equal(places_of(method), places_of(method, seed=4))
+
+
+def test_tpe_asks_again_the_same_and_looks_where_it_is_bad() -> None:
+    pytest.importorskip("optuna")
+    places = places_of("tpe")
+    np.testing.assert_array_equal(places, places_of("tpe"))
+    away = np.hypot(*(places - [0.8, 0.2]).T)
+    assert np.median(away[20:]) < 0.5 * np.median(away[:10])
+
+
+def test_tpe_goes_on_after_cases_that_are_not_possible() -> None:
+    pytest.importorskip("optuna")
+    proposer = proposer_of("tpe", axes=1, runs=4, seed=0)
+    proposer.ask(2)
+    proposer.tell([None, 1.0])
+    assert proposer.ask(2).shape == (2, 1)
+
+
+def test_without_optuna_tpe_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    with pytest.raises(MissingDependencyError, match=r"odscen\[search\]"):
+        proposer_of("tpe", axes=1, runs=1, seed=0)
+
+
+def test_an_unknown_method_is_refused_by_name() -> None:
+    with pytest.raises(InputError, match="'sobol' is not one of random, latin, tpe"):
+        proposer_of("sobol", axes=1, runs=1, seed=0)
