@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.app.template_scenarios import template_scenario
-from odscen.experiments.proposals import SEARCH_METHODS
 from odscen.experiments.search import SearchSettings, search
 from odscen.experiments.sweeps import SweepSettings
 from odscen.maps.store import Workspace
@@ -33,6 +32,8 @@ if TYPE_CHECKING:
 MAP = Path(__file__).parents[1] / "maps" / "signal_crossing.xodr"
 SAFE = ("min_ttc >= 1.5", "min_pet >= 1.0")
 DRAWS = 10_000
+
+METHODS = ("random", "latin", "tpe")
 
 
 def main() -> None:
@@ -52,9 +53,9 @@ def compare(folder: Path, asked: argparse.Namespace) -> None:
     workspace.add_map(MAP)
     scenario = two_runners(workspace)
     axes = [Range(name, one.min, one.max) for name, one in scenario.parameters.items()]
-    found: dict[str, list[tuple[float, float, float, float]]] = {m: [] for m in SEARCH_METHODS}
+    found: dict[str, list[tuple[float, float, float, float]]] = {m: [] for m in METHODS}
     for seed in range(asked.seeds):
-        for method in SEARCH_METHODS:
+        for method in METHODS:
             how = SearchSettings(method, asked.runs, asked.batch, seed)
             one = search(
                 workspace,

@@ -16,8 +16,7 @@ from odscen.app.maps import LoadedMap, load_map
 from odscen.base.markup import element
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.maps.store import Workspace
-from odscen.reports.report_map import fitted_view, scale_bar, view_box
-from odscen.reports.report_measures import measure_layer
+from odscen.reports.report_maps import fitted_view, measure_layer, scale_bar, view_box
 from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.sumo.realize.traffic_measures.measure_actions import measure_actions
 from tools import map_style

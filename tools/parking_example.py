@@ -16,8 +16,7 @@ from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.base.markup import element, path_data
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.maps.store import Workspace
-from odscen.reports.report_map import fitted_view, scale_bar, view_box
-from odscen.reports.report_parking import parking_layer
+from odscen.reports.report_maps import fitted_view, parking_layer, scale_bar, view_box
 from odscen.runs.measured import read_parking
 from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.sumo.realize.transit.parking_places import parking_positions, planned_parking

@@ -49,7 +49,7 @@ SHOWN = (
     "figures/measures/traffic_files",
     "records/",
     "runs/",
-    "reports/signals/stage_diagrams",
+    "reports/signal_pictures",
     "scenario/",
     "simulators/",
     "sumo/",

@@ -22,7 +22,7 @@ from odscen.base.markup import element
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.maps.store import Workspace
 from odscen.records.run_plan import Plan
-from odscen.reports.report_map import scale_bar, view_box
+from odscen.reports.report_maps import scale_bar, view_box
 from odscen.runs.recorded import read_trajectories
 from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare

@@ -67,7 +67,10 @@ def test_a_dry_run_lists_the_cases_and_runs_none(scenario: Path, tmp_path: Path)
     [
         (["--vary", "gap"], "'gap' varies nothing"),
         (["--vary", "per_minute=1..9"], "a grid needs the number of steps"),
-        (["--samples", "3", "--method", "best"], "'best' is not one of sobol, latin, random"),
+        (
+            ["--samples", "3", "--method", "best"],
+            "'best' is not one of grid, latin, sobol, random, tpe",
+        ),
         (["--vary", "per_minute=1,2", "--figure", "x=y"], "give the function as FILE.py:NAME"),
         (["--vary", "per_minute=1,2", "--figure", "beauty"], "no figure of runs is called"),
         (["--vary", "per_minute=1,2", "--plan", "plan.json"], "not both"),

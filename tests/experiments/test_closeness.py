@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from odscen.experiments.sweep_rows import closeness_of, criticality
+from odscen.experiments.closeness import closeness_of, criticality
 
 BODIES = {"east": (4.0, 2.0), "north": (4.0, 2.0), "far": (4.0, 2.0)}
 NOTHING = dict.fromkeys(

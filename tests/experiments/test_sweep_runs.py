@@ -207,7 +207,7 @@ def test_cases_that_are_not_possible_are_rows_with_the_reason(
     [
         ("gup=1,2", (), "no parameter 'gup'; it has gap, van"),
         ("gap=60,70", (), "no case of the sweep can be run: case-001"),
-        ("gap=20", ("ttc > 1",), "no column 'ttc'; it has collision, impact_speed, min_ttc"),
+        ("gap=20", ("ttc > 1",), "no column 'ttc'; there are collision, impact_speed, min_ttc"),
         ("gap=20", ("safe please",), "is no limit; write for example"),
     ],
 )

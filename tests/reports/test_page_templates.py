@@ -76,5 +76,5 @@ def test_a_page_nests_and_allows_its_own_script_only() -> None:
 
 
 def test_a_name_that_is_not_given_is_an_error() -> None:
-    with pytest.raises(UndefinedError, match="ident"):
-        page_templates._filled("section", parts=[])
+    with pytest.raises(UndefinedError, match="title"):
+        page_templates.render_page("run_report.html.j2", title="", head={})

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.reports.plots import Series, TimeUnit, clock_axis, line_chart, nice_ticks
+from odscen.reports.charts import Series, TimeUnit, clock_axis, line_chart, nice_ticks
 
 
 @given(st.floats(1e-3, 1e6))

@@ -6,12 +6,20 @@ import polars as pl
 import pytest
 
 from odscen.drawing.map_drawing import Lines
-from odscen.figures.by_place.traffic import TrafficFigures, traffic_figures
-from odscen.reports.place_shapes import PlaceShapes
-from odscen.reports.report_corridor import NONE_RECORDED, CorridorTraces, corridor_section
-from odscen.reports.report_emissions import emission_section
-from odscen.reports.report_flow import diagram_section, flow_section
-from odscen.reports.report_service import level_strip, service_map, service_section
+from odscen.figures.by_place.traffic import TrafficFigures, over_run, traffic_figures
+from odscen.reports.page_templates import render_block
+from odscen.reports.report_maps import PlaceShapes, service_map
+from odscen.reports.report_sections import (
+    NONE_RECORDED,
+    CorridorTraces,
+    corridor_values,
+    diagram_values,
+    emission_values,
+    flow_values,
+    level_strip,
+    service_values,
+    worst_places,
+)
 from odscen.reports.report_words import stretch
 from tests.figures.made_traffic import NOBODY, PLACES, lane_rows, made_figures
 from tests.reports.test_run_report import EVIL, Reader, report
@@ -24,6 +32,31 @@ SHAPES = PlaceShapes(
     },
     {"j10": np.array([105.0, 0.0])},
 )
+
+
+def section_of(name, values):
+    return values and render_block("run_report.html.j2", name, **{name: values})
+
+
+def service_section(figures):
+    return section_of("service", service_values(figures))
+
+
+def diagram_section(network):
+    return section_of("diagram", diagram_values(network))
+
+
+def emission_section(figures):
+    return section_of("emissions", emission_values(figures))
+
+
+def corridor_section(given):
+    return section_of("corridor", corridor_values(given))
+
+
+def brief_map(figures, shapes):
+    drawn = service_map(figures, shapes, worst_places(over_run(figures.junctions)))
+    return section_of("brief", {"cards": [], "findings": [], "map": drawn})
 
 
 def words(markup):
@@ -49,7 +82,7 @@ def test_a_junction_has_its_level_delay_and_worst_time():
 
 
 def test_the_map_colours_places_and_leaves_those_without_traffic_grey():
-    section = str(service_map(made_figures(), SHAPES))
+    section = str(brief_map(made_figures(), SHAPES))
     # On r1 it takes 57 s to drive what would take 10.
     assert re.search(r'href="#place-0" class="los-f"><title>r1: level F, 6 km/h', section)
     assert re.search(r'href="#place-1" class="los-a"><title>r2: level A, 36 km/h', section)
@@ -64,7 +97,7 @@ def test_a_junction_that_nobody_gets_into_has_level_f_and_no_delay():
     # Two vehicles stand before it for a quarter of an hour.
     stuck = lane_rows(0, "a_0", 2, length=0.0, lost=900.0, co2=20.0, source=True, sink=False)
     rows = pl.DataFrame([stuck | {"waiting": 1800.0}])
-    section = str(service_map(traffic_figures(rows, PLACES, end=900.0), SHAPES))
+    section = str(brief_map(traffic_figures(rows, PLACES, end=900.0), SHAPES))
     assert "<title>j10: level F, no vehicle enters it</title>" in section
 
 
@@ -90,8 +123,8 @@ def test_the_diagram_has_a_dot_for_each_interval_with_traffic_and_names_the_most
 
 def test_a_run_of_one_interval_has_no_course():
     network = made_figures([(50, 5.0)]).network
-    assert flow_section(network) is None
-    assert diagram_section(network) is None
+    assert flow_values(network) is None
+    assert diagram_values(network) is None
 
 
 def test_emissions_are_summed_and_the_largest_place_stands_first():
@@ -162,7 +195,7 @@ def test_names_of_places_are_escaped():
     shapes = PlaceShapes({EVIL: SHAPES.segments["r1"]}, {EVIL: SHAPES.junctions["j10"]})
     for section in (
         service_section(figures),
-        service_map(figures, shapes),
+        brief_map(figures, shapes),
         emission_section(figures),
         corridor_section(traces(segments=(EVIL,), junctions=[(EVIL, 1.0, 2.0)])),
     ):

@@ -11,7 +11,8 @@ from odscen.drawing.map_drawing import Area, Lines, MapDrawing
 from odscen.figures.measures.summary import actor_outcomes
 from odscen.records.run_events import Event, EventKind
 from odscen.records.run_plan import Plan, PlannedActor
-from odscen.reports.run_report import duration, render_report
+from odscen.reports.report_words import duration
+from odscen.reports.run_report import render_report
 
 EVIL = '<img src=x onerror="alert(1)">'
 

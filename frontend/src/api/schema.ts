@@ -4713,8 +4713,7 @@ export interface components {
             /** @enum {string} */
             state: "running" | "done" | "stopped" | "failed";
             parameters: string[];
-            /** @enum {string} */
-            method: "grid" | "latin" | "sobol" | "random";
+            method: string;
             cases: number;
             ended: number;
             seconds_left: number | null;
@@ -4738,11 +4737,8 @@ export interface components {
         SweepWish: {
             scenario: string;
             vary: (components["schemas"]["VaryWish"] | components["schemas"]["TableWish"])[];
-            /**
-             * @default grid
-             * @enum {string}
-             */
-            method?: "grid" | "latin" | "sobol" | "random";
+            /** @default grid */
+            method?: string;
             samples?: number | null;
             /** @default 0 */
             sample_seed?: number;

@@ -15,7 +15,7 @@ from odscen.figures.measures.comparison import CONFIDENCE, compare_figure
 from odscen.figures.measures.registry import SEGMENT_FIGURES
 from odscen.figures.measures.traffic_files import read_tables
 from odscen.records.outcomes import RunStatus
-from odscen.reports.place_shapes import place_shapes
+from odscen.reports.report_maps import place_shapes
 from odscen.runs.deferred_figures import whole_summary
 from odscen.runs.finished_run import Run
 from odscen.runs.layout import FIGURES_FOLDER, SCENARIO_FILE, SUMMARY_FILE
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from odscen.experiments.measure import Measured
     from odscen.figures.measures.comparison import Difference, Finding
     from odscen.maps.store import Workspace
-    from odscen.reports.place_shapes import PlaceShapes
+    from odscen.reports.report_maps import PlaceShapes
     from odscen.scenario.document.scenario_document import Scenario
 
 

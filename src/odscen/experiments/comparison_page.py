@@ -9,9 +9,9 @@ import numpy as np
 from odscen.base.markup import Markup, element, join, number
 from odscen.experiments.place_map import place_map
 from odscen.figures.measures.comparison import Finding
+from odscen.reports.charts import Dots, dot_chart, legend
 from odscen.reports.page_templates import html_page, html_table, page_head, report_section
-from odscen.reports.plots import Dots, dot_chart, legend
-from odscen.reports.report_flow import DENSITY, FLOW, column
+from odscen.reports.report_sections import DENSITY, FLOW, column
 from odscen.reports.report_words import stretch
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from odscen.experiments.compare import Row, RunComparison, RunSet
     from odscen.experiments.place_map import PlaceStyles
-    from odscen.reports.place_shapes import PlaceShapes
+    from odscen.reports.report_maps import PlaceShapes
 
 STEPS = (0.05, 0.15, 0.3)
 """Limits between the colours of the map, as shares of the value in A."""

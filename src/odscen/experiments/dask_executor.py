@@ -25,7 +25,7 @@ from odscen.base.atomic_folders import new_folder
 from odscen.base.checksums import digest
 from odscen.base.errors import ConflictError, InputError, MissingDependencyError, ToolError
 from odscen.base.folder_locks import locked
-from odscen.experiments.study_rows import outcome_row
+from odscen.experiments.table import outcome_row
 from odscen.experiments.work import (
     Outcome,
     carry_out_order,

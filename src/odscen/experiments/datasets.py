@@ -26,8 +26,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_file, write_text
 from odscen.experiments.plan import StudyPlan, read_plan_data
 from odscen.experiments.studies import begin_study_of, carry_out_study
-from odscen.experiments.study_rows import FIGURE_COLUMNS
-from odscen.experiments.sweep_rows import limit_from_text
+from odscen.experiments.table import STUDY, columns_of, read_limit, study_figures
 from odscen.experiments.work import versions
 from odscen.figures.measures.usability import UsabilityLevel
 from odscen.formats.scenarionet_export import pickled
@@ -42,7 +41,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.experiments.plan import StudyGrid
-    from odscen.experiments.sweep_rows import Limit
+    from odscen.experiments.table import Limit
     from odscen.experiments.work import Executor, Outcome
     from odscen.maps.store import Workspace
 
@@ -189,7 +188,8 @@ class DatasetPlan(Part):
         InputError
             If a figure is unknown.
         """
-        return tuple(limit_from_text(text, FIGURE_COLUMNS) for text in self.keep_if)
+        columns = columns_of(STUDY, tuple(study_figures()))
+        return tuple(read_limit(text, columns) for text in self.keep_if)
 
     def split_of(self, map_name: str) -> str | None:
         """Split of a map; ``None`` if no pattern matches."""

@@ -39,6 +39,7 @@ from odscen.experiments.verdict import (
     hold_against,
     likeliest_first,
 )
+from odscen.experiments.work import LocalExecutor
 from odscen.opendrive.parse import parse
 from odscen.opendrive.parse_rules import MAX_BYTES
 from odscen.sumo.realize.driving import normal_headway
@@ -308,7 +309,7 @@ def run_suite(
         if update.wanted:
             _refuse_given_seeds(suite)
         with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
-            runner = SeedRunner(suite, processes, progress)
+            runner = SeedRunner(suite, LocalExecutor(workspace, processes), progress)
             place = RunPlace(out or Path(temporary), keep=out is not None)
             if update.wanted:
                 aside = RunPlace(Path(temporary) / "changed", keep=False)

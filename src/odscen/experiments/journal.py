@@ -1,4 +1,6 @@
-"""Rows of a study as they come: a journal that is added to, and parts that it is moved to.
+"""What of an experiment has ended: a journal of rows, or the run folders where all are kept.
+
+A journal is added to as runs end, and moved to parts.
 
 A row is there whole or not at all: the last line of a journal whose process was killed may be torn,
 and is left out. A run that stands in a part and in the journal, as its process was killed between
@@ -63,6 +65,25 @@ def _take(rows: Rows, content: bytes, file: Path) -> None:
             ) from error
 
 
+class KeptRuns:
+    """Run folders that all stay, as of a sweep: they say by themselves which runs have ended."""
+
+    def __init__(self, ended: Iterable[str] = ()) -> None:
+        self._ended = set(ended)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._ended
+
+    def __len__(self) -> int:
+        return len(self._ended)
+
+    def add(self, name: str, row: Mapping[str, Any]) -> bool:
+        """Take a run as ended; its folder is there."""
+        del row
+        self._ended.add(name)
+        return True
+
+
 class StudyJournal:
     """The rows of a study, open for more; hold the lock of the study.
 
@@ -99,6 +120,12 @@ class StudyJournal:
         if self._file is not None:
             self._sync()
             self._file.close()
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.rows
+
+    def __len__(self) -> int:
+        return len(self.rows)
 
     def add(self, name: str, row: Mapping[str, Any]) -> bool:
         """Write down a run that has ended; ``False`` if it was there, which changes nothing."""

@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field
 
 from odscen.app.figure_functions import value_of
 from odscen.base.errors import InputError
+from odscen.experiments.table import COLUMNS, SUITE, MeasuredRun
 from odscen.experiments.tolerance import parse_tolerance
 from odscen.figures.measures.figure import Better, Figure
 from odscen.figures.measures.registry import names_of
@@ -42,7 +43,7 @@ class FigureEntry(Part):
 
 
 def declared(data: Mapping[str, Any]) -> dict[str, Figure]:
-    """Figures that the text of a suite declares, before it has been validated."""
+    """Figures that the text of a suite declares, before it is validated, and columns of suites."""
     entries = data.get("figures")
     found = {}
     for name, entry in entries.items() if isinstance(entries, dict) else ():
@@ -56,7 +57,8 @@ def declared(data: Mapping[str, Any]) -> dict[str, Figure]:
             better=next((one for one in Better if one == given.get("better")), Better.NEITHER),
             tolerance=str(given.get("tolerance", "2 %")),
         )
-    return found
+    more = {name: column.figure for name, column in COLUMNS.items() if SUITE in column.tables}
+    return found | more
 
 
 def refuse_tolerances(figures: Mapping[str, Figure]) -> None:
@@ -84,6 +86,10 @@ def own_values(figures: Mapping[str, Figure], run: Run, *, beside: Path) -> dict
     """
     found: dict[str, float | None] = {}
     for name, figure in figures.items():
+        if name in COLUMNS:
+            value = COLUMNS[name].value(MeasuredRun(run))
+            found[name] = None if value is None else float(value)
+            continue
         file, _, function = figure.source.rpartition(":")
 
         def call(run: Run, file: Path = beside / file, function: str = function) -> object:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.markup import Markup, element, path_data
-from odscen.reports.report_map import fitted_view, scale_bar, view_box
+from odscen.reports.report_maps import fitted_view, scale_bar, view_box
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.base.arrays import FloatArray
-    from odscen.reports.place_shapes import PlaceShapes
+    from odscen.reports.report_maps import PlaceShapes
 
 PlaceStyles = dict[tuple[str, str], tuple[str, str]]
 """Class and words of each place, by kind and name."""

@@ -135,7 +135,7 @@ class StudyPlan(Part):
     variant: tuple[StudyVariant, ...] = ()
     only_variants: bool = False
     vary: tuple[dict[str, Any], ...] = ()
-    method: Literal["grid", "latin", "sobol", "random"] | None = None
+    method: Label | None = None
     samples: Annotated[int, Field(ge=1)] | None = None
     sample_seed: Annotated[int, Field(ge=0)] = 0
     run: StudyRuns = StudyRuns()

@@ -9,45 +9,39 @@ on.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from odscen.app.running.batches import run_all
 from odscen.base.errors import InputError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
-from odscen.experiments.proposals import proposer_of
-from odscen.experiments.sweep_rows import Closeness, closeness_of, criticality
+from odscen.experiments.closeness import criticality
+from odscen.experiments.journal import KeptRuns
 from odscen.experiments.sweeps import (
+    CaseRuns,
     SweepSettings,
     begin_folder,
-    checked_cases,
     has_completed,
-    limits_of,
     refuse_unknown,
-    rows_of,
-    watched_actors,
     write_cases,
 )
-from odscen.records.run_plan import Plan
+from odscen.experiments.table import SEARCH
+from odscen.experiments.work import LocalExecutor
 from odscen.runs import layout
-from odscen.runs.reporter import Reporter
-from odscen.scenario.sweeps.sweep_plan import MOST_CASES, SweepPlan
+from odscen.scenario.sweeps.sweep_plan import MOST_CASES, SweepPlan, proposal_kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     import polars as pl
 
     from odscen.base.arrays import FloatArray
-    from odscen.experiments.sweep_rows import Limit
     from odscen.maps.store import Workspace
-    from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import Range, Table
 
@@ -101,6 +95,7 @@ def pair_coverage(places: FloatArray, *, cells: int = CELLS) -> float:
 
 FORMAT: Final = "odscen-search"
 VERSION: Final = 1
+_SUMMARIES: Final = f"runs/case-*/{layout.SUMMARY_FILE}"
 SEARCH_FILE, ARCHIVE_FILE = "search.json", "criticals.json"
 
 
@@ -111,7 +106,7 @@ class SearchSettings:
     Attributes
     ----------
     method
-        ``random``, ``latin`` or ``tpe``.
+        A kind of :data:`~odscen.scenario.sweeps.sweep_plan.PROPOSALS` that takes a number of cases.
     runs
         How many cases, at most :data:`~odscen.scenario.sweeps.sweep_plan.MOST_CASES`.
     batch
@@ -169,6 +164,7 @@ def search(
     search_settings: SearchSettings,
     settings: SweepSettings | None = None,
     processes: int = 1,
+    check: Callable[[], None] | None = None,
     done: Callable[[int, int], None] | None = None,
 ) -> SearchResult:
     """Look for cases that are not safe; what ``out`` has from an interrupted search is kept.
@@ -185,8 +181,10 @@ def search(
         How a case is run and judged.
     processes
         How many run at a time.
+    check
+        Called now and then while runs are waited for; what it raises ends them.
     done
-        Called from the threads that wait for runs, with how many of how many have ended.
+        Called with how many of how many have ended.
 
     Raises
     ------
@@ -198,29 +196,24 @@ def search(
         If the method needs a package that is not installed.
     """
     settings = settings or SweepSettings()
-    watched = watched_actors(scenario)
-    own = {name: _measure(name, watched) for name in Closeness._fields}
-    judged = replace(settings, own={**settings.own, **own})
-    limits = limits_of(judged)
-    plan = SweepPlan(tuple(axes), "random", search_settings.runs, search_settings.seed)
-    refuse_unknown(plan.names, scenario)
-    proposer = proposer_of(
-        search_settings.method,
-        axes=len(plan.axes),
-        runs=search_settings.runs,
-        seed=search_settings.seed,
+    cases = CaseRuns(scenario, out, settings, table=SEARCH)
+    plan = SweepPlan(
+        tuple(axes), search_settings.method, search_settings.runs, search_settings.seed
     )
+    refuse_unknown(plan.names, scenario)
+    proposer = proposal_kind(plan.method).start(plan)
     with disk_errors(f"search {out}"), locked(out, what=f"search {out.name!r}"):
         said = _said(plan, search_settings, settings)
         begin_folder(out, {SEARCH_FILE: said}, scenario, what="search")
-        looking = _Looking(workspace, scenario, plan, out, judged, limits, processes, done)
+        executor = LocalExecutor(workspace, processes, check)
+        looking = _Looking(workspace, scenario, plan, out, cases, executor, done)
         while (left := search_settings.runs - len(looking.rows)) > 0:
             places = proposer.ask(min(search_settings.batch, left))
             proposer.tell(looking.run(places))
         return looking.found()
 
 
-class _Looking(Reporter):
+class _Looking:
     """Cases that have been run so far."""
 
     def __init__(
@@ -229,42 +222,29 @@ class _Looking(Reporter):
         scenario: Scenario,
         plan: SweepPlan,
         out: Path,
-        settings: SweepSettings,
-        limits: Sequence[Limit],
-        processes: int,
+        case_runs: CaseRuns,
+        executor: LocalExecutor,
         done: Callable[[int, int], None] | None,
     ) -> None:
         self.rows: list[dict[str, Any]] = []
-        self._settings = settings
         self._workspace, self._scenario, self._out = workspace, scenario, out
-        self._plan, self._limits, self._processes, self._done = plan, limits, processes, done
+        self._plan, self._case_runs, self._executor = plan, case_runs, executor
+        self._done = done
         self._places: list[list[float]] = []
+        # Of the folder as it is: what an interrupted search has, whatever is asked for next.
+        self._record = KeptRuns(file.parent.name for file in out.glob(_SUMMARIES))
 
     def run(self, places: FloatArray) -> list[float | None]:
         """Run cases at places of the unit cube; how critical each was, ``None``: not possible."""
-        digits = max(3, len(str(self._plan.samples)))
+        count = self._plan.samples or 0
+        digits = max(3, len(str(count)))
         cases = {}
         for number, place in enumerate(places.tolist(), start=len(self.rows) + 1):
-            parts = [axis.at(share) for axis, share in zip(self._plan.axes, place, strict=True)]
-            values = (value for part in parts for value in part)
-            cases[f"case-{number:0{digits}}"] = dict(zip(self._plan.names, values, strict=True))
-        checked, refused = checked_cases(
-            self._workspace, self._scenario, cases, self._out, self._settings
-        )
-        run_all(
-            [run for run in checked if not has_completed(run.folder)],
-            processes=self._processes,
-            reports=self._settings.reports,
-            reporter=self,
-        )
-        rows = rows_of(
-            self._scenario,
-            cases,
-            self._out,
-            refused=refused,
-            settings=self._settings,
-            limits=self._limits,
-        )
+            cases[f"case-{number:0{digits}}"] = self._plan.values_at(place)
+        checked = self._case_runs.check(self._workspace, cases)
+        left = [run for run in checked if not has_completed(run.folder)]
+        self._case_runs.run(self._executor, left, self._record, count=count, done=self._done)
+        rows = self._case_runs.rows(cases)
         for row in rows:
             row["criticality"] = None if row["safe"] is None else criticality(row)
         self._places += places.tolist()
@@ -278,7 +258,11 @@ class _Looking(Reporter):
         scores = [self.rows[k]["criticality"] for k in critical]
         kept = [critical[k] for k in distinct(places[critical], scores)]
         table = write_cases(
-            self._out, self._scenario, self._plan.names, rows=self.rows, limits=self._limits
+            self._out,
+            self._scenario,
+            self._plan.names,
+            rows=self.rows,
+            limits=self._case_runs.limits,
         )
         found = SearchResult(
             folder=self._out,
@@ -299,13 +283,6 @@ class _Looking(Reporter):
         write_text(self._out / ARCHIVE_FILE, text)
         return found
 
-    def finished(self, run: Run) -> None:
-        """Say how many have ended."""
-        del run
-        if self._done is not None:
-            ended = len([*(self._out / "runs").glob(f"case-*/{layout.SUMMARY_FILE}")])
-            self._done(ended, self._plan.samples or 0)
-
 
 def _said(plan: SweepPlan, how: SearchSettings, settings: SweepSettings) -> dict[str, Any]:
     """What ``search.json`` says."""
@@ -319,23 +296,3 @@ def _said(plan: SweepPlan, how: SearchSettings, settings: SweepSettings) -> dict
         "seed": how.seed,
         "settings": settings.to_dict(),
     }
-
-
-def _measure(name: str, watched: Collection[str] | None) -> Callable[[Run], float | None]:
-    """A column that :class:`Closeness` has a value for."""
-
-    def measured(run: Run) -> float | None:
-        value: float | None = getattr(_closeness(run, watched), name)
-        return value
-
-    return measured
-
-
-def _closeness(run: Run, watched: Collection[str] | None) -> Closeness:
-    try:
-        trajectories = run.trajectories()
-    except InputError:  # nobody was on the road
-        return Closeness(None, None)
-    text = (run.folder / layout.PLAN_FILE).read_text(encoding="utf-8")
-    bodies = {one.id: (one.length, one.width) for one in Plan.from_json(text).actors}
-    return closeness_of(trajectories, bodies, watched)

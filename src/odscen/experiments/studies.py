@@ -34,8 +34,8 @@ from odscen.experiments.plan import (
     read_study_plan,
     refuse_other,
 )
-from odscen.experiments.study_rows import REFUSED, refuse_taken_names, study_table
-from odscen.experiments.work import WorkOrder, unpacked, versions
+from odscen.experiments.table import REFUSED, refuse_taken_names, study_table
+from odscen.experiments.work import WorkOrder, carry_out, unpacked, versions
 from odscen.records.outcomes import RunStatus
 from odscen.scenario.document.validation import validated
 
@@ -324,31 +324,25 @@ def carry_out_study(
                     if row["status"] != RunStatus.COMPLETED
                 )
             orders = StudyOrders(grid, journal.rows, target=target, formats=formats)
-            for outcomes in executor.outcomes(orders):
-                for outcome in outcomes:
-                    _take(out, journal, outcome, take)
-                if done is not None:
-                    done(len(journal.rows), grid.count)
+            carry_out(
+                executor.outcomes(orders),
+                journal,
+                count=grid.count,
+                take=lambda outcome: _keep(out, outcome, take),
+                done=done,
+            )
             table = write_table(out, grid, journal.rows)
         state = _state(out, grid, journal.rows, active=False)
     return EndedStudy(state, table)
 
 
-def _take(
-    out: Path,
-    journal: StudyJournal,
-    outcome: Outcome,
-    more: Callable[[Outcome], None] | None,
-) -> None:
-    """Keep what a run has given; its row last, as a run without a row is run again."""
-    if outcome.name in journal.rows:
-        return
+def _keep(out: Path, outcome: Outcome, more: Callable[[Outcome], None] | None) -> None:
+    """Keep what a run has given beside its row."""
     if outcome.folder is not None:
         with new_folder(out / RUNS_FOLDER / outcome.name) as folder:
             unpacked(outcome.folder, folder)
     if more is not None:
         more(outcome)
-    journal.add(outcome.name, outcome.row)
 
 
 class StudyOrders:
@@ -419,8 +413,6 @@ def study_results(out: Path) -> EndedStudy:
     InputError
         If there is no study.
     """
-    from odscen.experiments.study_rows import study_table
-
     grid, rows = read_study(out), read_rows(out)
     state = _state(out, grid, rows, active=is_locked(out))
     return EndedStudy(state, study_table(grid, rows))

@@ -16,8 +16,7 @@ from odscen.base.errors import InputError
 from odscen.base.markup import Markup, element, join
 from odscen.base.text_files import write_text
 from odscen.experiments.studies import study_results
-from odscen.experiments.study_rows import FIGURE_COLUMNS
-from odscen.figures.measures.registry import run_figure
+from odscen.experiments.table import study_figures
 from odscen.records.outcomes import RunStatus
 from odscen.reports.page_templates import html_page, html_table, page_head, report_section
 
@@ -97,13 +96,13 @@ def figures_had(out: Path) -> list[str]:
         If there is no study.
     """
     table = _completed(study_results(out).table)
-    had = [name for name in FIGURE_COLUMNS if table[name].null_count() < table.height]
+    had = [name for name in study_figures() if table[name].null_count() < table.height]
     return had or list(SHOWN_FIGURES)
 
 
 def _refuse_unknown(figures: Iterable[str]) -> None:
     for name in figures:
-        if run_figure(name) is None:
+        if name not in study_figures():
             raise InputError(f"no figure of runs is called {name!r}")
 
 
@@ -232,9 +231,7 @@ def _section(
 
 
 def _label(name: str) -> str:
-    figure = run_figure(name)
-    if figure is None:
-        return name
+    figure = study_figures()[name]
     return f"{figure.label}, {figure.unit}" if figure.unit else figure.label
 
 

@@ -17,10 +17,9 @@ from odscen.experiments.suite import CaseStatus
 from odscen.experiments.suite_runs import map_before
 from odscen.experiments.suite_words import details, headline, seed_words, sizing_words
 from odscen.experiments.verdict import FEWEST, Effect
+from odscen.reports.charts import legend
 from odscen.reports.page_templates import html_page, html_table, page_head, report_section
-from odscen.reports.place_shapes import place_shapes
-from odscen.reports.plots import legend
-from odscen.reports.report_map import SPEED_STEPS_KMH
+from odscen.reports.report_maps import SPEED_STEPS_KMH, place_shapes
 from odscen.runs.layout import REPORT_FILE
 
 if TYPE_CHECKING:

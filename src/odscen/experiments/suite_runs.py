@@ -13,9 +13,9 @@ import shutil
 import threading
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ToolError, in_file
@@ -23,11 +23,13 @@ from odscen.base.given_files import read_given
 from odscen.base.stored_files import documents, read_document
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.experiments.baseline import fingerprint, read_baseline
+from odscen.experiments.journal import KeptRuns
 from odscen.experiments.measure import FigureKey, measure
 from odscen.experiments.own_figures import own_values
 from odscen.experiments.suite import SeedResult
 from odscen.experiments.tolerance import Sizing
 from odscen.experiments.verdict import causes_between
+from odscen.experiments.work import PreparedOrder, PreparedOrders, carry_out
 from odscen.figures.judging.criteria import missed_rows, missed_words
 from odscen.figures.judging.expectations import CRITERIA, USABLE, evaluate, needs_criticality
 from odscen.maps.folder_names import name_from_file
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
     from odscen.app.running.runs import CheckedRun
     from odscen.experiments.baseline import Baseline, Fingerprint
     from odscen.experiments.suite import Case, CaseResult, Suite, SuiteResult
+    from odscen.experiments.work import LocalExecutor, Outcome
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
@@ -242,89 +245,72 @@ class RunPlace(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SeedRunner:
-    """Runs scenarios of a suite, ``processes`` at a time."""
+    """Runs scenarios of a suite.
+
+    Attributes
+    ----------
+    tell
+        Called with the name of a run and how much of all runs has been carried out, 0 to 1.
+    """
 
     suite: Suite
-    processes: int = 1
+    executor: LocalExecutor
     tell: Callable[[str, float], None] | None = None
 
     def run(self, cases: Sequence[LoadedCase], place: RunPlace) -> None:
         """Run each case with those of its seeds that it was not run with, and keep the results."""
-        jobs: dict[str, tuple[LoadedCase, int]] = {}
-        runs = []
+        asked: dict[str, tuple[LoadedCase, int]] = {}
+        orders = []
+        shares: dict[str, float] = {}
+        lock = threading.Lock()
+
+        def report(name: str, share: float) -> None:
+            with lock:
+                shares[name] = min(share, 1.0)
+                total = sum(shares.values()) / len(asked)
+            if self.tell is not None:
+                self.tell(name, total)
+
+        class SeedReporter(Reporter):
+            """Adds up the progress of runs that go on at the same time."""
+
+            def __init__(self, name: str) -> None:
+                self._name = name
+
+            def advanced(self, progress: Progress) -> None:
+                report(self._name, progress.time / progress.until if progress.until else 0.0)
+
+        def make_row(case: LoadedCase, seed: int, result: Run) -> dict[str, Any]:
+            made = _seed_result(case, seed, result, self.suite, kept=place.keep)
+            if not place.keep:
+                shutil.rmtree(result.folder)
+            return {"result": made}
+
         for case in cases:
             for seed in case.case.seeds:
                 if seed in case.runs or seed in case.refused:
                     continue
                 name = f"{case.case.name}/seed-{seed}"
-                folder = place.root / name
-                jobs[name] = case, seed
+                asked[name] = case, seed
                 settings = replace(case.run.settings, seed=seed)
-                runs.append(replace(case.run, name=name, folder=folder, settings=settings))
-        if not runs:
-            return
+                run = replace(case.run, name=name, folder=place.root / name, settings=settings)
+                row_of = partial(make_row, case, seed)
+                orders.append(
+                    PreparedOrder(
+                        run, reports=place.keep, row_of=row_of, reporter=SeedReporter(name)
+                    )
+                )
 
-        def keep_result(name: str, result: Run) -> None:
-            case, seed = jobs[name]
-            case.runs[seed] = _seed_result(case, seed, result, self.suite, kept=place.keep)
-            if not place.keep:
-                shutil.rmtree(result.folder)
+        def take(outcome: Outcome) -> None:
+            case, seed = asked[outcome.name]
+            if "result" in outcome.row:
+                case.runs[seed] = outcome.row["result"]
+            else:
+                case.refused[seed] = f"seed {seed}: {outcome.row['detail']}"
+            report(outcome.name, 1.0)
 
-        def note_refusal(name: str, error: InputError) -> None:
-            case, seed = jobs[name]
-            case.refused[seed] = f"seed {seed}: {error}"
-            follow.set_share(name, 1.0)
-
-        follow = _SuiteProgress(len(runs), self.tell, keep_result)
-        run_all(
-            runs,
-            processes=self.processes,
-            reports=place.keep,
-            reporter=follow,
-            refused=note_refusal,
-        )
-
-
-class _SuiteProgress(Reporter):
-    """Adds up the progress of runs that go on at the same time, and keeps their results."""
-
-    def __init__(
-        self,
-        total: int,
-        tell: Callable[[str, float], None] | None,
-        keep_result: Callable[[str, Run], None],
-    ) -> None:
-        self._shares: dict[str, float] = {}
-        self._total = total
-        self._tell = tell
-        self._lock = threading.Lock()
-        self.keep_result = keep_result
-
-    def of_run(self, name: str) -> Reporter:
-        return _SeedProgress(self, name)
-
-    def set_share(self, name: str, share: float) -> None:
-        """Say how much of a run is done."""
-        with self._lock:
-            self._shares[name] = share
-            total = sum(self._shares.values()) / self._total
-        if self._tell is not None:
-            self._tell(name, total)
-
-
-class _SeedProgress(Reporter):
-    """One of the runs."""
-
-    def __init__(self, suite: _SuiteProgress, name: str) -> None:
-        self._suite, self._name = suite, name
-
-    def advanced(self, progress: Progress) -> None:
-        share = progress.time / progress.until if progress.until else 0.0
-        self._suite.set_share(self._name, min(share, 1.0))
-
-    def finished(self, run: Run) -> None:
-        self._suite.keep_result(self._name, run)
-        self._suite.set_share(self._name, 1.0)
+        outcomes = self.executor.outcomes(PreparedOrders(orders))
+        carry_out(outcomes, KeptRuns(), count=len(orders), take=take)
 
 
 def _seed_result(

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from odscen.base.markup import Markup, element, join, number
-from odscen.experiments.sweep_rows import UNITS
+from odscen.experiments.table import column_units
+from odscen.reports.charts import Axis, ChartFrame, chart, legend, nice_ticks, text_at
 from odscen.reports.page_templates import html_page, html_table, page_head, report_section
-from odscen.reports.plots import Axis, ChartFrame, chart, legend, nice_ticks, text_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -154,7 +154,7 @@ def _plane(sweep: SweepShown) -> Markup | None:
         if np.isnan(sweep.column(_DEFAULT_MEASURE)).all():
             return None
         names.append(_DEFAULT_MEASURE)
-    units = {**UNITS, **sweep.units}
+    units = {**column_units(), **sweep.units}
     x, y = (sweep.column(name) for name in names)
     across, up = (_axis(v, name, units[name]) for v, name in zip((x, y), names, strict=True))
     frame = ChartFrame(across, up, height=400.0)
@@ -238,7 +238,7 @@ def _lines(sweep: SweepShown) -> Markup:
         if np.isfinite(sweep.column(name)).any()
     ]  # fmt: skip
     names = [*sweep.names, *measures]
-    units = {**UNITS, **sweep.units}
+    units = {**column_units(), **sweep.units}
     width, top, bottom = 760.0, 46.0, 330.0
     at = np.linspace(70.0, width - 70.0, len(names)) if len(names) > 1 else np.array([width / 2])
     heights, axes = [], []
@@ -293,7 +293,7 @@ def _line(at: FloatArray, heights: Sequence[float], words: str) -> Markup:
 def _table(sweep: SweepShown) -> Markup:
     measures = [key for key in sweep.rows[0] if key not in {"case", "safe", "status", "detail"}]
     names = [*sweep.names, *(key for key in measures if _measured(sweep, key))]
-    units = {**UNITS, **sweep.units}
+    units = {**column_units(), **sweep.units}
     heads = ["case", "", "safe", *(f"{n}, {units[n]}" if units.get(n) else n for n in names)]
     rows = []
     for row in sweep.rows:

@@ -16,7 +16,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.app.export import export
-from odscen.app.figure_functions import installed_value, is_installed
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
 from odscen.app.scenarios import SUFFIX, read_scenario, scenario_name
@@ -26,31 +25,29 @@ from odscen.base.folder_locks import locked
 from odscen.base.stored_files import read_document
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
+from odscen.experiments.journal import KeptRuns
 from odscen.experiments.sweep_page import SweepShown, safe_boundary, sweep_page
-from odscen.experiments.sweep_rows import OUTCOME, limit_from_text, outcome_of
-from odscen.figures.measures.registry import run_figure
+from odscen.experiments.table import REFUSED, SWEEP, MeasuredRun, columns_of, read_limit
+from odscen.experiments.work import LocalExecutor, PreparedOrder, PreparedOrders, carry_out
 from odscen.formats.openscenario.dialect import Dialect
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.records.outcomes import RunStatus
-from odscen.records.run_events import events_from_json
 from odscen.runs import layout
 from odscen.runs.finished_run import Run
-from odscen.runs.recorded import read_conflicts
 from odscen.runs.recording import Recording
-from odscen.runs.reporter import SILENT, Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.sweeps.sweep_plan import concrete, plan_from_data
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     import polars as pl
 
     from odscen.app.running.runs import CheckedRun
-    from odscen.experiments.sweep_rows import Limit
+    from odscen.experiments.table import Limit
+    from odscen.experiments.work import Outcome
     from odscen.maps.store import Workspace
-    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
 
@@ -204,74 +201,108 @@ class Sweep:
     boundary: tuple[tuple[tuple[float, float], tuple[float, float]], ...]
 
 
-def limits_of(settings: SweepSettings) -> tuple[Limit, ...]:
-    """Read what a safe case keeps.
+class CaseRuns:
+    """Cases of a scenario in a folder: checked, run where they have not been, and read as rows.
+
+    Parameters
+    ----------
+    table
+        Whose columns rows have: of a sweep or a search.
 
     Raises
     ------
     InputError
-        If a figure or a column of a limit is unknown.
+        If a figure, or a column of a limit, is unknown.
     """
-    for name in settings.figures:
-        if run_figure(name) is None and not is_installed(name):
-            raise InputError(
-                f"no figure of runs is called {name!r}, and no installed package offers one"
-            )
-    columns = [*OUTCOME, *settings.figures, *settings.own]
-    return tuple(limit_from_text(text, columns) for text in settings.safe)
 
+    def __init__(
+        self, scenario: Scenario, out: Path, settings: SweepSettings, *, table: str = SWEEP
+    ) -> None:
+        self.columns = columns_of(table, settings.figures, settings.own)
+        self.limits = tuple(read_limit(text, self.columns) for text in settings.safe)
+        self.refused: dict[str, str] = {}
+        self._scenario, self._out, self._settings = scenario, out, settings
+        self._watched = watched_actors(scenario)
+        # Those of a sweep are computed when they are first asked for.
+        self._with_figures = table != SWEEP or bool(settings.figures)
 
-def rows_of(
-    scenario: Scenario,
-    cases: Mapping[str, Mapping[str, float]],
-    out: Path,
-    *,
-    refused: Mapping[str, str],
-    settings: SweepSettings,
-    limits: Sequence[Limit],
-) -> list[dict[str, Any]]:
-    """A row for each case, from its run folder; ``refused`` are cases without, and why.
-
-    The ``status`` of a case that has not been run yet is ``waiting``.
-    """
-    watched = watched_actors(scenario)
-    rows = []
-    for name, values in cases.items():
-        row: dict[str, Any] = {"case": name, "status": "refused", "safe": None}
-        row |= {"detail": refused.get(name), **values}
-        measured = dict.fromkeys([*OUTCOME, *settings.figures, *settings.own])
-        folder = out / "runs" / name
-        if name not in refused and not (folder / layout.SUMMARY_FILE).is_file():
-            row["status"] = "waiting"
-        elif name not in refused:
-            run = Run.open(folder)
-            row["status"] = str(run.status)
-            if run.status is RunStatus.COMPLETED:
-                measured = _measured(run, settings, watched)
-                row["safe"] = not measured["collision"] and all(
-                    limit.holds(measured) for limit in limits
+    def check(
+        self, workspace: Workspace, cases: Mapping[str, Mapping[str, float]]
+    ) -> list[CheckedRun]:
+        """Check each case as a run; why others are not possible is in ``refused``."""
+        scenario, out = self._scenario, self._out
+        entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
+        given = RunSettings(
+            seed=self._settings.seed,
+            recording=WATCHES_CLOSENESS,
+            behaviour=self._settings.behaviour,
+        )
+        runs = []
+        for name, values in cases.items():
+            try:
+                case = concrete(scenario, values, name=name)
+                run = check_run(
+                    workspace, case, name=name, out=out / "runs", settings=given, entry=entry
                 )
-            else:
-                row["detail"] = str(run.known["error"])
-        rows.append(row | measured)
-    return rows
+            except ScenarioError as error:
+                self.refused[name] = "; ".join([error.problem, *error.problems])
+                continue
+            file = out / "cases" / f"{name}{SUFFIX}"
+            if not file.is_file():
+                write_text(file, dumps(case))
+            runs.append(run)
+        return runs
+
+    def run(
+        self,
+        executor: LocalExecutor,
+        runs: Sequence[CheckedRun],
+        record: KeptRuns,
+        *,
+        count: int,
+        done: Callable[[int, int], None] | None = None,
+    ) -> None:
+        """Run cases; their folders are the record of what has ended."""
+
+        def take(outcome: Outcome) -> None:
+            if outcome.row["status"] == REFUSED:
+                self.refused[outcome.name] = str(outcome.row["detail"])
+
+        orders = PreparedOrders(
+            PreparedOrder(run, self._settings.reports, self._with_figures) for run in runs
+        )
+        carry_out(executor.outcomes(orders), record, count=count, take=take, done=done)
+
+    def rows(self, cases: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
+        """A row for each case, from its run folder; one that has not been run yet is waiting."""
+        rows = []
+        for name, values in cases.items():
+            row: dict[str, Any] = {"case": name, "status": REFUSED, "safe": None}
+            row |= {"detail": self.refused.get(name), **values}
+            measures: dict[str, Any] = dict.fromkeys(self.columns)
+            folder = self._out / "runs" / name
+            if name not in self.refused and not (folder / layout.SUMMARY_FILE).is_file():
+                row["status"] = "waiting"
+            elif name not in self.refused:
+                run = Run.open(folder)
+                row["status"] = str(run.status)
+                if run.status is RunStatus.COMPLETED:
+                    measured = MeasuredRun(run, self._watched)
+                    measures = {key: one.value(measured) for key, one in self.columns.items()}
+                    known = {"planned": run.counts.get("planned"), **measures}
+                    row["safe"] = not measures["collision"] and all(
+                        limit.holds(known) for limit in self.limits
+                    )
+                else:
+                    row["detail"] = str(run.known["error"])
+            rows.append(row | measures)
+        return rows
 
 
 def watched_actors(scenario: Scenario) -> frozenset[str] | None:
     """Whose collisions and encounters a sweep is about: egos, or actors of rules, or everybody."""
     egos = frozenset(actor.id for actor in scenario.actors if actor.ego)
     return egos or frozenset(rule.actor for rule in scenario.rules) or None
-
-
-def _measured(run: Run, settings: SweepSettings, watched: Collection[str] | None) -> dict[str, Any]:
-    events = events_from_json((run.folder / layout.EVENTS_FILE).read_text(encoding="utf-8"))
-    found: dict[str, Any] = dict(
-        outcome_of(events, read_conflicts(run.folder), run.trajectories, watched)
-    )
-    for name in settings.figures:
-        entry = run_figure(name)
-        found[name] = installed_value(name, run) if entry is None else run.value_of(entry)
-    return found | {name: function(run) for name, function in settings.own.items()}
 
 
 def write_table(
@@ -325,12 +356,8 @@ def read_table(out: Path) -> Sweep:
     if (out / TABLE_FILE).is_file():
         table = pl.read_parquet(out / TABLE_FILE)
     else:
-        settings = settings_from_dict(said)
-        limits = limits_of(settings)
-        cases = named_cases(plan)
-        table = _as_table(
-            rows_of(scenario, cases, out, refused={}, settings=settings, limits=limits)
-        )
+        runs = CaseRuns(scenario, out, settings_from_dict(said))
+        table = _as_table(runs.rows(named_cases(plan)))
     return Sweep(out, table, _boundary(plan, table.to_dicts()))
 
 
@@ -385,7 +412,7 @@ def sweep(
     settings: SweepSettings | None = None,
     processes: int = 1,
     tell: Callable[[str], None] | None = None,
-    reporter: Reporter = SILENT,
+    check: Callable[[], None] | None = None,
     done: Callable[[int, int], None] | None = None,
 ) -> Sweep:
     """Run every case of a plan; cases that ``out`` has from an earlier, interrupted time are kept.
@@ -400,10 +427,10 @@ def sweep(
         How many run at a time.
     tell
         Called with how many cases there are, and, after the first, with what the rest will take.
-    reporter
-        Hears of each run, from the threads that wait for runs.
+    check
+        Called now and then while runs are waited for; what it raises ends them.
     done
-        Called from these with how many of how many have ended.
+        Called with how many of how many have ended.
 
     Raises
     ------
@@ -413,23 +440,44 @@ def sweep(
         If another sweep is in ``out``.
     """
     settings = settings or SweepSettings()
-    limits = limits_of(settings)
+    runs = CaseRuns(scenario, out, settings)
     if settings.openscenario is not None:
         Dialect.of(settings.openscenario)  # an unknown version is refused before anything runs
     refuse_unknown(plan.names, scenario)
     with disk_errors(f"sweep {out}"), locked(out, what=f"sweep {out.name!r}"):
         cases = named_cases(plan)
         begin_sweep(out, scenario, plan, settings)
-        checked, refused = checked_cases(workspace, scenario, cases, out, settings)
+        checked = runs.check(workspace, cases)
         if not checked:
-            raise InputError(f"no case of the sweep can be run: {next(iter(refused.values()))}")
+            raise InputError(
+                f"no case of the sweep can be run: {next(iter(runs.refused.values()))}"
+            )
         left = [run for run in checked if not has_completed(run.folder)]
+        record = KeptRuns({run.name for run in checked} - {run.name for run in left})
         if tell is not None:
-            tell(_first_words(len(cases), len(refused), len(left), plan))
-        _run(left, len(checked), processes, settings, tell=tell, reporter=reporter, done=done)
-        _export(workspace, checked, out / "cases", settings.openscenario)
-        rows = rows_of(scenario, cases, out, refused=refused, settings=settings, limits=limits)
-        return write_table(out, scenario, plan, rows=rows, limits=limits)
+            words = f"{len(cases)} cases of {', '.join(plan.names)}"
+            if runs.refused:
+                words += f", {len(runs.refused)} of them not possible"
+            tell(f"{words}; {len(left)} to run" if len(left) < len(checked) else words)
+        # The first one alone, so that it says what the others will take.
+        for some in (left[:1], left[1:]):
+            began = time.monotonic()
+            executor = LocalExecutor(workspace, processes, check)
+            runs.run(executor, some, record, count=len(checked), done=done)
+            if some and some[0] is left[0] and len(left) > 1 and tell is not None:
+                spent, rest = time.monotonic() - began, len(left) - 1
+                disk = sum(f.stat().st_size for f in some[0].folder.rglob("*") if f.is_file())
+                tell(
+                    f"the first took {spent:.1f} s and {disk / 1e6:.1f} MB: about "
+                    f"{clock(rest * spent / processes + 59)} h and {rest * disk / 1e6:,.0f} MB for "
+                    f"the other {rest}"
+                )
+        if settings.openscenario is not None:
+            for run in checked:
+                file = out / "cases" / f"{run.name}{SUFFIX}"
+                options = {"version": settings.openscenario}
+                export(workspace, file, out / "cases", to="openscenario", options=options)
+        return write_table(out, scenario, plan, rows=runs.rows(cases), limits=runs.limits)
 
 
 def refuse_unknown(names: Sequence[str], scenario: Scenario) -> None:
@@ -438,105 +486,6 @@ def refuse_unknown(names: Sequence[str], scenario: Scenario) -> None:
         if name not in scenario.parameters:
             known = ", ".join(scenario.parameters) or "none"
             raise InputError(f"the scenario has no parameter {name!r}; it has {known}")
-
-
-def checked_cases(
-    workspace: Workspace,
-    scenario: Scenario,
-    cases: Mapping[str, Mapping[str, float]],
-    out: Path,
-    settings: SweepSettings,
-) -> tuple[list[CheckedRun], dict[str, str]]:
-    """Each case as a run, and those that are not possible with the reason."""
-    entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
-    given = RunSettings(
-        seed=settings.seed, recording=WATCHES_CLOSENESS, behaviour=settings.behaviour
-    )
-    runs, refused = [], {}
-    for name, values in cases.items():
-        try:
-            case = concrete(scenario, values, name=name)
-            run = check_run(
-                workspace, case, name=name, out=out / "runs", settings=given, entry=entry
-            )
-        except ScenarioError as error:
-            refused[name] = "; ".join([error.problem, *error.problems])
-            continue
-        file = out / "cases" / f"{name}{SUFFIX}"
-        if not file.is_file():
-            write_text(file, dumps(case))
-        runs.append(run)
-    return runs, refused
-
-
-def _first_words(cases: int, refused: int, left: int, plan: SweepPlan) -> str:
-    words = f"{cases} cases of {', '.join(plan.names)}"
-    if refused:
-        words += f", {refused} of them not possible"
-    return f"{words}; {left} to run" if left < cases - refused else words
-
-
-def _run(
-    left: Sequence[CheckedRun],
-    count: int,
-    processes: int,
-    settings: SweepSettings,
-    *,
-    tell: Callable[[str], None] | None,
-    reporter: Reporter,
-    done: Callable[[int, int], None] | None,
-) -> None:
-    """Run the first case alone, say what the others will take, and run them."""
-    counting = _CountingReporter(reporter, count - len(left), count, done)
-    for these in (left[:1], left[1:]):
-        if not these:
-            continue
-        began = time.monotonic()
-        run_all(
-            these,
-            processes=processes,
-            reports=settings.reports,
-            figures=bool(settings.figures),
-            reporter=counting,
-        )
-        if these[0] is left[0] and len(left) > 1 and tell is not None:
-            spent = time.monotonic() - began
-            disk = sum(f.stat().st_size for f in these[0].folder.rglob("*") if f.is_file())
-            rest = len(left) - 1
-            tell(
-                f"the first took {spent:.1f} s and {disk / 1e6:.1f} MB: about "
-                f"{clock(rest * spent / processes + 59)} h and {rest * disk / 1e6:,.0f} MB for the "
-                f"other {rest}"
-            )
-
-
-class _CountingReporter(Reporter):
-    """Passes on what runs report, and counts those that have ended."""
-
-    def __init__(
-        self, own: Reporter, ended: int, count: int, done: Callable[[int, int], None] | None
-    ) -> None:
-        self._own, self._ended, self._count, self._done = own, ended, count, done
-
-    def advanced(self, progress: Progress) -> None:
-        self._own.advanced(progress)
-
-    def finished(self, run: Run) -> None:
-        self._own.finished(run)
-        self._ended += 1
-        if self._done is not None:
-            self._done(self._ended, self._count)
-
-
-def _export(
-    workspace: Workspace, runs: Sequence[CheckedRun], folder: Path, version: str | None
-) -> None:
-    """Write each case as OpenSCENARIO beside its scenario, and the map once."""
-    if version is None:
-        return
-    for run in runs:
-        file = folder / f"{run.folder.name}{SUFFIX}"
-        export(workspace, file, folder, to="openscenario", options={"version": version})
 
 
 def has_completed(folder: Path) -> bool:
@@ -592,15 +541,15 @@ def opened_case(out: Path, case: str) -> Scenario:
 
 
 def _criterion(limit: Limit) -> str:
-    return f"{limit.column}(ego) {limit.op} {limit.bound:g} s"
+    return f"{_TTC}(ego) {limit.expectation.op} {limit.expectation.bound:g} s"
 
 
 def _of_ttc(text: str) -> Limit | None:
     """A limit if it is one of time to collision that a criterion can hold as well."""
     if re.match(rf"\s*{_TTC}\s*>", text) is None:
         return None
-    limit = limit_from_text(text, [_TTC])
-    return limit if limit.bound <= _RECORDED else None
+    limit = read_limit(text, columns_of(SWEEP))
+    return limit if limit.expectation.bound <= _RECORDED else None
 
 
 PATIENCE: Final = 60.0
@@ -652,7 +601,7 @@ def estimate(
         If a parameter, limit or figure is unknown, or no case that was tried is possible.
     """
     refuse_unknown(plan.names, scenario)
-    limits_of(settings)
+    CaseRuns(scenario, Path(), settings)  # an unknown figure or limit is refused
     with TemporaryDirectory(prefix="odscen-sweep-") as folder:
         began = time.monotonic()
         run = _possible(workspace, scenario, plan, settings, patience, Path(folder))

@@ -15,7 +15,7 @@ import tarfile
 import threading
 import time
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import import_module
 from importlib.metadata import version
@@ -30,9 +30,9 @@ from odscen.app.variants import edited
 from odscen.base.atomic_folders import clear_leftovers, passing_folder
 from odscen.base.errors import ConflictError, InputError, MissingDependencyError
 from odscen.base.version import __version__
-from odscen.experiments.study_rows import REFUSED, outcome_row, row_of
+from odscen.experiments.table import REFUSED, outcome_row, row_of
 from odscen.records.outcomes import RunStatus
-from odscen.runs.reporter import Reporter
+from odscen.runs.reporter import SILENT, Reporter
 from odscen.scenario.document.json_form import loads
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.validation import validated
@@ -41,7 +41,7 @@ from odscen.scenario.sampling.sampler import sample_scenario
 from odscen.scenario.sweeps.sweep_plan import concrete
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from concurrent.futures import Future
 
     from odscen.app.maps import LoadedMap
@@ -84,6 +84,11 @@ class WorkOrder:
     target: str | None
     formats: tuple[str, ...]
     versions: Mapping[str, str]
+
+    def carry_out(self, workspace: Workspace, stopped: Callable[[], bool]) -> list[Outcome]:
+        """Carry it out in a workspace that has all maps."""
+        places = {source.map_name: workspace for source in self.sources.values()}
+        return carry_out_order(self, places, stopped=stopped)
 
 
 class Outcome(NamedTuple):
@@ -259,7 +264,7 @@ def _simulated(
     ended = run_all(
         [checked],
         reports=False,
-        reporter=_StudyReporter(stopped),
+        reporter=_StoppableReporter(stopped),
         refused=lambda _name, error: refusals.append(_words(error)),
     )
     if not ended:
@@ -285,16 +290,16 @@ class GivenUpError(Exception):
     """The study has been stopped, and what is under way with it."""
 
 
-class _StudyReporter(Reporter):
-    """Ends a run whose study has been stopped."""
+class _StoppableReporter(Reporter):
+    """Ends a run whose experiment has been stopped."""
 
-    def __init__(self, stopped: Callable[[], bool]) -> None:
-        self._stopped = stopped
+    def __init__(self, stopped: Callable[[], bool], own: Reporter = SILENT) -> None:
+        self._stopped, self._own = stopped, own
 
     def advanced(self, progress: Progress) -> None:
-        del progress
         if self._stopped():
             raise GivenUpError
+        self._own.advanced(progress)
 
 
 def _exported(
@@ -370,20 +375,72 @@ class Orders(Protocol):
         """An order of at most so many runs; ``None`` when there are no more."""
 
 
+class LocalOrder(Protocol):
+    """Runs that this machine can carry out."""
+
+    def carry_out(self, workspace: Workspace, stopped: Callable[[], bool]) -> list[Outcome]:
+        """Carry them out; asked again and again, ``stopped`` ends what is under way."""
+
+
+class LocalOrders(Protocol):
+    """Gives the next order for this machine."""
+
+    def next(self, most: int) -> LocalOrder | None:
+        """An order of at most so many runs; ``None`` when there are no more."""
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedOrder:
+    """A run that has been checked on this machine; its folder stays where it says.
+
+    Attributes
+    ----------
+    reports, figures
+        Whether its report is written, and whether its figures are computed at once.
+    row_of
+        Makes its row while the run is at hand.
+    reporter
+        Hears of it, from the thread that waits for it.
+    """
+
+    run: CheckedRun
+    reports: bool = False
+    figures: bool = True
+    row_of: Callable[[Run], dict[str, Any]] | None = None
+    reporter: Reporter = SILENT
+
+    def carry_out(self, workspace: Workspace, stopped: Callable[[], bool]) -> list[Outcome]:
+        """Carry it out; what cannot be prepared, or has no row, is refused."""
+        del workspace
+        reporter = _StoppableReporter(stopped, self.reporter)
+        try:
+            (result,) = run_all(
+                [self.run], reports=self.reports, figures=self.figures, reporter=reporter
+            )
+            if self.row_of is not None:
+                return [Outcome(self.run.name, self.row_of(result))]
+        except InputError as error:
+            return [Outcome(self.run.name, outcome_row(REFUSED, str(error)))]
+        return [Outcome(self.run.name, outcome_row(result.status, result.known["error"]))]
+
+
+class PreparedOrders:
+    """Orders of one run each."""
+
+    def __init__(self, orders: Iterable[PreparedOrder]) -> None:
+        self._left = iter(orders)
+
+    def next(self, most: int) -> PreparedOrder | None:
+        """The next one."""
+        del most
+        return next(self._left, None)
+
+
 class Executor(Protocol):
     """Carries out orders."""
 
     def outcomes(self, orders: Orders) -> Iterator[list[Outcome]]:
         """Outcomes of each order, when it has been carried out."""
-
-
-def _import_what_threads_share() -> None:
-    """Import what is otherwise imported at its first use, by several threads at a time.
-
-    Where two of them wait for each other's imports, Python gives one a module that is half there.
-    """
-    for name in ("numpy.ma", "polars"):
-        import_module(name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -403,17 +460,26 @@ class LocalExecutor:
     workspace: Workspace
     processes: int = 1
     check: Callable[[], None] | None = None
-    _stop: threading.Event = field(default_factory=threading.Event)
 
-    def outcomes(self, orders: Orders) -> Iterator[list[Outcome]]:
+    def outcomes(self, orders: LocalOrders) -> Iterator[list[Outcome]]:
         """Outcomes of each order, of one run, when it has been carried out."""
-        _import_what_threads_share()
+        # What is otherwise imported at its first use, by several threads at a time: where two of
+        # them wait for each other's imports, Python gives one a module that is half there.
+        for name in ("numpy.ma", "polars"):
+            import_module(name)
+        stop = threading.Event()
+
+        def work(order: LocalOrder) -> list[Outcome]:
+            if stop.is_set():
+                raise GivenUpError
+            return order.carry_out(self.workspace, stop.is_set)
+
         with ThreadPoolExecutor(max_workers=max(1, self.processes)) as pool:
             running: set[Future[list[Outcome]]] = set()
             try:
                 while True:
                     while len(running) < self.processes + 1 and (order := orders.next(1)):
-                        running.add(pool.submit(self._work, order))
+                        running.add(pool.submit(work, order))
                     if not running:
                         return
                     ended, running = wait(running, timeout=_LISTEN, return_when=FIRST_COMPLETED)
@@ -422,13 +488,48 @@ class LocalExecutor:
                     for future in ended:
                         yield future.result()
             finally:
-                self._stop.set()
+                stop.set()
                 pool.shutdown(wait=False, cancel_futures=True)
 
-    def _work(self, order: WorkOrder) -> list[Outcome]:
-        if self._stop.is_set():
-            raise GivenUpError
-        places: Mapping[str, Workspace] = {
-            source.map_name: self.workspace for source in order.sources.values()
-        }
-        return carry_out_order(order, places, stopped=self._stop.is_set)
+
+class Record(Protocol):
+    """What has ended: a journal, or the run folders where all are kept."""
+
+    def __contains__(self, name: object) -> bool:
+        """Whether a run has ended."""
+
+    def __len__(self) -> int:
+        """How many have."""
+
+    def add(self, name: str, row: Mapping[str, Any]) -> bool:
+        """Write down that a run has ended, and its row."""
+
+
+def carry_out(
+    outcomes: Iterable[list[Outcome]],
+    record: Record,
+    *,
+    count: int,
+    take: Callable[[Outcome], None] | None = None,
+    done: Callable[[int, int], None] | None = None,
+) -> None:
+    """Take what an executor gives; runs that the record has count once.
+
+    Parameters
+    ----------
+    count
+        How many runs there are in all.
+    take
+        Called with each outcome before its row is kept, as a run without a row is run again.
+    done
+        Called with how many of how many have ended.
+    """
+    for some in outcomes:
+        for outcome in some:
+            if outcome.name in record:
+                continue
+            if take is not None:
+                take(outcome)
+            record.add(outcome.name, outcome.row)
+        if done is not None:
+            done(len(record), count)

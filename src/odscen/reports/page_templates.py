@@ -1,7 +1,8 @@
-"""HTML of the pages: skeleton, head, sections and tables, from the templates beside this module.
+"""Pages from the templates beside this module.
 
 What a template is given is escaped unless it is :class:`odscen.base.markup.Markup`, and loses
-what XML cannot hold; a name that a template does not know is an error.
+what XML cannot hold; a name that a template does not know is an error. Templates have the macros
+of ``kit.html.j2`` as ``kit``, and the filters below.
 """
 
 from __future__ import annotations
@@ -14,20 +15,28 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-from odscen.base.markup import Markup, escaped
+from odscen.base.markup import Markup, escaped, number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from jinja2 import Template
+
+
+def render_page(template: str, **values: object) -> str:
+    """Whole page of a template that extends ``page.html.j2``; ``values`` has its ``title``."""
+    return _template(template).render(values)
+
+
+def render_block(template: str, block: str, **values: object) -> Markup:
+    """One block of a template, such as one section of the report of a run."""
+    loaded = _template(template)
+    return Markup("".join(loaded.blocks[block](loaded.new_context(values))))
+
 
 def html_page(title: str, body: Markup) -> str:
     """Whole page with our style and script around ``body``; it forbids itself everything else."""
-    style = _text("assets", "report.css") + _text("assets", "signals.css")
-    script = _text("assets", "report.js")
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    return _filled(
-        "page", title=title, body=body, digest=digest, style=Markup(style), script=Markup(script)
-    )
+    return render_page("page.html.j2", title=title, body=body)
 
 
 def page_head(
@@ -40,14 +49,12 @@ def page_head(
     style
         Class of the verdict: good, fair or bad.
     """
-    shown = [part for part in parts if part]
-    return _filled("head", kind=kind, title=title, verdict=verdict, style=style, parts=shown)
+    return _fill_macro("head", kind, title, verdict, style, parts=parts)
 
 
 def report_section(heading: str, *children: Markup | None, explained: str, ident: str) -> Markup:
     """Section with heading, content, and a sentence on how to read it."""
-    shown = [child for child in children if child]
-    return _filled("section", heading=heading, parts=shown, explained=explained, ident=ident)
+    return _fill_macro("section", heading, ident, explained, parts=children)
 
 
 def html_table(
@@ -55,24 +62,49 @@ def html_table(
 ) -> Markup:
     """Table that scrolls where there is no room; ``rows`` are ``tr``, ``label`` names it."""
     given = {name.rstrip("_"): value for name, value in attributes.items()}
-    return _filled("table", heads=heads, rows=rows, label=label or heads[0], attributes=given)
+    return _fill_macro("table", heads, label, given, parts=rows)
 
 
-def _filled(name: str, **values: object) -> Markup:
-    return Markup(_environment().get_template(f"{name}.html.j2").render(values))
+def _fill_macro(macro: str, *values: object, parts: Sequence[Markup | None]) -> Markup:
+    """Call a macro of ``kit.html.j2`` that is written around what it is called with."""
+    inner = Markup("\n".join(part for part in parts if part))
+    return Markup(getattr(_template("kit.html.j2").module, macro)(*values, caller=lambda: inner))
+
+
+def _template(name: str) -> Template:
+    return _environment().get_template(name)
 
 
 @cache
 def _environment() -> Environment:
-    return Environment(
-        loader=FunctionLoader(lambda name: _text("templates", name)),
+    environment = Environment(
+        loader=FunctionLoader(lambda name: _read_text("templates", name)),
         autoescape=True,
         finalize=escaped,
         keep_trailing_newline=True,
         trim_blocks=True,
+        lstrip_blocks=True,
         undefined=StrictUndefined,
     )
+    environment.filters["number"] = _format_number
+    environment.filters["count"] = lambda value: f"{value:,}"
+    environment.filters["route"] = lambda movement: str(movement).replace(">", " > ")
+    script = _read_text("assets", "report.js")
+    environment.globals |= {
+        "page_style": Markup(
+            _read_text("assets", "report.css") + _read_text("assets", "signals.css")
+        ),
+        "page_script": Markup(script),
+        "script_digest": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+    }
+    # Blocks are also rendered alone, where imports at the top of their template are not seen.
+    environment.globals["kit"] = environment.get_template("kit.html.j2").module
+    return environment
 
 
-def _text(folder: str, name: str) -> str:
+def _format_number(value: float | None, digits: int = 2, missing: str = "-") -> str:
+    return missing if value is None else number(float(value), digits)
+
+
+def _read_text(folder: str, name: str) -> str:
     return (files("odscen.reports") / folder / name).read_text(encoding="utf-8")

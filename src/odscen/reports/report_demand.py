@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from odscen.base.markup import Markup, element, number
-from odscen.reports.page_templates import html_table, report_section
-from odscen.reports.plots import (
+from odscen.reports.charts import (
     Axis,
     ChartFrame,
     Dots,
@@ -17,39 +16,20 @@ from odscen.reports.plots import (
     legend,
     value_axis,
 )
+from odscen.reports.page_templates import render_block
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.records.assignment_steps import Assignment, AssignmentStep
-
-_HEADS = (
-    "Iteration", "Gap, %", "Mean travel time, s", "Routes changed", "Arrived", "Teleported",
-    "Not inserted",
-)  # fmt: skip
+    from odscen.records.assignment_steps import Assignment
 
 
-def assignment_section(assignment: Assignment) -> Markup | None:
-    """Chart of the gap by iteration, and a row for each; ``None`` without any."""
+def assignment_values(assignment: Assignment) -> dict[str, Any] | None:
+    """Chart of the gap by iteration, and the iterations; ``None`` without any."""
     if not assignment.steps:
         return None
-    reached = "reached" if assignment.gap <= assignment.wanted else "not reached"
-    explained = (
-        "the scenario was run once for each iteration, and after each some trips changed to the "
-        "route that had been quickest. The gap is the share of all travel time that trips would "
-        f"save on the quickest routes. The routes of iteration {assignment.used} are driven: a gap "
-        f"of {100 * assignment.gap:.2f} %; {100 * assignment.wanted:g} % was wanted and is "
-        f"{reached}. Where signals and queues differ from one iteration to the next, the gap does "
-        "not come down to 0."
-    )
-    table = html_table(_HEADS, [_row(step) for step in assignment.steps], label="Iterations")
-    return report_section(
-        "Routes by travel time",
-        convergence_chart(assignment),
-        table,
-        explained=explained,
-        ident="assignment",
-    )
+    values = {name: getattr(assignment, name) for name in ("steps", "gap", "wanted", "used")}
+    return {"chart": convergence_chart(assignment), **values}
 
 
 def convergence_chart(assignment: Assignment) -> Markup:
@@ -73,16 +53,6 @@ def convergence_chart(assignment: Assignment) -> Markup:
     parts.insert(0, element("path", element("title", "wanted"), d=line, class_="trail"))
     description = "Gap of the routes by iteration; the horizontal line is the gap wanted"
     return chart(frame, parts, description=description)
-
-
-def _row(step: AssignmentStep) -> Markup:
-    mean = "-" if step.travel_time is None else number(step.travel_time, digits=1)
-    cells = (
-        f"{100 * step.gap:.2f}", mean, f"{step.changed:,}", f"{step.arrived:,}",
-        f"{step.teleported:,}", f"{step.waiting:,}",
-    )  # fmt: skip
-    head = element("th", str(step.iteration), scope="row")
-    return element("tr", head, *(element("td", cell, class_="n") for cell in cells))
 
 
 class ShownCount(NamedTuple):
@@ -115,40 +85,36 @@ def counts_section(
         How many whole hours of a place are within GEH 5, and how many there are, if slices of
         counts make up hours.
     """
-    missed = [one for one in counts if one.geh > GOOD_GEH]
-    met = len(counts) - len(missed)
-    share = met / len(counts) if counts else 0.0
-    explained = (
-        f"{met:,} of {len(counts):,} counts are within GEH 5 ({share:.1%}); the root of the mean "
-        f"squared difference is {rmse:.1f} vehicles. On the line traffic is what was counted."
-    )
-    good, there = hours
-    if there:
-        explained += f" Of the whole hours, {good:,} of {there:,} are ({good / there:.1%})."
-    heads = ("Place", "From, s", "To, s", "Counted", "Traffic", "GEH", "Why not")
-    worst = sorted(missed, key=lambda one: (-one.geh, one.place, one.begin))[:MOST_ROWS]
-    table = html_table(heads, [_count_row(one) for one in worst], label="Counts not met")
-    ident = heading.lower().replace(" ", "-")
-    return report_section(
-        heading,
-        scatter_chart(counts),
-        table if worst else None,
-        explained=explained,
-        ident=ident,
+    missed = [count for count in counts if count.geh > GOOD_GEH]
+    worst = sorted(missed, key=lambda count: (-count.geh, count.place, count.begin))[:MOST_ROWS]
+    return render_block(
+        "counts.html.j2",
+        "counts",
+        heading=heading,
+        ident=heading.lower().replace(" ", "-"),
+        chart=scatter_chart(counts),
+        worst=worst,
+        met=len(counts) - len(missed),
+        count=len(counts),
+        rmse=rmse,
+        hours=hours,
     )
 
 
 def scatter_chart(counts: Sequence[ShownCount]) -> Markup:
     """Traffic over counts, vehicles in each slice; both axes alike, with the line of equals."""
-    top = max((max(one.counted, one.modelled) for one in counts), default=1.0)
+    top = max((max(count.counted, count.modelled) for count in counts), default=1.0)
     frame = ChartFrame(
         value_axis(top, "counted, vehicles"), value_axis(top, "traffic, vehicles"), height=420.0
     )
     groups = []
     for good, label, style in ((True, "GEH up to 5", "c-arrived"), (False, "above", "c-waiting")):
-        mine = [one for one in counts if (one.geh <= GOOD_GEH) is good]
-        x, y = (np.array([float(getattr(one, key)) for one in mine]) for key in _AXES)
-        titles = [f"{one.place}: {one.counted:g} counted, {one.modelled:g}" for one in mine]
+        mine = [count for count in counts if (count.geh <= GOOD_GEH) is good]
+        x, y = (
+            np.array([float(getattr(count, key)) for count in mine])
+            for key in ("counted", "modelled")
+        )
+        titles = [f"{count.place}: {count.counted:g} counted, {count.modelled:g}" for count in mine]
         groups.append(Dots(label, style, x, y, titles))
     high = frame.x_axis.high
     ends = [float(value) for value in (frame.x(0.0), frame.y(0.0), frame.x(high), frame.y(high))]
@@ -157,16 +123,3 @@ def scatter_chart(counts: Sequence[ShownCount]) -> Markup:
     keys = legend([(dots.style, dots.label) for dots in groups])
     description = "Traffic against counts; on the diagonal both are equal"
     return chart(frame, [line, *dot_parts(frame, groups)], description=description, keys=keys)
-
-
-_AXES = ("counted", "modelled")
-
-
-def _count_row(one: ShownCount) -> Markup:
-    cells = (f"{one.begin:g}", f"{one.end:g}", f"{one.counted:g}", f"{one.modelled:g}")
-    return element(
-        "tr",
-        element("th", one.place, scope="row"),
-        *(element("td", cell, class_="n") for cell in (*cells, f"{one.geh:.1f}")),
-        element("td", one.why, class_="wrap"),
-    )

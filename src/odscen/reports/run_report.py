@@ -1,50 +1,56 @@
 """The report of a run: one HTML file that needs nothing else, for people who do not program.
 
-Everything that comes from files is escaped by construction (:mod:`odscen.base.markup`); besides,
-the page forbids itself every request and every script but its own, whose hash it names.
+Each section is a block of ``run_report.html.j2`` and a function that computes what the block is
+given, here or in :mod:`odscen.reports.report_sections`. Everything that comes from files is escaped
+by the templates; besides, the page forbids itself every request and every script but its own, whose
+hash it names.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from odscen.base.durations import clock
-from odscen.base.markup import Markup, element, join, number
+from odscen.base.markup import number
+from odscen.figures.by_place.traffic import over_run
+from odscen.figures.measures.conflicts import SERIOUS_DRAC, SERIOUS_PET, SERIOUS_TTC, is_serious
 from odscen.figures.measures.curves import presence
-from odscen.figures.measures.figure import RunData, SummaryPart
+from odscen.figures.measures.figure import ReportSection, RunData, SummaryPart
 from odscen.figures.measures.gridlock import find_incidents
 from odscen.figures.measures.registry import figure_values
+from odscen.figures.measures.timetable import LATE, stops_served
 from odscen.figures.measures.usability import UsabilityLevel, run_usability
-from odscen.records.outcomes import RunStatus
-from odscen.records.traces import bin_width, speed_over_time, tidy, travel
-from odscen.reports.page_templates import html_page, page_head, report_section
-from odscen.reports.plots import Series, line_chart
-from odscen.reports.report_brief import brief_section
-from odscen.reports.report_conflicts import conflict_section
-from odscen.reports.report_corridor import corridor_section
-from odscen.reports.report_demand import assignment_section
-from odscen.reports.report_emissions import emission_section
-from odscen.reports.report_figures import key_figure_section
-from odscen.reports.report_flow import diagram_section, flow_section
-from odscen.reports.report_groups import group_section, station_section
-from odscen.reports.report_incidents import incident_section
-from odscen.reports.report_map import CATEGORIES, run_map
-from odscen.reports.report_measures import measure_section
-from odscen.reports.report_parking import parking_section
-from odscen.reports.report_service import service_section
-from odscen.reports.report_tables import (
-    actor_table,
-    criteria_table,
-    event_list,
-    expectation_table,
+from odscen.records.outcomes import (
+    ActorStatus,
+    IncidentKind,
+    RunStatus,
+    reason_label,
+    stop_reason,
 )
-from odscen.reports.report_transit import transit_section
-from odscen.reports.report_walking import walking_section
+from odscen.records.run_events import EventKind
+from odscen.records.traces import bin_width, speed_over_time, tidy, travel
+from odscen.reports.charts import Series, line_chart
+from odscen.reports.page_templates import render_page
+from odscen.reports.report_cards import Card, figure_cards, named_cards
+from odscen.reports.report_demand import assignment_values
+from odscen.reports.report_maps import CATEGORIES, run_map, service_map, worst_incidents
+from odscen.reports.report_sections import (
+    corridor_values,
+    diagram_values,
+    emission_values,
+    flow_values,
+    group_values,
+    service_values,
+    station_values,
+    worst_places,
+)
+from odscen.reports.report_signals import signal_values
 from odscen.reports.report_words import duration, starting_at
-from odscen.reports.signals.report_signals import signal_section
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import polars as pl
 
@@ -57,10 +63,11 @@ if TYPE_CHECKING:
     from odscen.figures.measures.usability import Usability
     from odscen.records.assignment_steps import Assignment
     from odscen.records.run_events import Event
-    from odscen.records.run_plan import Plan
-    from odscen.reports.place_shapes import PlaceShapes
-    from odscen.reports.report_corridor import CorridorTraces
-    from odscen.reports.signals.report_signals import LightsOfRun
+    from odscen.records.run_plan import Plan, PlannedMeasure
+    from odscen.records.traces import ActorTravel
+    from odscen.reports.report_maps import PlaceShapes
+    from odscen.reports.report_sections import CorridorTraces
+    from odscen.reports.report_signals import LightsOfRun
 
 
 def render_report(
@@ -127,54 +134,80 @@ def render_report(
     """
     categories = {actor.id: actor.category for actor in actors}
     traces = tidy(trajectories, categories, net_offset=plan.net_offset)
-    end = _end(summary, traces)
+    last = traces["time"].max()
+    recorded = float(last) if isinstance(last, int | float) else 0.0
+    end = max(float(summary.get("sim_seconds") or 0.0), recorded, 1.0)
     incidents = find_incidents(plan, actors, events, end=end)
-    title = plan.scenario or "Run"
-    usability = run_usability(actors, incidents, end=end, until=_cut_short(summary, plan))
+    cut_short = plan.until if summary.get("stopped") else None
+    usability = run_usability(actors, incidents, end=end, until=cut_short)
     run = RunData(actors, figures, conflicts=conflicts, visits=visits, end=end, parking=parking)
     counts = figure_values(run, part=SummaryPart.ACTORS)
     given = summary.get("figures") or figure_values(run)
+    values = {**given, **counts}
+    drawn = run_map(traces, plan, actors, events, drawing, incidents=incidents)
+    title = plan.scenario or "Run"
     with starting_at(plan.clock):
-        body = [
-            _head(title, plan, summary, usability, _in_a_sentence(counts)),
-            brief_section({**given, **counts}, usability, figures, shapes),
-            key_figure_section({**given, **counts}, traces),
-            measure_section(plan.measures, int(counts["stranded"] or 0)),
-            service_section(figures) if figures else None,
-            group_section(figures.lane_groups) if figures else None,
-            station_section(stations) if stations is not None else None,
-            _map_section(traces, plan, actors, events, drawing, incidents, every),
-            incident_section(incidents),
-            *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
-            corridor_section(corridor) if corridor is not None else None,
-            signal_section(lights, given, drawing=drawing) if lights is not None else None,
-            transit_section(visits, given) if visits is not None else None,
-            parking_section(parking, given) if parking is not None else None,
-            assignment_section(assignment) if assignment is not None else None,
-            _speed_section(traces, end),
-            _progress_section(actors, end),
-            conflict_section(conflicts) if conflicts is not None else None,
-            walking_section(given, actors, traces, end=end),
-            emission_section(figures) if figures else None,
-            criteria_table(summary.get("criteria") or ()),
-            expectation_table(summary.get("expectations") or ()),
-            event_list(
-                events, actors, problems=[str(text) for text in summary.get("problems") or ()]
-            ),
-            actor_table(actors, travel(traces)),
-            _foot(summary),
-        ]
-    return html_page(f"{title} - run report", join([part for part in body if part]))
+        return render_page(
+            "run_report.html.j2",
+            title=f"{title} - run report",
+            head=_head_values(title, plan, summary, usability, counts),
+            brief=_brief_values(values, usability, figures, shapes),
+            figures={
+                "cards": [
+                    *figure_cards(ReportSection.KEY_FIGURES, values),
+                    _speed_card(traces),
+                ]
+            },
+            measures=measure_values(plan.measures, int(counts["stranded"] or 0)),
+            service=service_values(figures) if figures else None,
+            groups=group_values(figures.lane_groups) if figures else None,
+            stations=station_values(stations) if stations is not None else None,
+            map=drawn and {**drawn._asdict(), "incidents": bool(incidents), "every": every},
+            incidents=_incident_values(incidents),
+            flow=flow_values(figures.network) if figures else None,
+            diagram=diagram_values(figures.network) if figures else None,
+            corridor=corridor_values(corridor) if corridor is not None else None,
+            signals=signal_values(lights, given, drawing=drawing) if lights is not None else None,
+            transit=_transit_values(visits, given) if visits is not None else None,
+            parking=_parking_values(parking, given) if parking is not None else None,
+            assignment=assignment_values(assignment) if assignment is not None else None,
+            speed=_speed_values(traces, end),
+            progress=_progress_values(actors, end),
+            conflicts=conflict_values(conflicts) if conflicts is not None else None,
+            walking=_walking_values(given, actors, traces, end=end),
+            emissions=emission_values(figures) if figures else None,
+            criteria=summary.get("criteria") or (),
+            expectations=summary.get("expectations") or (),
+            events=_event_values(events, actors, problems=summary.get("problems") or ()),
+            actors=_actor_values(actors, travel(traces)),
+            foot=_foot_values(summary),
+        )
 
 
-def _end(summary: Mapping[str, Any], traces: pl.DataFrame) -> float:
-    last = traces["time"].max()
-    recorded = float(last) if isinstance(last, int | float) else 0.0
-    return max(float(summary.get("sim_seconds") or 0.0), recorded, 1.0)
-
-
-def _cut_short(summary: Mapping[str, Any], plan: Plan) -> float | None:
-    return plan.until if summary.get("stopped") else None
+def _head_values(
+    title: str, plan: Plan, summary: Mapping[str, Any], usability: Usability, counts: Values
+) -> dict[str, Any]:
+    style, words = _verdict(summary, usability)
+    weather = summary.get("environment")
+    if isinstance(weather, dict):
+        weather = str(weather.get("name") or weather.get("preset") or "")
+    facts = [
+        ("Map", summary.get("map")),
+        ("Weather", weather),
+        ("Seed", plan.seed),
+        ("Starts at", clock(plan.clock) if plan.clock else None),
+        ("Simulated", duration(summary.get("sim_seconds"))),
+        ("Warm-up left out", duration(summary.get("warm_up"))),
+        ("Computed in", duration(summary.get("wall_seconds"))),
+    ]
+    return {
+        "title": title,
+        "verdict": words,
+        "style": style,
+        "outcomes": _outcome_sentence(counts),
+        "reason": summary.get("error") or summary.get("reason"),
+        "facts": [fact for fact in facts if fact[1] not in (None, "")],
+    }
 
 
 _STYLES = {
@@ -197,14 +230,13 @@ def _verdict(summary: Mapping[str, Any], usability: Usability) -> tuple[str, str
         return "bad", f"{words}, {missed} of {len(expectations)} {kind} not met"
     style = _STYLES[usability.level]
     if expectations:
-        one = {"criteria": "criterion"}.get(kind, "expectation")
-        met = f"{one} met" if len(expectations) == 1 else f"all {kind} met"
+        single = {"criteria": "criterion"}.get(kind, "expectation")
+        met = f"{single} met" if len(expectations) == 1 else f"all {kind} met"
         return style, f"{words}, {met}"
     return style, words
 
 
-def _in_a_sentence(counts: Values) -> str:
-    """Outcomes of the actors, in one sentence."""
+def _outcome_sentence(counts: Values) -> str:
     if not counts["planned"]:
         return ""
     parts = [f"{counts['arrived']:,} of {counts['planned']:,} road users arrived"]
@@ -225,107 +257,185 @@ def _in_a_sentence(counts: Values) -> str:
     return "; ".join(parts) + "."
 
 
-def _head(
-    title: str, plan: Plan, summary: Mapping[str, Any], usability: Usability, sentence: str
-) -> Markup:
-    style, words = _verdict(summary, usability)
-    facts = [
-        ("Map", summary.get("map")),
-        ("Weather", summary.get("environment")),
-        ("Seed", plan.seed),
-        ("Starts at", clock(plan.clock) if plan.clock else None),
-        ("Simulated", duration(summary.get("sim_seconds"))),
-        ("Warm-up left out", duration(summary.get("warm_up"))),
-        ("Computed in", duration(summary.get("wall_seconds"))),
-    ]
-    shown = [
-        element("span", element("b", f"{name} "), _plain(value))
-        for name, value in facts
-        if value not in (None, "")
-    ]
-    reason = summary.get("error") or summary.get("reason")
-    return page_head(
-        "Run report",
-        title,
-        element("p", sentence) if sentence else None,
-        element("pre", str(reason), class_="reason") if reason else None,
-        element("p", *shown, class_="facts"),
-        verdict=words,
-        style=style,
-    )
+BRIEF_FIGURES = (
+    "arrived",
+    "mean_delay",
+    "mean_latent_delay",
+    "mean_speed",
+    "throughput",
+    "worst_junction_delay",
+)
+"""Figures of the run that the first page has; those that it does not have are left out."""
+
+MOST_FINDINGS = 3
 
 
-def _plain(value: object) -> str:
-    if isinstance(value, dict):
-        return str(value.get("name") or value.get("preset") or "")
-    return number(value) if isinstance(value, float) else str(value)
+def _brief_values(
+    values: Mapping[str, Any],
+    usability: Usability,
+    figures: TrafficFigures | None,
+    shapes: PlaceShapes | None,
+) -> dict[str, Any]:
+    """Figures, findings, and the map of levels of service if there are figures and shapes."""
+    findings = [reason.words for reason in usability.reasons]
+    drawn = None
+    if figures is not None:
+        findings += _place_findings(figures)
+        if shapes is not None:
+            drawn = service_map(figures, shapes, worst_places(over_run(figures.junctions)))
+    return {
+        "cards": named_cards(BRIEF_FIGURES, values),
+        "findings": [f"{words[:1].upper()}{words[1:]}." for words in findings[:MOST_FINDINGS]],
+        "map": drawn,
+    }
 
 
-def _map_section(
-    traces: pl.DataFrame,
-    plan: Plan,
-    actors: Sequence[ActorOutcome],
-    events: Sequence[Event],
-    drawing: MapDrawing | None,
-    incidents: Sequence[Incident],
-    every: int,
-) -> Markup | None:
-    figure = run_map(traces, plan, actors, events, drawing, incidents=incidents)
-    if figure is None:
+def _place_findings(figures: TrafficFigures) -> Iterator[str]:
+    """The worst movement and the slowest segment, if they are at capacity or beyond."""
+    for row in worst_places(over_run(figures.movements))[:1]:
+        if row["level"] in ("E", "F"):
+            name = str(row["movement"]).replace(">", " > ")
+            yield (
+                f"the turning movement {name} has level of service {row['level']}: "
+                f"{number(row['shown'], 0)} s control delay for {row['vehicles']:,} vehicles"
+            )
+    segments = over_run(figures.segments)
+    slow = segments.filter(segments["level"].is_in(["E", "F"])).sort("time_loss", descending=True)
+    for row in slow.head(1).iter_rows(named=True):
+        yield (
+            f"segment {row['segment']}, the one with most time lost, has level of service "
+            f"{row['level']}: "
+            f"{number(row['speed'] * 3.6, 0)} km/h for {row['vehicles']:,} vehicles"
+        )
+
+
+def _speed_card(traces: pl.DataFrame) -> Card:
+    """Mean of all vehicles at all times, those included that have not arrived."""
+    speed = traces["speed"].filter(traces["category"] != "pedestrian").mean()
+    text = f"{number(speed * 3.6, 1)} km/h" if isinstance(speed, int | float) else "-"
+    return Card("mean speed on the road", text, "of all vehicles, stops included")
+
+
+MEASURE_LABELS = {
+    "closure": "Closure",
+    "roadworks": "Roadworks",
+    "incident": "Incident",
+    "speed_limit": "Speed limit",
+    "permission": "Permission",
+    "signal_outage": "Signal out of order",
+}
+"""Words for the kinds of measures."""
+
+
+def measure_values(measures: Sequence[PlannedMeasure], stranded: int = 0) -> dict[str, Any] | None:
+    """Measures with their numbers, and how many actors they left without a route."""
+    if not measures:
         return None
-    explained = (
-        "every line is the trajectory of one actor; point at it to see whose. Switch to mean speed "
-        "to see where traffic was slow: red places were congested, blue places flowed freely."
-    )
-    if incidents:
-        explained += (
-            " Numbered rings are incidents: gridlock, teleports; the table below has them. Where "
-            "rings crowd, one has its number; point at the others for theirs."
+    rows = [
+        (
+            place,
+            f"{MEASURE_LABELS.get(measure.kind, measure.kind)} {measure.id}",
+            measure.words,
+            duration(measure.begin) or "0 s",
+            duration(measure.end),
         )
-    if every > 1:
-        explained += (
-            f" The run is long: this page is made from one in {every} recorded positions, "
-            "so that trajectories are a little straighter and shorter than they were."
-        )
-    return report_section("Trajectories", figure, explained=explained, ident="map")
+        for place, measure in enumerate(measures, start=1)
+    ]
+    return {"rows": rows, "stranded": stranded}
 
 
-def _speed_section(traces: pl.DataFrame, end: float) -> Markup | None:
+def _incident_values(incidents: Sequence[Incident]) -> dict[str, Any] | None:
+    if not incidents:
+        return None
+    shown = worst_incidents(incidents)
+    rows = []
+    for place, incident in enumerate(shown, start=1):
+        where = incident.place or incident.lane or ""
+        if incident.x is not None and incident.y is not None:
+            where = f"x {number(incident.x, 0)} m, y {number(incident.y, 0)} m ({where})"
+        until = number(incident.until, 0) if incident.until is not None else "did not dissolve"
+        if incident.kind is IncidentKind.NOT_INSERTED:
+            until = "not inserted"
+        reason = reason_label(incident.reason)
+        count, since = number(incident.count, 0), number(incident.time, 0)
+        rows.append((place, incident.kind.label, reason, count, since, until, where))
+    return {"rows": rows, "more": len(incidents) - len(shown)}
+
+
+def _transit_values(visits: pl.DataFrame, values: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Cards over all lines, and a row for each stop of each line."""
+    if visits.is_empty():
+        return None
+    return {
+        "cards": figure_cards(ReportSection.TRANSIT, values),
+        "rows": stops_served(visits).to_dicts(),
+        "late_minutes": LATE / 60.0,
+    }
+
+
+MOST_AREAS = 60
+"""Parking areas in the table; of more, those that were fullest."""
+
+
+def _parking_values(parking: ParkingUse, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Cards over all areas, places taken over time, and a row for each area."""
+    rows = [(area, parking.use(area.id)) for area in parking.areas]
+    if len(rows) > MOST_AREAS:
+        fullest = sorted(rows, key=lambda row: -row[1].occupancy)[:MOST_AREAS]
+        rows = [row for row in rows if row in fullest]
+    taken = parking.taken()
+    width = bin_width(parking.end - parking.begin)
+    times = np.arange(parking.begin, parking.end + width / 2.0, width)
+    last_change = np.searchsorted(taken.time, times, side="right") - 1
+    places = sum(area.places for area in parking.areas)
+    series = [
+        Series("occupied", "c-running", taken.places[last_change].astype(np.float64)),
+        Series("places", "c-waiting", np.full(len(times), float(places))),
+    ]
+    text = "Occupied parking places over time, in all areas"
+    return {
+        "cards": figure_cards(ReportSection.PARKING, values),
+        "chart": line_chart(times, series, y_label="places", description=text, end=parking.end),
+        "rows": rows,
+        "areas": len(parking.areas),
+    }
+
+
+def _speed_values(traces: pl.DataFrame, end: float) -> dict[str, Any] | None:
+    """Mean speed of all vehicles over time, and of each category if there are several."""
     if traces.is_empty():
         return None
     width = bin_width(end)
     traces = traces.select("time", "speed", "category")
     vehicles = traces.filter(traces["category"] != "pedestrian")
-    parts: list[Markup | None] = []
+    all_vehicles = each = None
     if not vehicles.is_empty():
         curve = speed_over_time(vehicles, end=end, width=width)
         line = Series(
             "mean of all vehicles", "c-all", curve.mean * 3.6, curve.low * 3.6, curve.high * 3.6
         )
         text = "Mean speed of all vehicles over time"
-        parts.append(line_chart(curve.time, [line], y_label="speed, km/h", description=text))
+        all_vehicles = line_chart(curve.time, [line], y_label="speed, km/h", description=text)
     present = [key for key in CATEGORIES if (traces["category"] == key).any()]
+    # Fewer and longer bins: a handful of lines over each other must stay apart by eye.
+    width_each = bin_width(end, bins=40)
     if len(present) > 1:
-        # Fewer and longer bins: a handful of lines over each other must stay apart by eye.
-        width_each = bin_width(end, bins=40)
         lines = []
         for key in present:
-            curve = speed_over_time(
-                traces.filter(traces["category"] == key), end=end, width=width_each
-            )
+            own = traces.filter(traces["category"] == key)
+            curve = speed_over_time(own, end=end, width=width_each)
             lines.append(Series(CATEGORIES[key], f"c-{key}", curve.mean * 3.6))
         text = f"Mean speed of each category over time, every {duration(width_each)}"
-        parts.append(element("h3", f"By category, mean over {duration(width_each)}"))
-        parts.append(line_chart(curve.time, lines, y_label="speed, km/h", description=text))
-    explained = (
-        f"each point of the upper chart is the mean over {duration(width)} of all vehicles on the "
-        "road then, stopped ones included. A wide band means that some drive freely while others "
-        "are queued. A line ends where no vehicle is left."
-    )
-    return report_section("Speed over time", *parts, explained=explained, ident="speed")
+        each = line_chart(curve.time, lines, y_label="speed, km/h", description=text)
+    return {
+        "all": all_vehicles,
+        "each": each,
+        "bin": duration(width),
+        "bin_each": duration(width_each),
+    }
 
 
-def _progress_section(actors: Sequence[ActorOutcome], end: float) -> Markup | None:
+def _progress_values(actors: Sequence[ActorOutcome], end: float) -> dict[str, Any] | None:
     if not actors:
         return None
     counts = presence(actors, end=end)
@@ -335,21 +445,189 @@ def _progress_section(actors: Sequence[ActorOutcome], end: float) -> Markup | No
     ]
     if counts.waiting.any():
         series.append(Series("not inserted yet", "c-waiting", counts.waiting))
-    chart = line_chart(
-        counts.time,
-        series,
-        y_label="actors",
-        description="Actors on the road and arrived over time",
-    )
-    explained = (
-        "when the line of arrivals climbs steadily, traffic flows. A growing number that is not "
-        "inserted yet (insertion backlog) means that there is no room where they depart."
-    )
-    return report_section("Insertions and arrivals", chart, explained=explained, ident="progress")
+    text = "Actors on the road and arrived over time"
+    return {"chart": line_chart(counts.time, series, y_label="actors", description=text)}
 
 
-def _foot(summary: Mapping[str, Any]) -> Markup:
+MOST_CONFLICTS = 15
+"""Rows of the table at most."""
+
+CONFLICT_KINDS = {
+    "following": "following",
+    "merging": "merging",
+    "crossing": "crossing",
+    "walking": "with a pedestrian",
+}
+
+
+def conflict_values(conflicts: pl.DataFrame) -> dict[str, Any]:
+    """Cards, and the worst conflicts.
+
+    Parameters
+    ----------
+    conflicts
+        As :func:`~odscen.figures.measures.conflicts.conflict_table` gives them.
+    """
+    import polars as pl
+
+    values = {**figure_values(RunData(conflicts=conflicts)), "conflicts": conflicts.height}
+    if not (conflicts["kind"] == "walking").any():
+        del values["pedestrian_min_pet"]
+    share = pl.max_horizontal(
+        SERIOUS_TTC / pl.col("ttc").clip(0.01),
+        SERIOUS_PET / pl.col("pet").clip(0.01),
+        pl.col("drac") / SERIOUS_DRAC,
+    )
+    worst = conflicts.sort(share, descending=True, maintain_order=True).head(MOST_CONFLICTS)
+    return {
+        "cards": figure_cards(ReportSection.CONFLICTS, values),
+        "rows": worst.with_columns(serious=is_serious()).to_dicts(),
+        "kinds": CONFLICT_KINDS,
+        "ttc": SERIOUS_TTC,
+        "pet": SERIOUS_PET,
+        "drac": SERIOUS_DRAC,
+    }
+
+
+def _walking_values(
+    figures: Mapping[str, Any],
+    actors: Sequence[ActorOutcome],
+    traces: pl.DataFrame,
+    *,
+    end: float,
+) -> dict[str, Any] | None:
+    """Figures of pedestrians and their speed over time."""
+    walkers = [actor for actor in actors if actor.category == "pedestrian"]
+    if not walkers:
+        return None
+    arrived = sum(actor.status is ActorStatus.ARRIVED for actor in walkers)
+    cards = [
+        Card("pedestrians", f"{len(walkers):,}", f"{arrived:,} arrived"),
+        *figure_cards(ReportSection.PEDESTRIANS, figures),
+    ]
+    chart = None
+    on_foot = traces.filter(traces["category"] == "pedestrian")
+    if not on_foot.is_empty():
+        curve = speed_over_time(on_foot, end=end, width=bin_width(end, bins=60))
+        if np.isfinite(curve.mean).sum() > 1:
+            line = Series("mean of all pedestrians", "c-pedestrian", curve.mean, curve.low,
+                          curve.high)  # fmt: skip
+            text = "Mean walking speed over time"
+            chart = line_chart(
+                curve.time, [line], y_label="speed, m/s", description=text, height=210.0, end=end
+            )
+    return {"cards": cards, "chart": chart}
+
+
+EVENT_LIMIT = 300
+
+_GRIDLOCKED = "Usually a blocked lane, or a turn that other traffic never left room for."
+
+EVENT_WORDS = {
+    EventKind.TELEPORT_START: ("was gridlocked and teleported", _GRIDLOCKED),
+    EventKind.TELEPORT_END: ("was put back on the road after its teleport", ""),
+    EventKind.COLLISION: (
+        "collided",
+        "Two bodies overlapped; often at a junction without signals, or after a teleport.",
+    ),
+    EventKind.EMERGENCY_STOP: (
+        "stopped harder than its brakes can",
+        "Usually the lane ahead was closed to it at short notice.",
+    ),
+    EventKind.LOST: (
+        "did not come back when the simulation was reloaded",
+        "A limit of the simulator; its trip is not counted as finished.",
+    ),
+    EventKind.STRANDED: (
+        "was stranded",
+        "A measure had closed every route to its goal; it was taken out.",
+    ),
+    EventKind.MEASURE_BEGIN: ("began", ""),
+    EventKind.MEASURE_END: ("ended", ""),
+    EventKind.RULE_STARTED: ("began to do what a rule says", ""),
+    EventKind.RULE_ACTED: ("did what a rule says", ""),
+    EventKind.RULE_ENDED: ("has done what a rule says", ""),
+    EventKind.RULE_FAILED: (
+        "could not do what a rule says",
+        "The scenario, or what traffic did before, does not allow it.",
+    ),
+    EventKind.RULE_OVERRIDDEN: (
+        "stopped doing what a rule says",
+        "Another rule acts on the same actor instead.",
+    ),
+}
+"""What happened and why that may be, for the events that are reported."""
+
+_NOT_INSERTED = ("was not inserted", "Its start was never free, or the run ended before its turn.")
+
+
+class _EventRow(NamedTuple):
+    """Line of the list of events."""
+
+    time: str
+    actor: str
+    words: str
+    reason: str
+
+
+def _event_values(
+    events: Sequence[Event], actors: Sequence[ActorOutcome], *, problems: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Everything unusual, in order of time, in words; ``problems`` are known before the start."""
+    listed = [(event.time, _event_row(event)) for event in events if event.kind in EVENT_WORDS]
+    listed += [
+        (actor.depart, _EventRow(number(actor.depart, 1), actor.id, *_NOT_INSERTED))
+        for actor in actors
+        if actor.inserted is None
+    ]
+    listed.sort(key=lambda pair: pair[0])
+    return {
+        "rows": [row for _, row in listed[:EVENT_LIMIT]],
+        "problems": problems[:EVENT_LIMIT],
+        "more": max(len(listed) - EVENT_LIMIT, 0),
+        "rules": any(event.rule for event in events),
+    }
+
+
+def _event_row(event: Event) -> _EventRow:
+    words, reason = EVENT_WORDS[event.kind]
+    if event.rule:
+        values = ", ".join(f"{name} {value:.4g}" for name, value in (event.values or {}).items())
+        words += f": {event.rule}" + (f" ({values})" if values else "")
+    if event.partner:
+        words += f" with {event.partner}"
+    if event.x is not None and event.y is not None:
+        words += f" at x {number(event.x, 1)} m, y {number(event.y, 1)} m"
+    if event.kind is EventKind.COLLISION and event.values:
+        words += f", {number(event.values.get('impact_speed', 0.0), 1)} m/s faster"
+    if event.detail:
+        of_rule = event.kind is EventKind.RULE_FAILED or event.rule
+        detail = event.detail if of_rule else reason_label(stop_reason(event.detail))
+        words += f" ({detail})"
+    time = number(event.time, 2 if event.rule else 1)
+    return _EventRow(time, event.actor, words, reason)
+
+
+ACTOR_LIMIT = 3000
+"""Rows of the actor table at most; a browser sorts that many at once. The file has all."""
+
+PRINTED_ACTORS = 100
+"""Rows of it on paper; the style sheet hides the others there."""
+
+
+def _actor_values(actors: Sequence[ActorOutcome], travel: ActorTravel) -> dict[str, Any]:
+    """One row per actor; the page's script sorts and filters them."""
+    return {
+        "rows": actors[:ACTOR_LIMIT],
+        "count": len(actors),
+        "printed": PRINTED_ACTORS,
+        "distance": travel.distance,
+        "speed_kmh": {actor: speed * 3.6 for actor, speed in travel.speed.items()},
+    }
+
+
+def _foot_values(summary: Mapping[str, Any]) -> dict[str, Any]:
     versions = dict(summary.get("versions") or {})
     own = str(versions.pop("odscen", ""))
-    made = ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
-    return element("footer", f"Made by odscen {own}".strip() + (f" with {made}." if made else "."))
+    others = ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
+    return {"own": own, "others": others}

@@ -8,7 +8,8 @@ from odscen.figures.measures.conflicts import (
     walking_conflicts,
 )
 from odscen.records.run_plan import PlannedActor
-from odscen.reports.report_conflicts import conflict_section
+from odscen.reports.page_templates import render_block
+from odscen.reports.run_report import conflict_values
 
 STEP = 0.1
 
@@ -106,7 +107,8 @@ def test_conflicts_are_told_the_worst_first():
         {"begin": 1.0, "end": 2.0, "one": "a", "other": "<b>", "kind": "following", "ttc": 2.5},
         {"begin": 5.0, "end": 6.0, "one": "c", "other": "d", "kind": "crossing", "ttc": 0.75},
     ]
-    section = conflict_section(conflict_table([{**measures, **row} for row in rows]))
+    values = conflict_values(conflict_table([{**measures, **row} for row in rows]))
+    section = render_block("run_report.html.j2", "conflicts", conflicts=values)
     page = html.fromstring(str(section))
     told = [[cell.text_content() for cell in row] for row in page.findall(".//tbody/tr")]
     assert told == [

@@ -9,8 +9,8 @@ import pytest
 from odscen.base.errors import InputError, NotFoundError
 from odscen.figures.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.figures.by_place.traffic import over_run
-from odscen.reports.place_shapes import place_shapes
-from odscen.reports.report_corridor import NONE_RECORDED
+from odscen.reports.report_maps import place_shapes
+from odscen.reports.report_sections import NONE_RECORDED
 from odscen.runs.measured import read_figures
 from odscen.runs.run_settings import RunSettings
 from odscen.sumo.outputs.corridor_traces import corridor_traces

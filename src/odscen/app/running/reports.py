@@ -25,9 +25,9 @@ from odscen.records.outcomes import RunStatus
 from odscen.records.row_text import rounded
 from odscen.records.run_events import events_from_json
 from odscen.records.run_plan import Plan
-from odscen.reports.place_shapes import place_shapes
+from odscen.reports.report_maps import place_shapes
+from odscen.reports.report_signals import LightsOfRun
 from odscen.reports.run_report import render_report
-from odscen.reports.signals.report_signals import LightsOfRun
 from odscen.runs import layout
 from odscen.runs.deferred_figures import whole_summary
 from odscen.runs.finished_run import Run

@@ -91,7 +91,7 @@ def signal_sheets(
     ScenarioError
         With every problem of the signals.
     """
-    from odscen.reports.signals.signal_sheet import signal_sheet
+    from odscen.reports.signal_sheet import signal_sheet
 
     scenario = given_scenario(scenario)
     drawing = map_of(workspace, scenario).drawing

@@ -9,6 +9,8 @@ share of the planned actors: ``arrived>=0.95``, ``arrived>=95%`` and ``arrived==
 ``NAME(ACTOR) OP NUMBER [UNIT]`` is about one actor, by its id: ``min_ttc(car-1) >= 1.5 s``;
 ``ego`` means every ego, unless an actor has this id. Names are those of
 :mod:`odscen.figures.judging.actor_measures`.
+A value that a run does not have meets no limit; measures of encounters in tables of cases are the
+exception, see :mod:`odscen.experiments.table`.
 ``usable`` alone expects that the run is not "not usable", ``criteria`` alone that every criterion
 of the scenario is met.
 A unit may be another one of the same kind: ``mean_speed >= 30 km/h``; without one it is SI.
@@ -111,6 +113,10 @@ class Expectation:
         written = match["unit"] if match is not None else None
         return written or (figure.unit if figure is not None and not self.share else "")
 
+    def holds(self, value: float) -> bool:
+        """Whether a value of its figure, in SI, keeps it."""
+        return _OPERATORS[self.op](value, self.bound)
+
     def in_its_unit(self, value: float) -> float:
         """A value of its figure in the unit that it is written in."""
         if self.unit == "%":
@@ -141,7 +147,12 @@ class ExpectationVerdict:
     time: float | None = None
 
 
-def parse_expectation(text: str, *, own: Mapping[str, Figure] | None = None) -> Expectation:
+def parse_expectation(
+    text: str,
+    *,
+    own: Mapping[str, Figure] | None = None,
+    columns: Mapping[str, Figure] | None = None,
+) -> Expectation:
     """Read one expectation, for ``expectations`` of the settings of a run.
 
     Parameters
@@ -152,6 +163,8 @@ def parse_expectation(text: str, *, own: Mapping[str, Figure] | None = None) -> 
         ``NAME(ACTOR) OP NUMBER [UNIT]``, see docs/criteria.md; or ``usable``; or ``criteria``.
     own
         Further figures by name, whose values are put into the ``figures`` of the summary.
+    columns
+        Columns of a table: then it is a limit of one of them, and nothing else.
 
     Returns
     -------
@@ -163,10 +176,16 @@ def parse_expectation(text: str, *, own: Mapping[str, Figure] | None = None) -> 
     InputError
         If it is not ``NAME OP NUMBER [UNIT]``, or the name is not known, or the unit does not fit.
     """
-    for word in (USABLE, CRITERIA):
-        if text.strip() == word.name:
-            return word
     match = _PATTERN.fullmatch(text)
+    if columns is not None:
+        if match is None or match["actor"] is not None:
+            raise InputError(f"{text!r} is no limit; write for example: min_ttc >= 1.5 s")
+        if match["name"] not in columns:
+            known = ", ".join(columns)
+            raise InputError(f"{text!r}: there is no column {match['name']!r}; there are {known}")
+    for word in (USABLE, CRITERIA):
+        if text.strip() == word.name and columns is None:
+            return word
     if match is None:
         raise InputError(
             f"expectation {text!r} is not of the form NAME OP NUMBER, "
@@ -175,6 +194,8 @@ def parse_expectation(text: str, *, own: Mapping[str, Figure] | None = None) -> 
     name, number, unit = match["name"], match["number"], match["unit"] or ""
     percent = unit == "%"
     figure, names = run_figure(name) or (own or {}).get(name), NAMES
+    if columns is not None:
+        figure = columns[name]
     if match["actor"] is not None:
         figure, names = actor_measure(name), ACTOR_NAMES
     counts = isinstance(figure, RunFigure) and figure.count
@@ -237,7 +258,7 @@ def _verdict(
     found = _measured(expectation, summary, records)
     if found is None:
         return ExpectationVerdict(expectation.text, None, passed=False)
-    passed = _OPERATORS[expectation.op](found.value, expectation.bound)
+    passed = expectation.holds(found.value)
     return ExpectationVerdict(expectation.text, found.value, passed, found.time)
 
 

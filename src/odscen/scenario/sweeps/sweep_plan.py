@@ -1,29 +1,36 @@
-"""What a sweep varies, and how: ranges, sets and tables of values, on a grid or as samples."""
+"""Cases of a scenario: which parameters are varied, and what proposes their values.
+
+A case is a place in the unit cube, a share of each range, set or table that is varied. A proposer
+is asked for some, told how critical each was, and asked again; with the same seed and the same
+answers it asks the same. :data:`PROPOSALS` has all kinds: one more is a line there, or a call of
+:func:`register_proposal`, and the commands that vary parameters take it.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+import warnings
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
-from odscen.base.errors import InputError, ScenarioError
+from odscen.base.errors import InputError, MissingDependencyError, ScenarioError
 from odscen.scenario.document.json_form import with_values
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
     from odscen.scenario.document.scenario_document import Scenario
 
-Method = Literal["grid", "latin", "sobol", "random"]
-METHODS: Final[tuple[str, ...]] = get_args(Method)
 MOST_CASES: Final = 100_000
 _DIGITS: Final = 9
 """Digits of values: enough for any number of a scenario, and 0.1 + 0.2 is 0.3."""
+_FIRST_AT_RANDOM = 10
+"""Cases before TPE has anything to go by, as optuna has it."""
 _RANGE = re.compile(r"(?P<low>[^.]+(?:\.\d+)?)\.\.(?P<high>[^:]+)(?::(?P<steps>.+))?")
 
 
@@ -41,20 +48,15 @@ class Range:
         """The one parameter that is varied."""
         return (self.name,)
 
-    def on_grid(self) -> tuple[tuple[float, ...], ...]:
-        """Values on a grid.
-
-        Raises
-        ------
-        InputError
-            Without steps.
-        """
+    @property
+    def shares(self) -> Sequence[float]:
+        """Shares of the range of the values on a grid; :class:`InputError` without steps."""
         if self.steps is None:
             raise InputError(
                 f"{self.name}: a grid needs the number of steps: {self.name}={self.low:g}.."
                 f"{self.high:g}:10; or give a number of samples"
             )
-        return tuple((_rounded(v),) for v in np.linspace(self.low, self.high, self.steps))
+        return [step / (self.steps - 1) for step in range(self.steps)]
 
     def at(self, share: float) -> tuple[float, ...]:
         """Value at a share of the range, from 0 to 1."""
@@ -68,9 +70,10 @@ class Table:
     names: tuple[str, ...]
     rows: tuple[tuple[float, ...], ...]
 
-    def on_grid(self) -> tuple[tuple[float, ...], ...]:
-        """All rows."""
-        return self.rows
+    @property
+    def shares(self) -> Sequence[float]:
+        """Shares of the table of its rows: the middle of each row's part."""
+        return [(row + 0.5) / len(self.rows) for row in range(len(self.rows))]
 
     def at(self, share: float) -> tuple[float, ...]:
         """Row at a share of the table, from 0 to 1."""
@@ -86,8 +89,7 @@ class SweepPlan:
     axes
         What is varied; no parameter twice.
     method
-        ``grid``: all combinations; ``latin``: a Latin hypercube; ``sobol``: a scrambled Sobol
-        sequence; ``random``: independent draws.
+        Name of a kind of :data:`PROPOSALS`.
     samples
         How many cases, of all methods but the grid.
     seed
@@ -95,7 +97,7 @@ class SweepPlan:
     """
 
     axes: tuple[Range | Table, ...]
-    method: Method = "grid"
+    method: str = "grid"
     samples: int | None = None
     seed: int = 0
 
@@ -108,8 +110,9 @@ class SweepPlan:
             raise InputError(
                 "nothing is varied: name a parameter and its values, for example gap=1..4:7"
             )
-        if (self.method == "grid") != (self.samples is None):
-            needs = "takes no" if self.method == "grid" else "needs a"
+        counted = proposal_kind(self.method).counted
+        if counted != (self.samples is not None):
+            needs = "needs a" if counted else "takes no"
             raise InputError(f"method {self.method} {needs} number of samples")
 
     @property
@@ -123,35 +126,23 @@ class SweepPlan:
         Raises
         ------
         InputError
-            If there are too many, or a grid lacks the steps of a range.
+            If there are too many, a grid lacks the steps of a range, or the method proposes cases
+            by what became of others.
         """
-        if self.method == "grid":
-            grids = [axis.on_grid() for axis in self.axes]
-            _refuse_many(math.prod(map(len, grids)))
-            return tuple(self._case(parts) for parts in product(*grids))
-        _refuse_many(self.samples or 0)
-        return tuple(
-            self._case([axis.at(share) for axis, share in zip(self.axes, row, strict=True)])
-            for row in self._shares().tolist()
-        )
+        kind = proposal_kind(self.method)
+        if kind.learns:
+            raise InputError(
+                f"method {self.method} learns from cases that have been run: only a search has it"
+            )
+        count = self.samples or math.prod(len(axis.shares) for axis in self.axes)
+        if count > MOST_CASES:
+            raise InputError(f"the sweep has {count:,} cases; at most {MOST_CASES:,} are possible")
+        return tuple(map(self.values_at, kind.start(self).ask(count).tolist()))
 
-    def _case(self, parts: Sequence[tuple[float, ...]]) -> dict[str, float]:
+    def values_at(self, place: Sequence[float]) -> dict[str, float]:
+        """Values of the parameters at a place of the unit cube."""
+        parts = (axis.at(share) for axis, share in zip(self.axes, place, strict=True))
         return dict(zip(self.names, (value for part in parts for value in part), strict=True))
-
-    def _shares(self) -> FloatArray:
-        """Samples of the unit cube; shape ``(samples, axes)``."""
-        count, axes = self.samples or 0, len(self.axes)
-        generator = np.random.default_rng(self.seed)
-        if self.method == "random":
-            return generator.random((count, axes))
-        from scipy.stats import qmc
-
-        if self.method == "latin":
-            found: FloatArray = qmc.LatinHypercube(axes, rng=generator).random(count)
-            return found
-        power = max(math.ceil(math.log2(count)), 0)
-        balanced: FloatArray = qmc.Sobol(axes, rng=generator).random_base2(power)
-        return balanced[:count]
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready; :func:`plan_from_data` reads it."""
@@ -162,6 +153,146 @@ class SweepPlan:
             for axis in self.axes
         ]
         return {"vary": vary, "method": self.method, "samples": self.samples, "seed": self.seed}
+
+
+class Proposer(Protocol):
+    """Proposes cases."""
+
+    def ask(self, count: int) -> FloatArray:
+        """Places in the unit cube to try next, shape ``(count, axes)``; fewer if none are left."""
+
+    def tell(self, values: Sequence[float | None]) -> None:
+        """Take how critical those were that were asked last; ``None``: not possible."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProposalKind:
+    """A way to propose cases.
+
+    Attributes
+    ----------
+    name
+        The ``method`` of plans and options.
+    start
+        Makes a proposer of a plan.
+    counted
+        Whether it takes a number of cases, as all but a grid do.
+    learns
+        Whether it goes by what became of the cases before: only a search tells.
+    """
+
+    name: str
+    start: Callable[[SweepPlan], Proposer]
+    counted: bool = True
+    learns: bool = False
+
+
+class _Listed:
+    """Places that do not depend on what becomes of them."""
+
+    def __init__(self, places: FloatArray) -> None:
+        self._places = places
+        self._next = 0
+
+    def ask(self, count: int) -> FloatArray:
+        asked = self._places[self._next : self._next + count]
+        self._next += count
+        return asked
+
+    def tell(self, values: Sequence[float | None]) -> None:
+        del values
+
+
+class _Tpe:
+    """Tree-structured Parzen estimator (Bergstra et al., 2011), optuna's."""
+
+    def __init__(self, plan: SweepPlan) -> None:
+        try:
+            import optuna
+        except ImportError as error:
+            raise MissingDependencyError(
+                "method tpe needs optuna: pip install 'odscen[search]'"
+            ) from error
+        optuna.logging.set_verbosity(optuna.logging.ERROR)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # parts of the sampler are called experimental
+            sampler = optuna.samplers.TPESampler(
+                n_startup_trials=_FIRST_AT_RANDOM,
+                multivariate=True,
+                constant_liar=True,
+                seed=plan.seed,
+            )
+        self._study = optuna.create_study(sampler=sampler, direction="maximize")
+        self._ranges: dict[str, Any] = {
+            f"x{axis:03}": optuna.distributions.FloatDistribution(0.0, 1.0)
+            for axis in range(len(plan.axes))
+        }
+        self._failed = optuna.trial.TrialState.FAIL
+        self._asked: list[Any] = []
+
+    def ask(self, count: int) -> FloatArray:
+        self._asked = [self._study.ask(self._ranges) for _ in range(count)]
+        rows = [[trial.params[name] for name in self._ranges] for trial in self._asked]
+        return np.array(rows, dtype=np.float64).reshape(count, len(self._ranges))
+
+    def tell(self, values: Sequence[float | None]) -> None:
+        for trial, value in zip(self._asked, values, strict=True):
+            if value is None:
+                self._study.tell(trial, state=self._failed)
+            else:
+                self._study.tell(trial, value)
+
+
+def _start_grid(plan: SweepPlan) -> Proposer:
+    shares = list(product(*(axis.shares for axis in plan.axes)))
+    return _Listed(np.array(shares, dtype=np.float64).reshape(-1, len(plan.axes)))
+
+
+def _start_latin(plan: SweepPlan) -> Proposer:
+    from scipy.stats import qmc
+
+    cube = qmc.LatinHypercube(len(plan.axes), rng=np.random.default_rng(plan.seed))
+    return _Listed(cube.random(plan.samples or 0))
+
+
+def _start_sobol(plan: SweepPlan) -> Proposer:
+    from scipy.stats import qmc
+
+    # The sequence is balanced in powers of two only.
+    power = max(math.ceil(math.log2(plan.samples or 1)), 0)
+    cube = qmc.Sobol(len(plan.axes), rng=np.random.default_rng(plan.seed))
+    return _Listed(cube.random_base2(power)[: plan.samples])
+
+
+def _start_random(plan: SweepPlan) -> Proposer:
+    generator = np.random.default_rng(plan.seed)
+    return _Listed(generator.random((plan.samples or 0, len(plan.axes))))
+
+
+PROPOSALS: Final[dict[str, ProposalKind]] = {
+    kind.name: kind
+    for kind in (
+        ProposalKind("grid", _start_grid, counted=False),
+        ProposalKind("latin", _start_latin),
+        ProposalKind("sobol", _start_sobol),
+        ProposalKind("random", _start_random),
+        ProposalKind("tpe", _Tpe, learns=True),
+    )
+}
+"""By name: all combinations, a Latin hypercube, a scrambled Sobol sequence, independent draws, and
+where earlier cases were critical."""
+
+
+def register_proposal(kind: ProposalKind) -> None:
+    """Add a way to propose cases: plans, ``--method`` of commands and the server know its name."""
+    PROPOSALS[kind.name] = kind
+
+
+def proposal_kind(method: str) -> ProposalKind:
+    """Look up a way to propose cases; :class:`InputError` names those that there are."""
+    if method not in PROPOSALS:
+        raise InputError(f"method {method!r} is not one of {', '.join(PROPOSALS)}")
+    return PROPOSALS[method]
 
 
 def concrete(scenario: Scenario, values: Mapping[str, float], *, name: str) -> Scenario:
@@ -221,8 +352,7 @@ def plan_from_data(data: Mapping[str, Any]) -> SweepPlan:
         raise InputError("vary must be a list of ranges, sets and tables")
     samples = data.get("samples")
     method = data.get("method", "grid" if samples is None else "sobol")
-    if method not in METHODS:
-        raise InputError(f"method {method!r} is not one of {', '.join(METHODS)}")
+    proposal_kind(method)
     count = None if samples is None else _whole(samples, "samples", least=1)
     seed = _whole(data.get("seed", 0), "seed", least=0)
     axes = tuple(_axis(one, f"vary[{index}]") for index, one in enumerate(vary))
@@ -292,11 +422,6 @@ def _whole(value: object, place: str, *, least: int) -> int:
     if not number.is_integer() or number < least or number > MOST_CASES * 1e6:
         raise InputError(f"{place}: {number:g} is not a whole number from {least} on")
     return int(number)
-
-
-def _refuse_many(count: int) -> None:
-    if count > MOST_CASES:
-        raise InputError(f"the sweep has {count:,} cases; at most {MOST_CASES:,} are possible")
 
 
 def _rounded(value: float) -> float:

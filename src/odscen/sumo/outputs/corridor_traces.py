@@ -8,7 +8,7 @@ import numpy as np
 
 from odscen.base.nearest_points import nearest
 from odscen.figures.by_place.corridors import junctions_of
-from odscen.reports.report_corridor import NONE_RECORDED, CorridorTraces
+from odscen.reports.report_sections import NONE_RECORDED, CorridorTraces
 from odscen.runs.recorded import trajectory_files
 
 if TYPE_CHECKING:

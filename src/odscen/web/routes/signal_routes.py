@@ -24,13 +24,13 @@ from odscen.app.signals.signal_views import (
 from odscen.app.signals.turn_arrows import arrow_words, with_turn_arrows
 from odscen.base.errors import InputError, NotFoundError
 from odscen.records.light_programs import programs_from_json, stage_spans
-from odscen.reports.signals.signal_charts import plan_chart, plan_scale
-from odscen.reports.signals.signal_sheet import legend_picture, legend_shapes
-from odscen.reports.signals.stage_diagrams import (
+from odscen.reports.signal_charts import plan_chart, plan_scale
+from odscen.reports.signal_pictures import (
     JunctionPictures,
     detector_label,
     stage_words,
 )
+from odscen.reports.signal_sheet import legend_picture, legend_shapes
 from odscen.runs import layout
 from odscen.runs.recorded import read_calls, read_light_states
 from odscen.scenario.document.scenario_document import Scenario

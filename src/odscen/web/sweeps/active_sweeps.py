@@ -16,10 +16,10 @@ from odscen.experiments.sweeps import (
     PATIENCE,
     SWEEP_FILE,
     TABLE_FILE,
+    CaseRuns,
     SweepSettings,
     begin_sweep,
     estimate,
-    limits_of,
     opened_case,
     read_plan,
     read_sweep,
@@ -30,7 +30,6 @@ from odscen.experiments.sweeps import (
 )
 from odscen.maps.folder_names import check_name
 from odscen.runs import layout
-from odscen.runs.reporter import Reporter
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
 from odscen.web.studies.under_way import OneAtATime, UnderWay
 from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
 
     from odscen.experiments.sweeps import Sweep
     from odscen.maps.store import Workspace
-    from odscen.runs.reporter import Progress
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
     from odscen.web.sweeps.sweep_messages import SweepState, SweepWish
@@ -50,17 +48,6 @@ _FILES = re.compile(
     rf"|runs/case-\d+/{re.escape(layout.REPORT_FILE)}"
 )
 """What of a sweep can be downloaded."""
-
-
-class _SweepReporter(Reporter):
-    """Ends runs whose sweep has been stopped."""
-
-    def __init__(self, sweep: UnderWay) -> None:
-        self._sweep = sweep
-
-    def advanced(self, progress: Progress) -> None:
-        del progress
-        self._sweep.check()
 
 
 class Sweeps:
@@ -107,7 +94,7 @@ class Sweeps:
         """
         plan, settings = plan_from_data(wish.plan), _settings(wish)
         refuse_unknown(plan.names, scenario)
-        limits_of(settings)
+        CaseRuns(scenario, self._folder, settings)  # an unknown figure or limit is refused
         plan.cases()
         with self._work.lock:
             self._work.refuse_more()
@@ -240,7 +227,6 @@ class Sweeps:
         def work(known: UnderWay) -> None:
             def done(ended: int, _count: int) -> None:
                 known.ended = ended
-                known.check()
 
             sweep(
                 self._workspace,
@@ -249,8 +235,7 @@ class Sweeps:
                 folder,
                 settings=settings,
                 processes=processes,
-                tell=lambda _words: known.check(),
-                reporter=_SweepReporter(known),
+                check=known.check,
                 done=done,
             )
 

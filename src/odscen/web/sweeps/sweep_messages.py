@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from odscen.scenario.sweeps.sweep_plan import Method
 from odscen.web.messages import Answer, Name, RequestBody
 
 SweepState = Literal["running", "done", "stopped", "failed"]
@@ -57,7 +56,7 @@ class SweepWish(RequestBody):
 
     scenario: Name
     vary: Annotated[list[VaryWish | TableWish], Field(min_length=1, max_length=50)]
-    method: Method = "grid"
+    method: Name = "grid"
     samples: Annotated[int, Field(ge=1, le=100_000)] | None = None
     sample_seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
     safe: Annotated[tuple[Text, ...], Field(max_length=20)] = ()
@@ -108,7 +107,7 @@ class SweepInfo(Answer):
     scenario: str
     state: SweepState
     parameters: list[str]
-    method: Method
+    method: str
     cases: int
     ended: int
     seconds_left: float | None = None

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
 from odscen.base.errors import ConflictError, InputError
-from odscen.experiments.sweep_rows import UNITS
+from odscen.experiments.table import column_units
 from odscen.scenario.document.json_form import dumps
 from odscen.web.messages import ScenarioState
 from odscen.web.routes.scenario_routes import state_of
@@ -89,13 +89,14 @@ def cases(sweep: str, shared: Shared) -> SweepCases:
     found, scenario, settings = shared.sweeps.table(sweep)
     names = [name for name in found.table.columns if name in scenario.parameters]
     columns = [name for name in found.table.columns if name not in {*_ABOUT, *names}]
+    units = column_units()
     return SweepCases(
         sweep=sweep,
         limits=["no collision", *settings["safe"]],
         parameters=[
             SweepParameter(name=name, unit=scenario.parameters[name].unit) for name in names
         ],
-        columns=[SweepColumn(name=name, unit=UNITS.get(name, "")) for name in columns],
+        columns=[SweepColumn(name=name, unit=units.get(name, "")) for name in columns],
         cases=[_case(row, names, columns) for row in found.table.iter_rows(named=True)],
         boundary=list(found.boundary),
     )

@@ -20,7 +20,7 @@ _LETTER = 7.6
 """Pixels of a letter of a name, on average."""
 _HEAD = 26.0
 """Pixels of the row of stages."""
-_LETTERS = {"G": "green", "g": "permissive", "y": "yellow"}
+_BAR_KINDS = {"G": "green", "g": "permissive", "y": "yellow"}
 _HALF = {"green": _BAR / 2.0, "permissive": _BAR / 4.0, "yellow": _BAR / 2.0}
 """Half of the height of a bar, pixels."""
 _BETWEEN = {"yellow": "yellow", "all-red": "all red", "between": "between stages"}
@@ -50,7 +50,7 @@ def shown_bars(rows: Sequence[tuple[float, str]], links: Sequence[int]) -> list[
     bars: list[TimeBar] = []
     for (begin, state), (end, _) in pairwise(rows):
         letters = {state[n] for n in links}
-        kind = next((_LETTERS[one] for one in "Ggy" if one in letters), "")
+        kind = next((_BAR_KINDS[one] for one in "Ggy" if one in letters), "")
         if not kind:
             continue
         if bars and bars[-1].end == begin and bars[-1].shown == kind:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         StageSpan,
     )
 
+
 SIDE, SITE = 132.0, 380.0
 """Pixels of the picture of a stage, and of that of the whole junction."""
 
@@ -39,7 +40,7 @@ _LOOP_WIDTH, _BAND_WIDTH = 2.2, 2.8
 _ROOM = 22.0
 """Pixels from the middle of a name to that of another beside it."""
 
-_LETTERS = {"G": "green", "g": "permissive"}
+_MOVEMENT_KINDS = {"G": "green", "g": "permissive"}
 
 
 class StagePicture(NamedTuple):
@@ -165,37 +166,6 @@ class JunctionPictures:
         return StagePicture(stage, picture, words, names + (" on call" if stage.on_call else ""))
 
 
-def stage_diagram(
-    light: LightProgram, plan: ShownPlan, pictures: JunctionPictures | None = None
-) -> Markup | None:
-    """Figures of the stages with captions, as HTML.
-
-    Parameters
-    ----------
-    pictures
-        Of the light; without a ground if not given.
-
-    Returns
-    -------
-    ``None`` if the ways of the movements are not known.
-    """
-    found = (pictures or JunctionPictures(light)).stages(plan)
-    if not found:
-        return None
-    return element(
-        "div",
-        *(
-            element(
-                "figure",
-                one.picture,
-                element("figcaption", element("b", one.words), element("span", one.detail)),
-            )
-            for one in found
-        ),
-        class_="stages",
-    )
-
-
 def _reach(light: LightProgram, approach: float) -> Iterator[tuple[float, float]]:
     """Points that have to be in a picture: paths, with the last metres before their stop lines."""
     for group in light.groups:
@@ -219,7 +189,7 @@ def _movements(
 ) -> Iterator[tuple[str, Markup]]:
     """What each movement shows, and its line and head; without a state they show ``any``."""
     for link, path in zip(group.links, group.paths, strict=True):
-        kind = "any" if state is None else _LETTERS.get(state[link], "red")
+        kind = "any" if state is None else _MOVEMENT_KINDS.get(state[link], "red")
         style = f"movement {kind}" + (" walk" if group.walk else "")
         if len(path) > 1:
             yield kind, element("path", d=frame.path(path), class_=style)

@@ -12,9 +12,12 @@ from odscen.records.light_programs import (
     ShownGroup,
     ShownPlan,
 )
-from odscen.reports.signals.report_signals import LightsOfRun, signal_section
-from odscen.reports.signals.signal_charts import program_bars, shown_bars
-from odscen.reports.signals.stage_diagrams import stage_diagram
+from odscen.reports.page_templates import render_block
+from odscen.reports.report_signals import LightsOfRun, signal_values
+from odscen.reports.signal_charts import program_bars, shown_bars
+from odscen.reports.signal_pictures import (
+    JunctionPictures,
+)
 
 GROUPS = (
     ShownGroup(
@@ -55,13 +58,13 @@ def test_bars_are_green_permissive_and_yellow_at_their_seconds() -> None:
 
 
 def test_each_stage_has_a_picture_with_its_seconds_and_groups() -> None:
-    diagram = stage_diagram(LIGHT, PLAN)
-    assert diagram is not None
-    root = etree.fromstring(str(diagram))
-    words = ["".join(one.itertext()) for one in root.iter("figcaption")]
-    assert words == ["stage 1: 20 sK1", "stage 2: 10 to 15 sK2", "stage 3: 7 sF1 on call"]
-    first = root.find("figure")
-    assert first is not None
+    stages = JunctionPictures(LIGHT).stages(PLAN)
+    assert [(stage.words, stage.detail) for stage in stages] == [
+        ("stage 1: 20 s", "K1"),
+        ("stage 2: 10 to 15 s", "K2"),
+        ("stage 3: 7 s", "F1 on call"),
+    ]
+    first = etree.fromstring(str(stages[0].picture))
     kinds = [path.get("class") for path in first.iter("path")]
     assert kinds.count("movement green") == 1
     assert kinds.count("movement permissive") == 1
@@ -71,16 +74,16 @@ def test_each_stage_has_a_picture_with_its_seconds_and_groups() -> None:
 
 def test_a_light_without_ways_has_no_diagram() -> None:
     plain = LightProgram("J1", ("1",), "fixed", own=False, groups=(), plans=(PLAN,))
-    assert stage_diagram(plain, PLAN) is None
+    assert JunctionPictures(plain).stages(PLAN) == []
 
 
 def test_the_section_has_cards_bars_and_a_row_for_each_group() -> None:
     table = signal_use([LIGHT], states(), end=84.0)
-    section = signal_section(
+    values = signal_values(
         LightsOfRun((LIGHT,), states(), table), {"cycle_failures": 0.25, "unused_green": 0.1}
     )
-    assert section is not None
-    text = str(section)
+    text = str(render_block("run_report.html.j2", "signals", signals=values))
+    assert "<figcaption><b>stage 2: 10 to 15 s</b><span>K2</span></figcaption>" in text
     assert "Junction 1, actuated, program of the scenario" in text
     assert "25" in text
     assert "r2 &lt;left&gt;" in text

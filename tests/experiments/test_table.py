@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.experiments.sweep_rows import OUTCOME, limit_from_text, outcome_of
+from odscen.experiments.table import OUTCOME, SWEEP, columns_of, outcome_of, read_limit
 from odscen.figures.measures.conflicts import conflict_table
 from odscen.records.run_events import Event, EventKind
 
@@ -79,10 +79,10 @@ def test_an_impact_that_sumo_reports_has_its_speed_from_the_trajectories() -> No
     ],
 )
 def test_a_limit_holds_or_not(text: str, value: float | None, holds: bool) -> None:
-    assert limit_from_text(text, OUTCOME).holds({"min_ttc": value}) is holds
+    assert read_limit(text, columns_of(SWEEP)).holds({"min_ttc": value}) is holds
 
 
 @pytest.mark.parametrize("text", ["min_ttc", "min_ttc = 3", "ttc > 1", "min_ttc > fast", ""])
 def test_what_is_no_limit_is_refused(text: str) -> None:
     with pytest.raises(InputError, match=r"is no limit|no column 'ttc'"):
-        limit_from_text(text, OUTCOME)
+        read_limit(text, columns_of(SWEEP))

@@ -15,10 +15,11 @@ from odscen.drawing.map_shapes import map_drawing
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.records.light_programs import stage_spans
-from odscen.reports.signals.signal_charts import phase_spans, plan_chart, plan_scale
-from odscen.reports.signals.signal_sheet import signal_sheet
-from odscen.reports.signals.signal_tables import detector_rows, split_rows
-from odscen.reports.signals.stage_diagrams import JunctionPictures
+from odscen.reports.signal_charts import phase_spans, plan_chart, plan_scale
+from odscen.reports.signal_pictures import (
+    JunctionPictures,
+)
+from odscen.reports.signal_sheet import detector_rows, signal_sheet, split_rows
 from odscen.sumo.realize.lights.light_realization import realized_lights
 from tests.signal_case import MAP, crossing, program, scenario
 

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from odscen.base.errors import InputError, MissingDependencyError
-from odscen.experiments.proposals import proposer_of
+from odscen.scenario.sweeps.sweep_plan import Proposer, Range, SweepPlan, proposal_kind
+
+
+def proposer_of(method: str, *, axes: int, runs: int, seed: int) -> Proposer:
+    varied = tuple(Range(f"p{axis}", 0.0, 1.0) for axis in range(axes))
+    return proposal_kind(method).start(SweepPlan(varied, method, runs, seed))
 
 
 def places_of(method: str, *, seed: int = 3, runs: int = 40) -> np.ndarray:
@@ -57,5 +62,5 @@ def test_without_optuna_tpe_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_an_unknown_method_is_refused_by_name() -> None:
-    with pytest.raises(InputError, match="'sobol' is not one of random, latin, tpe"):
-        proposer_of("sobol", axes=1, runs=1, seed=0)
+    with pytest.raises(InputError, match="'best' is not one of grid, latin, sobol, random, tpe"):
+        proposer_of("best", axes=1, runs=1, seed=0)

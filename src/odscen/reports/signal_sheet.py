@@ -6,21 +6,57 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from odscen.base.markup import Markup, element, number
-from odscen.reports.signals.signal_charts import plan_chart, plan_height
-from odscen.reports.signals.signal_tables import (
-    DETECTOR_HEADS,
-    SPLIT_HEADS,
-    detector_rows,
-    split_rows,
+from odscen.records.light_programs import stage_spans
+from odscen.reports.signal_charts import plan_chart, plan_height
+from odscen.reports.signal_pictures import (
+    SIDE,
+    SITE,
+    JunctionPictures,
+    detector_label,
+    detector_purpose,
 )
-from odscen.reports.signals.stage_diagrams import SIDE, SITE, JunctionPictures
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.records.light_programs import LightProgram, ShownPlan
-    from odscen.reports.signals.stage_diagrams import StagePicture
+    from odscen.reports.signal_pictures import (
+        StagePicture,
+    )
+
+
+SPLIT_HEADS = ("Stage", "Green, s", "Split, s", "Split, %", "Groups")
+DETECTOR_HEADS = ("Detector", "Number", "Before the stop line, m", "Gap, s", "For")
+
+
+def split_rows(light: LightProgram, plan: ShownPlan) -> list[tuple[str, ...]]:
+    """Cells of :data:`SPLIT_HEADS` for each stage; its split is green and what follows it."""
+    rows: list[tuple[str, ...]] = []
+    for stage in stage_spans(plan):
+        green = number(stage.seconds, 1)
+        if stage.most > stage.least:
+            green = f"{number(stage.least, 1)} to {number(stage.most, 1)}"
+        groups = ", ".join(stage.groups(light))
+        call = " (on call)" if stage.on_call else ""
+        share = number(100.0 * stage.split / plan.cycle, 0)
+        rows.append((f"{stage.id}{call}", green, number(stage.split, 1), share, groups))
+    return rows
+
+
+def detector_rows(light: LightProgram) -> list[tuple[str, ...]]:
+    """Cells of :data:`DETECTOR_HEADS`; detectors with one name and purpose are one row."""
+    loops: dict[tuple[str, ...], int] = {}
+    for one in light.detectors:
+        before, gap = number(one.ahead, 1), number(one.gap, 1)
+        if one.bus:
+            before, gap = f"0 to {number(one.length, 0)}", ""
+        elif one.call:
+            before, gap = "", ""
+        row = (detector_label(light, one), before, gap, detector_purpose(one))
+        loops[row] = loops.get(row, 0) + 1
+    return [(name, str(count), *more) for (name, *more), count in loops.items()]
+
 
 WIDTH = 1120.0
 """Pixels of a sheet."""

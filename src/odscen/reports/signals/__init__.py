@@ -1,1 +1,0 @@
-"""Traffic lights in reports: tables, charts, diagrams, sheets."""
