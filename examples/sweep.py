@@ -1,6 +1,7 @@
-"""A sweep: how delay grows with traffic. Three loads, three random seeds each, as one table.
+"""An experiment: how delay grows with traffic. Three loads, three random seeds each, as one table.
 
-Run it with ``python examples/sweep.py [WORKSPACE]``.
+Run it with ``python examples/sweep.py [WORKSPACE]``. Run it again after an interruption, and it
+makes the runs that are missing.
 """
 
 from __future__ import annotations
@@ -17,22 +18,22 @@ MAP, FILLS, SEEDS = "signal_crossing", (0.1, 0.3, 0.5), 3
 
 
 def sweep(workspace: odscen.Workspace) -> pl.DataFrame:
-    settings = odscen.RunSettings(recording=odscen.Recording(trajectories=False))
-    rows = []
-    for fill in FILLS:
-        wanted = odscen.GenerationSettings(map_name=MAP, count=SEEDS, seed=1, fill=fill)
-        out = workspace.root / f"fill-{fill}"
-        paths = odscen.generate(workspace, settings=wanted, out=out)
-        for run in odscen.run_many(workspace, paths, settings=settings, out=out, processes=2):
-            delay = run.figures["mean_delay"]
-            rows.append({"fill": fill, "road users": run.counts["inserted"], "delay": delay})
+    sampled = [
+        {"maps": [MAP], "count": SEEDS, "seed": round(100 * fill), "fill": fill} for fill in FILLS
+    ]
+    plan = odscen.ExperimentPlan.model_validate(
+        {"name": "load", "sample": sampled, "run": {"trajectories": False}}
+    )
+    results = odscen.run_experiment(workspace, workspace.root / "load", plan=plan, processes=2)
+    # Scenarios are named after the map and their seed: signal_crossing-0031 has a fill of 0.3.
+    seed = pl.col("scenario").str.slice(-4).cast(pl.Int64)
     return (
-        pl.DataFrame(rows)
+        results.table.with_columns((seed // 10 / 10).alias("fill"))
         .group_by("fill", maintain_order=True)
         .agg(
-            pl.col("road users").mean(),
-            pl.col("delay").mean().round(1).alias("mean delay, s"),
-            pl.col("delay").std().round(1).alias("between seeds, s"),
+            pl.col("inserted").mean().alias("road users"),
+            pl.col("mean_delay").mean().round(1).alias("mean delay, s"),
+            pl.col("mean_delay").std().round(1).alias("between seeds, s"),
         )
     )
 

@@ -77,7 +77,7 @@ def test_whatever_is_not_a_main_noun_is_keyword_only(name: str) -> None:
     parameters = inspect.signature(getattr(odscen, name)).parameters.values()
     free = [one.name for one in parameters if one.kind is one.POSITIONAL_OR_KEYWORD]
     nouns = {"workspace", "scenario", "scenarios", "run", "arrays", "path", "out", "a", "b", "text"}
-    nouns |= {"template", "map_name", "file"}
+    nouns |= {"template", "map_name", "file", "suite"}
     assert set(free) <= nouns
     assert all(one.default is one.empty for one in parameters if one.name in free)
 

@@ -49,6 +49,12 @@ if TYPE_CHECKING:
     )
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.experiments.compare import RunComparison, compare
+    from odscen.experiments.gates import run_suite
+    from odscen.experiments.plan import StudyPlan as ExperimentPlan
+    from odscen.experiments.studies import EndedStudy as ExperimentResults
+    from odscen.experiments.studies import resume_experiment, run_experiment
+    from odscen.experiments.studies import study_results as experiment_results
+    from odscen.experiments.suite import read_suite
     from odscen.figures.judging.expectations import parse_expectation
     from odscen.learning.hetero_data import read_arrays
     from odscen.maps.map_entry import MapEntry
@@ -114,6 +120,13 @@ _HOMES = {
     "renew_report": "odscen.app.running.reports",
     "compare": "odscen.experiments.compare",
     "RunComparison": "odscen.experiments.compare",
+    "ExperimentPlan": "odscen.experiments.plan:StudyPlan",
+    "ExperimentResults": "odscen.experiments.studies:EndedStudy",
+    "run_experiment": "odscen.experiments.studies",
+    "resume_experiment": "odscen.experiments.studies",
+    "experiment_results": "odscen.experiments.studies:study_results",
+    "read_suite": "odscen.experiments.suite",
+    "run_suite": "odscen.experiments.gates",
     "OdscenError": "odscen.base.errors",
     "InputError": "odscen.base.errors",
     "ScenarioError": "odscen.base.errors",
@@ -134,6 +147,8 @@ __all__ = [
     "ConflictError",
     "ConversionSettings",
     "Editing",
+    "ExperimentPlan",
+    "ExperimentResults",
     "GenerationSettings",
     "InputError",
     "LimitError",
@@ -160,6 +175,7 @@ __all__ = [
     "compare",
     "coordinate_signals",
     "correct_matrix",
+    "experiment_results",
     "export",
     "export_signals",
     "fit_counts",
@@ -171,10 +187,14 @@ __all__ = [
     "place_template",
     "read_arrays",
     "read_scenario",
+    "read_suite",
     "renew_report",
     "resume",
+    "resume_experiment",
     "run",
+    "run_experiment",
     "run_many",
+    "run_suite",
     "scenario_arrays",
     "scenario_from_arrays",
     "shipped_maps",

@@ -283,14 +283,25 @@ def run_suite(
 
     Parameters
     ----------
+    workspace
+        Keeps the maps.
+    suite
+        As :func:`odscen.read_suite` reads it.
     processes
         How many run at a time.
     update
         Whether baselines are written anew of what comes out, instead of holding it against them.
     out
         Keeps the runs there, one folder per scenario and seed, with reports; else they are deleted.
+    progress
+        Called with the name of a run and how much of all runs has been carried out, 0 to 1.
     parts
         What was run elsewhere, by scenario: nothing is run then, and that is judged.
+
+    Returns
+    -------
+    SuiteResult
+        ``cases`` with status and problems of each scenario; ``exit_code`` is 0 if all pass.
 
     Raises
     ------

@@ -112,13 +112,15 @@ class StudyPlan(Part):
 
     Attributes
     ----------
+    name
+        For people.
     scenarios
         Files, or patterns of files, relative to the plan.
     sample
         Scenarios that are sampled.
     seeds
         ``20`` for 1 to 20, a list, or ``"101-150"``.
-    variant
+    variant, only_variants
         Variants; the scenario as designed is one of them unless ``only_variants``.
     vary, method, samples, sample_seed
         Parameters, as ``vary``, ``method``, ``samples`` and ``seed`` of a sweep.

@@ -15,6 +15,7 @@ import json
 from collections import Counter
 from dataclasses import dataclass
 from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.app.scenarios import SUFFIX
@@ -35,13 +36,12 @@ from odscen.experiments.plan import (
     refuse_other,
 )
 from odscen.experiments.table import REFUSED, refuse_taken_names, study_table
-from odscen.experiments.work import WorkOrder, carry_out, unpacked, versions
+from odscen.experiments.work import LocalExecutor, WorkOrder, carry_out, unpacked, versions
 from odscen.records.outcomes import RunStatus
 from odscen.scenario.document.validation import validated
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
 
     import polars as pl
 
@@ -208,7 +208,17 @@ class StudyState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EndedStudy:
-    """A study whose runs have all ended, with its table: see :func:`study_table`."""
+    """A study, or what has ended of one, with its table.
+
+    Attributes
+    ----------
+    state
+        How far it is: counts of runs by status, and why runs failed.
+    table
+        A row for each run that has ended, in the order of the plan: ``run``, ``scenario``,
+        ``variant``, ``case``, ``seed``, ``map``, the parameters, ``status``, ``detail``,
+        ``usable``, ``criteria``, and every figure of runs in its unit.
+    """
 
     state: StudyState
     table: pl.DataFrame
@@ -272,6 +282,87 @@ def extend_study(
         refuse_other(old, new)
         write_study(out, new)
     return new
+
+
+def run_experiment(
+    workspace: Workspace,
+    out: Path,
+    *,
+    plan: StudyPlan | Path,
+    processes: int = 1,
+    done: Callable[[int, int], None] | None = None,
+) -> EndedStudy:
+    """Run scenarios x variants x cases x seeds, or what is missing of them in a folder.
+
+    Parameters
+    ----------
+    workspace
+        Has the maps.
+    out
+        Folder of the study.
+    plan
+        What is run, or the file that says so; names of scenario files are relative to the file,
+        else to the current folder.
+    processes
+        How many run at a time.
+    done
+        Called with how many of how many have ended.
+
+    Returns
+    -------
+    EndedStudy
+        Its state and table. A run that fails is a row of it.
+
+    Raises
+    ------
+    InputError
+        If the plan, or a scenario of it, cannot be used.
+    ConflictError
+        If another study is in the folder, or another process works on it.
+    """
+    if isinstance(plan, Path):
+        begin_study(workspace, plan, out)
+    else:
+        begin_study_of(workspace, plan, out, beside=Path())
+    return carry_out_study(out, LocalExecutor(workspace, processes), done=done)
+
+
+def resume_experiment(
+    workspace: Workspace,
+    out: Path,
+    *,
+    processes: int = 1,
+    failed: bool = False,
+    done: Callable[[int, int], None] | None = None,
+) -> EndedStudy:
+    """Run what is missing in the folder of an experiment; no run is made twice.
+
+    Parameters
+    ----------
+    workspace
+        Has the maps.
+    out
+        Folder of the study.
+    processes
+        How many run at a time.
+    failed
+        Whether runs that failed, or were not possible, are made again.
+    done
+        Called with how many of how many have ended.
+
+    Returns
+    -------
+    EndedStudy
+        Its state and table.
+
+    Raises
+    ------
+    InputError
+        If there is no study.
+    ConflictError
+        If another process works on it, or another odscen has begun it.
+    """
+    return carry_out_study(out, LocalExecutor(workspace, processes), again=failed, done=done)
 
 
 def carry_out_study(
@@ -406,7 +497,17 @@ def study_state(out: Path) -> StudyState:
 
 
 def study_results(out: Path) -> EndedStudy:
-    """The table of a study, of all runs that have ended by now.
+    """Read the table of a study, of all runs that have ended by now.
+
+    Parameters
+    ----------
+    out
+        Folder of the study.
+
+    Returns
+    -------
+    EndedStudy
+        Its state and table; another process may work on it.
 
     Raises
     ------

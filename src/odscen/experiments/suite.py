@@ -235,6 +235,16 @@ def missing_case(baseline: Path) -> Case:
 def read_suite(file: Path) -> Suite:
     """Read a suite; paths in it are relative to the file.
 
+    Parameters
+    ----------
+    file
+        TOML, see docs/regression.md.
+
+    Returns
+    -------
+    Suite
+        For :func:`odscen.run_suite`.
+
     Raises
     ------
     InputError
