@@ -36,6 +36,7 @@ SHOWN = (
     "experiments/studies",
     "experiments/study_rows",
     "experiments/sweep",
+    "experiments/table",
     "experiments/work",
     "formats/openscenario",
     "formats/tll_",
