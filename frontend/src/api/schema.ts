@@ -651,12 +651,19 @@ export interface paths {
          */
         post: operations["day_api_scenarios__name__demand_day_post"];
     };
-    "/api/imports/openscenario": {
+    "/api/formats": {
         /**
-         * Import Openscenario
-         * @description Make a scenario of an OpenSCENARIO file, in the background; the result is its name.
+         * Formats
+         * @description All foreign formats, those of installed packages included.
          */
-        post: operations["import_openscenario_api_imports_openscenario_post"];
+        get: operations["formats_api_formats_get"];
+    };
+    "/api/imports/{of}": {
+        /**
+         * Import Files
+         * @description Make a scenario of a file of a foreign format, in the background; the result is its name.
+         */
+        post: operations["import_files_api_imports__of__post"];
     };
     "/api/scenarios/{name}/import": {
         /**
@@ -1010,14 +1017,15 @@ export interface components {
             name?: string | null;
             converter?: ("odscen" | "netconvert") | null;
         };
-        Body_import_openscenario_api_imports_openscenario_post: {
-            /** @description A scenario (.xosc), and if need be its map (.xodr) and catalogs. */
+        Body_import_files_api_imports__of__post: {
+            /** @description A scenario, and if need be its map (.xodr) and catalogs. */
             files: string[];
+            ego?: ("story" | "sumo") | null;
             /**
-             * @default story
-             * @enum {string}
+             * @description NAME=VALUE
+             * @default []
              */
-            ego?: "story" | "sumo";
+            option?: string[];
         };
         Body_import_programs_api_scenarios__name__signal_times_import_post: {
             /** @description SUMO's programs: .tll.xml, .add.xml, .net.xml. */
@@ -1968,6 +1976,24 @@ export interface components {
             speed: number | null;
             initial_speed: number | null;
             profile: string | null;
+        };
+        /** @description A foreign format: what its files are of, whether it is read and written, and how. */
+        FormatInfo: {
+            id: string;
+            title: string;
+            description: string;
+            of: ("scenario" | "run" | "map")[];
+            suffixes: string[];
+            reads: boolean;
+            writes: boolean;
+            options: components["schemas"]["FormatOptionInfo"][];
+        };
+        /** @description Something that a format lets one choose; ``values`` are all there are, if they are listed. */
+        FormatOptionInfo: {
+            name: string;
+            label: string;
+            values: string[];
+            default: string;
         };
         /**
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
@@ -6797,7 +6823,23 @@ export interface operations {
             default: components["responses"]["Error"];
         };
     };
-    import_openscenario_api_imports_openscenario_post: {
+    formats_api_formats_get: {
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["FormatInfo"][];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    import_files_api_imports__of__post: {
+        parameters: {
+            path: {
+                of: string;
+            };
+        };
         requestBody: {
             content: {
                 "multipart/form-data": FormData;
@@ -6850,6 +6892,8 @@ export interface operations {
             query: {
                 to: string;
                 version?: string | null;
+                /** @description NAME=VALUE */
+                option?: string[];
             };
             path: {
                 run: string;
@@ -6870,6 +6914,8 @@ export interface operations {
             query: {
                 to: string;
                 version?: string | null;
+                /** @description NAME=VALUE */
+                option?: string[];
             };
             path: {
                 name: string;
@@ -6890,6 +6936,8 @@ export interface operations {
             query: {
                 to: string;
                 version?: string | null;
+                /** @description NAME=VALUE */
+                option?: string[];
             };
             path: {
                 name: string;
