@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -34,13 +35,10 @@ def schema_json() -> str:
 
 
 def schema_types() -> str:
-    """The schema as TypeScript."""
+    """The schema as TypeScript, of what the page sends and reads."""
     with tempfile.TemporaryDirectory(prefix="odscen-api-") as folder:
         source, target = Path(folder, "openapi.json"), Path(folder, "schema.ts")
-        schema = json.loads(schema_json())
-        names = {f"{REFERENCE}{key}": one for key, one in _components(schema).items()}
-        schema["components"]["schemas"] |= _unknown(schema)
-        source.write_text(json.dumps(_spelled_out(schema, names)), encoding="utf-8")
+        source.write_text(json.dumps(_page_schema(json.loads(schema_json()))), encoding="utf-8")
         # Node lies beside the interpreter. What has a default may be left out of what is sent.
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
         options = ["--output", str(target), "--default-non-nullable", "false"]
@@ -53,38 +51,58 @@ def schema_types() -> str:
         )
         if done.returncode != 0:
             sys.exit(f"openapi-typescript has failed:\n{done.stdout}{done.stderr}")
-        return target.read_text(encoding="utf-8")
+        types = target.read_text(encoding="utf-8")
+    # The page sends forms as they are.
+    types = re.sub(r'("multipart/form-data": ).*;', r"\1FormData;", types)
+    # The generator also writes which methods a path has not, which parameters a method has not,
+    # and that answers may have headers of any name.
+    types = re.sub(r"^ +\w+\?: never;\n", "", types, flags=re.MULTILINE)
+    types = re.sub(
+        r"^ +headers: \{\n +\[name: string\]: unknown;\n +\};\n", "", types, flags=re.MULTILINE
+    )
+    return re.sub(r"^ +parameters: \{\n +\};\n", "", types, flags=re.MULTILINE)
 
 
-def _components(schema: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = schema["components"]["schemas"]
-    return found
+def _page_schema(schema: dict[str, Any]) -> dict[str, Any]:
+    """The schema without what the page has no use for, and with what the generator understands."""
+    components = schema["components"]["schemas"]
+    enumerations = {REFERENCE + name: part.get("enum") for name, part in components.items()}
+    # Scenarios as files are downloaded and uploaded, but not read by the page.
+    components = {name: part for name, part in components.items() if not name.endswith("-File")}
+    # Unions that hold themselves are what may be anything: TypeScript takes no such property.
+    for name, part in components.items():
+        if "anyOf" in part and json.dumps(REFERENCE + name) in json.dumps(part):
+            components[name] = {"description": part.get("description", "")}
+    schema["components"]["schemas"] = components
 
+    def translate(value: Any, *, names: bool = False) -> Any:
+        """A part of the schema; ``names``: its keys are names and not words of JSON Schema."""
+        if isinstance(value, list):
+            return [translate(element) for element in value]
+        if not isinstance(value, dict):
+            return value
+        if value.get("$ref", "").endswith("-File"):
+            return {"type": "string", "format": "binary"}
+        # Titles say again what the names say.
+        value = {
+            key: translate(part, names=not names and key in ("properties", "schemas"))
+            for key, part in value.items()
+            if names or key != "title"
+        }
+        # The generator knows nothing of ``propertyNames``: mappings whose keys are an enumeration
+        # become objects with those keys, none of them required.
+        keys = value.get("propertyNames")
+        if names or keys is None or enumerations.get(keys.get("$ref")) is None:
+            return value
+        content = value["additionalProperties"]
+        return {
+            "type": "object",
+            "properties": dict.fromkeys(enumerations[keys["$ref"]], content),
+        }
 
-def _unknown(schema: dict[str, Any]) -> dict[str, Any]:
-    """Unions that hold themselves, as what may be anything: TypeScript takes no such property."""
-    return {
-        name: {"description": one.get("description", "")}
-        for name, one in _components(schema).items()
-        if "anyOf" in one and json.dumps(REFERENCE + name) in json.dumps(one)
-    }
-
-
-def _spelled_out(value: Any, components: dict[str, Any]) -> Any:
-    """Mappings whose keys are an enumeration as objects with those keys, none of them required.
-
-    The generator knows nothing of ``propertyNames``.
-    """
-    if isinstance(value, list):
-        return [_spelled_out(one, components) for one in value]
-    if not isinstance(value, dict):
-        return value
-    value = {key: _spelled_out(one, components) for key, one in value.items()}
-    names = value.get("propertyNames")
-    keys = components.get(names["$ref"], {}).get("enum") if names and "$ref" in names else None
-    if keys is None:
-        return value
-    return {"type": "object", "properties": dict.fromkeys(keys, value["additionalProperties"])}
+    translated: dict[str, Any] = translate(schema)
+    translated["info"] = schema["info"]
+    return translated
 
 
 def main() -> None:

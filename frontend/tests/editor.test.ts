@@ -14,6 +14,7 @@ import {
 } from "../src/editor/scene";
 import { measureShapes, transitPins } from "../src/editor/sceneParts";
 import { createEditorStore, selectionAfter } from "../src/editor/store";
+import { stubFetch } from "./requests";
 import { laneFacts, placeWord } from "../src/editor/placeWords";
 import { Starts } from "../src/editor/placing";
 import { rowsInSight } from "../src/editor/windowed";
@@ -193,10 +194,10 @@ const state = (version: number, ...ids: string[]): ScenarioState => ({
 
 function answers(...list: [number, unknown][]): { url: string; body: unknown }[] {
   const asked: { url: string; body: unknown }[] = [];
-  vi.stubGlobal("fetch", (url: string, init?: RequestInit) => {
-    asked.push({ url, body: typeof init?.body === "string" ? JSON.parse(init.body) : undefined });
+  stubFetch(({ path: url, body: sent }) => {
+    asked.push({ url, body: sent });
     const [status, body] = list.shift() ?? [500, {}];
-    return Promise.resolve(new Response(JSON.stringify(body), { status }));
+    return new Response(JSON.stringify(body), { status });
   });
   return asked;
 }

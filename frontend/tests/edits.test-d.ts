@@ -49,7 +49,7 @@ export async function neverCalled(): Promise<unknown[]> {
     // @ts-expect-error the path has a name
     call("get", "/api/maps/{name}"),
     // @ts-expect-error a query with a misspelt argument
-    call("get", "/api/scenarios/{name}/goals", { path: { name: "s" }, query: { spwan: "n" } }),
+    call("get", "/api/scenarios/{name}/goals", { params: { path: { name: "s" }, query: { spwan: "n" } } }),
     // @ts-expect-error a body with a misspelt argument
     call("post", "/api/scenarios", { body: { mapp: "m" } }),
     // @ts-expect-error there is no such way to steer a run

@@ -7,6 +7,7 @@ import type { ReactNode } from "react";
 import { afterEach, vi } from "vitest";
 
 import { theme } from "../src/ui/theme";
+import { stubFetch } from "./requests";
 
 afterEach(() => {
   cleanup();
@@ -44,17 +45,15 @@ export async function fill(user: UserEvent, label: string, text: string): Promis
 /** Answers of the server by path, as long as it is asked; what was asked is kept. */
 export function server(answers: Record<string, unknown>): { path: string; body: unknown }[] {
   const asked: { path: string; body: unknown }[] = [];
-  vi.stubGlobal("fetch", (path: string, init?: RequestInit) => {
-    asked.push({ path, body: typeof init?.body === "string" ? JSON.parse(init.body) : init?.body });
+  stubFetch(({ path, body }) => {
+    asked.push({ path, body });
     const found = Object.keys(answers).find((key) => path.includes(key));
     const answer = found === undefined ? undefined : answers[found];
-    return Promise.resolve(
-      answer === undefined
-        ? new Response(JSON.stringify({ error: { kind: "NotFound", message: `nothing at ${path}` } }), {
-            status: 404,
-          })
-        : new Response(JSON.stringify(answer)),
-    );
+    return answer === undefined
+      ? new Response(JSON.stringify({ error: { kind: "NotFound", message: `nothing at ${path}` } }), {
+          status: 404,
+        })
+      : new Response(JSON.stringify(answer));
   });
   return asked;
 }

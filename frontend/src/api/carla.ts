@@ -7,6 +7,6 @@ export type CarlaInfo = components["schemas"]["CarlaInfo"];
 export const carla = {
   info: () => call("get", "/api/carla"),
   /** Pictures that replace each other as they come; for an `img`. */
-  cameraUrl: (run: string) => address("/api/runs/{run}/camera", { path: { run } }),
-  comparisonUrl: (run: string) => address("/api/runs/{run}/parity.html", { path: { run } }),
+  cameraUrl: (run: string) => address("/api/runs/{run}/camera", { params: { path: { run } } }),
+  comparisonUrl: (run: string) => address("/api/runs/{run}/parity.html", { params: { path: { run } } }),
 };

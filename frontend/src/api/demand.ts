@@ -29,9 +29,13 @@ export const demand = {
       keyof Omit<Table, "day">,
       unknown
     >;
-    return call("post", "/api/scenarios/{name}/demand/table", { path: { name }, body: form(fields) });
+    return call("post", "/api/scenarios/{name}/demand/table", {
+      params: { path: { name } },
+      body: form(fields),
+    });
   },
-  entries: (name: string) => call("get", "/api/scenarios/{name}/demand/entries", { path: { name } }),
+  entries: (name: string) =>
+    call("get", "/api/scenarios/{name}/demand/entries", { params: { path: { name } } }),
   /** Makes a day of traffic, which takes minutes with a trial; null if it was cancelled. */
   day: async (
     name: string,
@@ -40,7 +44,10 @@ export const demand = {
     onStep: (job: Job) => void,
   ): Promise<Schemas["DayMade"] | null> => {
     const body = { version, ...wish };
-    const { job } = await call("post", "/api/scenarios/{name}/demand/day", { path: { name }, body });
+    const { job } = await call("post", "/api/scenarios/{name}/demand/day", {
+      params: { path: { name } },
+      body,
+    });
     return (await followJob(job, onStep))?.day ?? null;
   },
 };

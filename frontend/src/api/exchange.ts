@@ -21,16 +21,16 @@ export const exchange = {
   bring: async (of: string, files: readonly File[], onStep: (job: Job) => void): Promise<string | null> => {
     const body = new FormData();
     for (const file of files) body.append("files", file);
-    const { job } = await call("post", "/api/imports/{of}", { path: { of }, body });
+    const { job } = await call("post", "/api/imports/{of}", { params: { path: { of } }, body });
     const done = await followJob(job, onStep);
     return done?.result ?? null;
   },
-  report: (name: string) => call("get", "/api/scenarios/{name}/import", { path: { name } }),
-  planUrl: (name: string) => address("/api/scenarios/{name}/import/plan", { path: { name } }),
+  report: (name: string) => call("get", "/api/scenarios/{name}/import", { params: { path: { name } } }),
+  planUrl: (name: string) => address("/api/scenarios/{name}/import/plan", { params: { path: { name } } }),
   notes: (name: string, to: string, version: string | null) =>
-    call("get", "/api/scenarios/{name}/export/notes", { path: { name }, query: { to, version } }),
+    call("get", "/api/scenarios/{name}/export/notes", { params: { path: { name }, query: { to, version } } }),
   exportUrl: (name: string, to: string, version: string | null) =>
-    address("/api/scenarios/{name}/export", { path: { name }, query: { to, version } }),
+    address("/api/scenarios/{name}/export", { params: { path: { name }, query: { to, version } } }),
   runUrl: (run: string, to: string, version: string) =>
-    address("/api/runs/{run}/export", { path: { run }, query: { to, version } }),
+    address("/api/runs/{run}/export", { params: { path: { run }, query: { to, version } } }),
 };

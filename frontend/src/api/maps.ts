@@ -5,9 +5,10 @@ import type { ConversionReport, Job } from "./types";
 
 const PAUSE = 300;
 
-export const reportUrl = (name: string): string => address("/api/maps/{name}/report", { path: { name } });
+export const reportUrl = (name: string): string =>
+  address("/api/maps/{name}/report", { params: { path: { name } } });
 export const conversionReport = (name: string): Promise<ConversionReport> =>
-  call("get", "/api/maps/{name}/report", { path: { name } });
+  call("get", "/api/maps/{name}/report", { params: { path: { name } } });
 
 /** Formats that maps can have. */
 export const mapImporters = () => call("get", "/api/map-importers");

@@ -18,5 +18,7 @@ export const models = {
   simulators: () => call("get", "/api/simulators"),
   /** What a simulator does not do of a scenario. */
   unsupported: (simulator: string, scenario: string) =>
-    call("get", "/api/simulators/{simulator}/unsupported", { path: { simulator }, query: { scenario } }),
+    call("get", "/api/simulators/{simulator}/unsupported", {
+      params: { path: { simulator }, query: { scenario } },
+    }),
 };

@@ -35,27 +35,28 @@ const MOST_ROWS = 600_000;
 
 export const runs = {
   /** Those of one scenario, the newest last. */
-  list: (scenario: string) => call("get", "/api/runs", { query: { scenario } }),
+  list: (scenario: string) => call("get", "/api/runs", { params: { query: { scenario } } }),
   start: (wish: RunWish) => call("post", "/api/runs", { body: wish }),
   forecast: (wish: RunWish) => call("post", "/api/runs/forecast", { body: wish }),
-  resume: (run: string) => call("post", "/api/runs/{run}/resume", { path: { run }, body: {} }),
-  fit: (run: string) => call("get", "/api/runs/{run}/fit", { path: { run } }),
-  files: (run: string) => call("get", "/api/runs/{run}/files", { path: { run } }),
-  fileUrl: (run: string, name: string) => address("/api/runs/{run}/files/{name}", { path: { run, name } }),
-  info: (run: string) => call("get", "/api/runs/{run}", { path: { run } }),
+  resume: (run: string) => call("post", "/api/runs/{run}/resume", { params: { path: { run } }, body: {} }),
+  fit: (run: string) => call("get", "/api/runs/{run}/fit", { params: { path: { run } } }),
+  files: (run: string) => call("get", "/api/runs/{run}/files", { params: { path: { run } } }),
+  fileUrl: (run: string, name: string) =>
+    address("/api/runs/{run}/files/{name}", { params: { path: { run, name } } }),
+  info: (run: string) => call("get", "/api/runs/{run}", { params: { path: { run } } }),
   control: (run: string, action: Action, speed?: number | null) =>
     call("post", "/api/runs/{run}/control", {
-      path: { run },
+      params: { path: { run } },
       body: speed === undefined ? { action } : { action, speed },
     }),
-  events: (run: string) => call("get", "/api/runs/{run}/events", { path: { run } }),
-  egos: (run: string) => call("get", "/api/runs/{run}/egos", { path: { run } }),
-  curves: (run: string) => call("get", "/api/runs/{run}/curves", { path: { run } }),
-  lanes: (run: string) => call("get", "/api/runs/{run}/lanes", { path: { run } }),
-  content: (run: string) => call("get", "/api/runs/{run}/content", { path: { run } }),
+  events: (run: string) => call("get", "/api/runs/{run}/events", { params: { path: { run } } }),
+  egos: (run: string) => call("get", "/api/runs/{run}/egos", { params: { path: { run } } }),
+  curves: (run: string) => call("get", "/api/runs/{run}/curves", { params: { path: { run } } }),
+  lanes: (run: string) => call("get", "/api/runs/{run}/lanes", { params: { path: { run } } }),
+  content: (run: string) => call("get", "/api/runs/{run}/content", { params: { path: { run } } }),
   replay: (run: string) =>
-    call("get", "/api/runs/{run}/trajectories", { path: { run }, query: { most: MOST_ROWS } }),
-  reportUrl: (run: string) => address("/api/runs/{run}/report.html", { path: { run } }),
+    call("get", "/api/runs/{run}/trajectories", { params: { path: { run }, query: { most: MOST_ROWS } } }),
+  reportUrl: (run: string) => address("/api/runs/{run}/report.html", { params: { path: { run } } }),
   liveUrl: (run: string) =>
     `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/runs/${encodeURIComponent(run)}/live`,
 };

@@ -5,304 +5,112 @@
 
 export interface paths {
     "/api/health": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Health
          * @description Say that the server is there, also while all threads are at work.
          */
         get: operations["health_api_health_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/maps": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Maps
          * @description All maps of the catalogue that can be used, by name.
          */
         get: operations["list_maps_api_maps_get"];
-        put?: never;
         /**
          * Add Map
          * @description Add a map; it is built in the background, with a network by the converter of that name.
          */
         post: operations["add_map_api_maps_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/broken-maps": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Broken Maps
          * @description Maps whose folders are damaged, by name, and why; they can be removed or added again.
          */
         get: operations["list_broken_maps_api_broken_maps_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/maps/{name}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Show Map
          * @description One map, with what it means and its traffic lights.
          */
         get: operations["show_map_api_maps__name__get"];
-        put?: never;
-        post?: never;
         /**
          * Remove Map
          * @description Move a map into the wastebasket; scenarios made on it stay.
          */
         delete: operations["remove_map_api_maps__name__delete"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/maps/{name}/preview.svg": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Preview
          * @description Drawing of the map as SVG.
          */
         get: operations["preview_api_maps__name__preview_svg_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/maps/{name}/drawing": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Drawing
          * @description What is drawn of the map, see ``docs/drawings.md``.
          */
         get: operations["drawing_api_maps__name__drawing_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/maps/{name}/graph": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Graph
          * @description Lane graph, segments and pedestrian graph as columns, see ``docs/server.md``.
          */
         get: operations["graph_api_maps__name__graph_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/maps/{name}/report": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Report
          * @description What became of each element of the map on the way to SUMO.
          */
         get: operations["report_api_maps__name__report_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/map-importers": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * List Map Importers
-         * @description Formats that maps can have: OpenDRIVE, and those of installed packages that can be used.
-         */
-        get: operations["list_map_importers_api_map_importers_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/maps/shipped": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Add Shipped Maps
          * @description Add the maps that ship with odscen.
          */
         post: operations["add_shipped_maps_api_maps_shipped_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/jobs/{job}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Show Job
          * @description How far a job is.
          */
         get: operations["show_job_api_jobs__job__get"];
-        put?: never;
-        post?: never;
         /**
          * Cancel Job
          * @description Cancel a job: within a second its state is ``cancelled``, and nothing unfinished is left.
          */
         delete: operations["cancel_job_api_jobs__job__delete"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/assets": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Assets
          * @description Categories, models and weather presets that a scenario can use.
          */
         get: operations["assets_api_assets_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/generators": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Generators
          * @description Generators that are installed, for the edit ``fill_roi``: the one that ships is the first.
          */
         get: operations["list_generators_api_generators_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/behaviours": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Behaviours
          * @description Behaviour models that are installed, for a new run: those that ship are the first.
          */
         get: operations["list_behaviours_api_behaviours_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/simulators": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Simulators
          * @description Simulators that are installed, for a new run: those that ship are the first.
@@ -310,1435 +118,531 @@ export interface paths {
          *     The address of a CARLA server is the one that this server was started with.
          */
         get: operations["list_simulators_api_simulators_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/simulators/{simulator}/unsupported": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Unsupported
          * @description What a simulator does not do of a scenario as it is now.
          */
         get: operations["list_unsupported_api_simulators__simulator__unsupported_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Scenarios
          * @description All scenarios, those changed last first.
          */
         get: operations["list_scenarios_api_scenarios_get"];
-        put?: never;
         /**
          * Create
          * @description Start a scenario on a map: an empty one, or a template where the map has room for it.
          */
         post: operations["create_api_scenarios_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/upload": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Upload
          * @description Add a scenario from a file.
          */
         post: operations["upload_api_scenarios_upload_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Show
          * @description One scenario as it is now.
          */
         get: operations["show_api_scenarios__name__get"];
-        put?: never;
-        post?: never;
         /**
          * Remove Scenario
          * @description Move a scenario and its history into the wastebasket; its runs stay.
          */
         delete: operations["remove_scenario_api_scenarios__name__delete"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/name": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
         /**
          * Rename
          * @description Give a scenario's file another name.
          */
         put: operations["rename_api_scenarios__name__name_put"];
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/problems": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Problems
          * @description What is wrong with a scenario as it is now.
          */
         get: operations["problems_api_scenarios__name__problems_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/edits": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Edit
          * @description Make edits, all or none; each kind is a function of ``odscen.scenario.edits``.
          */
         post: operations["edit_api_scenarios__name__edits_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/undo": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Undo
          * @description Take the last edit back.
          */
         post: operations["undo_api_scenarios__name__undo_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/redo": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Redo
          * @description Make the edit again that was taken back last.
          */
         post: operations["redo_api_scenarios__name__redo_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/copy": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Copy
          * @description Save a scenario under another name too; a free one is made if none is given.
          */
         post: operations["copy_api_scenarios__name__copy_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/goals": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Goals
          * @description Nodes that an actor that starts at ``spawn`` can have as its goal.
          */
         get: operations["goals_api_scenarios__name__goals_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/path": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Path
          * @description Path from ``spawn`` to ``goal`` inside the region, as a pedestrian, or a car, takes it.
          */
         get: operations["path_api_scenarios__name__path_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/plan": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Plan
          * @description Where road users are planned to be, each alone on the road; see ``docs/server.md``.
          */
         get: operations["plan_api_scenarios__name__plan_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/roi": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Roi
          * @description Segments of the region of interest, and those that may be added or taken out now.
          */
         get: operations["roi_api_scenarios__name__roi_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/download": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Download
          * @description Download the scenario as its document or in its graph form.
          */
         get: operations["download_api_scenarios__name__download_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/demand/table": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Table
          * @description Read a table into a scenario, all of it or nothing; see ``docs/demand.md``.
          */
         post: operations["table_api_scenarios__name__demand_table_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/demand/entries": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Entries
          * @description Where vehicles can drive into the region of a scenario.
          */
         get: operations["entries_api_scenarios__name__demand_entries_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Runs
          * @description All runs, or those of one scenario, the newest last.
          */
         get: operations["list_runs_api_runs_get"];
-        put?: never;
         /**
          * Start
          * @description Run a scenario as it is now.
          */
         post: operations["start_api_runs_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/forecast": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Forecast
          * @description What a run would need; takes as long as getting it ready.
          */
         post: operations["forecast_api_runs_forecast_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/resume": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Resume
          * @description Go on with an interrupted run from its last complete slice.
          */
         post: operations["resume_api_runs__run__resume_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Show
          * @description One run, with its summary once it has ended.
          */
         get: operations["show_api_runs__run__get"];
-        put?: never;
-        post?: never;
         /**
          * Remove Run
          * @description Move a finished run into the wastebasket; null if it has left nothing to keep.
          */
         delete: operations["remove_run_api_runs__run__delete"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/control": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Control
          * @description Pause, resume, step, change the speed of, or stop a run.
          */
         post: operations["control_api_runs__run__control_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/report.html": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Report
          * @description Report of a completed run, which is written if it is not there.
          */
         get: operations["report_api_runs__run__report_html_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/summary": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Summary
          * @description Key figures of a finished run: its ``summary.json``.
          */
         get: operations["summary_api_runs__run__summary_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/content": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Content
          * @description Whether two runs are of the same scenario can be told from this.
          */
         get: operations["content_api_runs__run__content_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/events": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Events
          * @description What went wrong on the road in a finished run: the first thousands of incidents.
          */
         get: operations["events_api_runs__run__events_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/egos": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Egos
          * @description What became of the vehicles under test of a finished run.
          */
         get: operations["egos_api_runs__run__egos_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/curves": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Curves
          * @description How many were where, and how fast, over time.
          */
         get: operations["curves_api_runs__run__curves_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/trajectories": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Trajectories
          * @description Where road users were, as columns; see ``docs/server.md``.
          */
         get: operations["trajectories_api_runs__run__trajectories_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/studies": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Studies
          * @description All studies, the newest last.
          */
         get: operations["list_studies_api_studies_get"];
-        put?: never;
         /**
          * Start
          * @description Begin a study of scenarios as they are now, and carry it out.
          */
         post: operations["start_api_studies_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/studies/{study}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Show
          * @description How far a study is.
          */
         get: operations["show_api_studies__study__get"];
-        put?: never;
-        post?: never;
         /**
          * Remove
          * @description Delete a study.
          */
         delete: operations["remove_api_studies__study__delete"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/studies/{study}/stop": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Stop
          * @description Stop a study; what has run is kept, and it can be resumed.
          */
         post: operations["stop_api_studies__study__stop_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/studies/{study}/resume": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Resume
          * @description Run what is missing of a study; it ends as if it had not been stopped.
          */
         post: operations["resume_api_studies__study__resume_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/studies/{study}/results": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Results
          * @description One figure of a study: means with their intervals, differences, and the runs' own values.
          */
         get: operations["results_api_studies__study__results_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/studies/{study}/files/{name}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * File
          * @description A file of a study: its table, or its page as of now.
          */
         get: operations["file_api_studies__study__files__name__get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/sweeps": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Sweeps
          * @description All sweeps, or those of one scenario, the newest last.
          */
         get: operations["list_sweeps_api_sweeps_get"];
-        put?: never;
         /**
          * Start
          * @description Sweep a scenario as it is now.
          */
         post: operations["start_api_sweeps_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/sweeps/plan": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Plan
          * @description What a sweep would take; runs one of its cases, and takes as long as that does.
          */
         post: operations["plan_api_sweeps_plan_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/sweeps/{sweep}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Show
          * @description How far a sweep is.
          */
         get: operations["show_api_sweeps__sweep__get"];
-        put?: never;
-        post?: never;
         /**
          * Remove
          * @description Delete a sweep with all of its runs.
          */
         delete: operations["remove_api_sweeps__sweep__delete"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/sweeps/{sweep}/stop": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Stop
          * @description Stop a sweep; what has run is kept, and it can be resumed.
          */
         post: operations["stop_api_sweeps__sweep__stop_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/sweeps/{sweep}/resume": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Resume
          * @description Run what is missing of a sweep; it ends as if it had not been stopped.
          */
         post: operations["resume_api_sweeps__sweep__resume_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/sweeps/{sweep}/cases": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Cases
          * @description The table of a sweep, of those cases that have ended if it has not, and the boundary.
          */
         get: operations["cases_api_sweeps__sweep__cases_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/sweeps/{sweep}/cases/{case}/scenario": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Open Case
          * @description Save a case as a scenario; the one that it was saved as before, if that is unchanged.
          */
         post: operations["open_case_api_sweeps__sweep__cases__case__scenario_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/sweeps/{sweep}/files/{name}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * File
          * @description A file of a sweep: its page, the table, a case, the report of a run.
          */
         get: operations["file_api_sweeps__sweep__files__name__get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/signals/{junction}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Of Scenario
          * @description What a light is told to show in a scenario, with all plans of the day.
          */
         get: operations["of_scenario_api_scenarios__name__signals__junction__get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/signals/{junction}/cycle": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Set Cycle
          * @description Give a light another cycle: greens in proportion to what they are.
          */
         post: operations["set_cycle_api_scenarios__name__signals__junction__cycle_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/signals/{junction}/own": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Take Over
          * @description Make the map's program of a light one of the scenario, which can be changed.
          */
         post: operations["take_over_api_scenarios__name__signals__junction__own_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/signal-times/webster": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Webster
          * @description Time lights after the demand: cycle and splits by Webster's method.
          */
         post: operations["webster_api_scenarios__name__signal_times_webster_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/signal-times/corridor": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Corridor
          * @description Coordinate lights: one cycle, and the offsets with the widest bands.
          */
         post: operations["corridor_api_scenarios__name__signal_times_corridor_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/signal-times/import": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Import Programs
          * @description Take programs over from SUMO's ``tlLogic``, with ``WAUT`` as plans of the day, and loops.
          */
         post: operations["import_programs_api_scenarios__name__signal_times_import_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/signals.add.xml": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Export Programs
          * @description SUMO's additional file with the programs that the scenario gives to lights.
          */
         get: operations["export_programs_api_scenarios__name__signals_add_xml_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/signals": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Of Run
          * @description What the lights of a finished run showed, and when.
          */
         get: operations["of_run_api_runs__run__signals_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/signals/{junction}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Light Of Run
          * @description What a light is told to show in a run; of a finished one with the calls of its detectors.
          */
         get: operations["light_of_run_api_runs__run__signals__junction__get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/files": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Files
          * @description Files that can be downloaded: report, figures, tables, recordings.
          */
         get: operations["files_api_runs__run__files_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/files/{name}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * File
          * @description Download one of them.
          */
         get: operations["file_api_runs__run__files__name__get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/fit": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Fit
          * @description How well a finished run meets the counts of its scenario.
          */
         get: operations["fit_api_runs__run__fit_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/lanes": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Lanes
          * @description What vehicles did on each lane in each interval of a finished run, as columns.
          */
         get: operations["lanes_api_runs__run__lanes_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/figures/actors": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Actor Measures
          * @description All measures of single actors, in the order in which they are offered.
          */
         get: operations["actor_measures_api_figures_actors_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/figures/installed": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Installed
          * @description Figures that installed packages offer, for columns of sweeps.
          */
         get: operations["installed_api_figures_installed_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/figures": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Figures
          * @description All figures of a run, in the order in which they are shown.
          */
         get: operations["figures_api_figures_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/carla": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Carla
          * @description Whether runs can be shown on the CARLA server.
          */
         get: operations["carla_api_carla_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/camera": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Camera
          * @description Pictures from above a run that CARLA shows, as they come; JPEG, one replacing the other.
          */
         get: operations["camera_api_runs__run__camera_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/parity.html": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Parity
          * @description How far SUMO and CARLA agreed in a finished run.
          */
         get: operations["parity_api_runs__run__parity_html_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/maps/{name}/removal": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Map Removal
          * @description What depends on a map.
          */
         get: operations["map_removal_api_maps__name__removal_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/removal": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Scenario Removal
          * @description What depends on a scenario.
          */
         get: operations["scenario_removal_api_scenarios__name__removal_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/removal": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Run Removal
          * @description Whether a run can be removed.
          */
         get: operations["run_removal_api_runs__run__removal_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/trash": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Trash
          * @description Everything in the wastebasket, removed last first.
          */
         get: operations["list_trash_api_trash_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/trash/{item}/restore": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Restore
          * @description Put an item back where it was; 409 if something of that name is there now.
          */
         post: operations["restore_api_trash__item__restore_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/trash/{item}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        post?: never;
         /**
          * Delete Item
          * @description Delete an item for good.
          */
         delete: operations["delete_item_api_trash__item__delete"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/templates": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * List Templates
          * @description All templates, in the order in which they are offered.
          */
         get: operations["list_templates_api_templates_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/demand/day": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Day
          * @description Give a scenario 24 hours of traffic on its whole map, in the background.
@@ -1746,160 +650,61 @@ export interface paths {
          *     It takes seconds, with a trial minutes; the job tells what was found.
          */
         post: operations["day_api_scenarios__name__demand_day_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/formats": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Formats
          * @description All foreign formats, those of installed packages included.
          */
         get: operations["formats_api_formats_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/imports/{of}": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
         /**
          * Import Files
          * @description Make a scenario of a file of a foreign format, in the background; the result is its name.
          */
         post: operations["import_files_api_imports__of__post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/import": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Import Report
          * @description What became of each element of the file that a scenario was imported from.
          */
         get: operations["import_report_api_scenarios__name__import_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/import/plan": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Import Plan
          * @description Plan of the sweep that the imported file describes, for ``odscen sweep --plan``.
          */
         get: operations["import_plan_api_scenarios__name__import_plan_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/runs/{run}/export": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Export Run
          * @description Download what happened in a finished run in another format, with the map.
          */
         get: operations["export_run_api_runs__run__export_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/export/notes": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Export Notes
          * @description What an export would hold, and what its format cannot say; refused if it cannot be made.
          */
         get: operations["export_notes_api_scenarios__name__export_notes_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
     "/api/scenarios/{name}/export": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         /**
          * Export Scenario
          * @description Download a scenario in another format, as a ZIP with all that it needs.
          */
         get: operations["export_scenario_api_scenarios__name__export_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
     };
 }
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /**
-         * Action
-         * @description One kind of action, or several that run together.
-         */
+        /** @description One kind of action, or several that run together. */
         "Action-Input": {
             speed?: components["schemas"]["SpeedChange-Input"] | null;
             brake?: components["schemas"]["Braking-Input"] | null;
@@ -1923,13 +728,9 @@ export interface components {
             ignore?: components["schemas"]["Ignoring-Input"] | null;
             release?: components["schemas"]["Releasing"] | null;
             own?: components["schemas"]["OwnAction-Input"] | null;
-            /** Together */
             together?: components["schemas"]["Action-Input"][] | null;
         };
-        /**
-         * Action
-         * @description One kind of action, or several that run together.
-         */
+        /** @description One kind of action, or several that run together. */
         "Action-Output": {
             speed: components["schemas"]["SpeedChange-Output"] | null;
             brake: components["schemas"]["Braking-Output"] | null;
@@ -1953,11 +754,9 @@ export interface components {
             ignore: components["schemas"]["Ignoring-Output"] | null;
             release: components["schemas"]["Releasing"] | null;
             own: components["schemas"]["OwnAction-Output"] | null;
-            /** Together */
             together: components["schemas"]["Action-Output"][] | null;
         };
         /**
-         * Actor
          * @description One road user, placed by hand or sampled.
          *
          *     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
@@ -1969,71 +768,36 @@ export interface components {
          *     their order; an open goal is one that can be reached from the last of them.
          */
         Actor: {
-            /** Id */
             id: string;
             category: components["schemas"]["Category"];
-            /** Model */
             model: string | null;
-            /** Spawn */
             spawn: string;
-            /** Goal */
             goal: string | null;
-            /**
-             * Via
-             * @default []
-             */
+            /** @default [] */
             via: string[];
-            /** Speed */
             speed: number | null;
-            /**
-             * Lateral Offset
-             * @default 0
-             */
+            /** @default 0 */
             lateral_offset: number;
-            /**
-             * Depart
-             * @default 0
-             */
+            /** @default 0 */
             depart: number;
-            /** Initial Speed */
             initial_speed: number | null;
-            /**
-             * Style
-             * @default normal
-             */
+            /** @default normal */
             style: string;
-            /**
-             * Ego
-             * @default false
-             */
+            /** @default false */
             ego: boolean;
-            /**
-             * Crosses Anywhere
-             * @default false
-             */
+            /** @default false */
             crosses_anywhere: boolean;
-            /**
-             * Ignores Red
-             * @default false
-             */
+            /** @default false */
             ignores_red: boolean;
         };
-        /**
-         * ActorMeasureInfo
-         * @description What a criterion can ask of one actor.
-         */
+        /** @description What a criterion can ask of one actor. */
         ActorMeasureInfo: {
-            /** Name */
             name: string;
-            /** Unit */
             unit: string;
-            /** Label */
             label: string;
-            /** Definition */
             definition: string;
         };
         /**
-         * ActorStatus
          * @description What has become of an actor when the run ended.
          *
          *     ``waiting`` is planned, but not inserted; ``running`` is inserted and has not arrived;
@@ -2041,65 +805,40 @@ export interface components {
          * @enum {string}
          */
         ActorStatus: "arrived" | "running" | "waiting" | "stranded";
-        /**
-         * AddActorEdit
-         * @description Place an actor on a node.
-         */
+        /** @description Place an actor on a node. */
         AddActorEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "add_actor";
-            /** Id */
             id?: string | null;
             category: components["schemas"]["Category"];
-            /** Model */
             model?: string | null;
-            /** Spawn */
             spawn: string;
-            /** Goal */
             goal?: string | null;
-            /** Via */
             via?: string[];
-            /** Speed */
             speed?: number | null;
-            /** Lateral Offset */
             lateral_offset?: number;
-            /** Depart */
             depart?: number;
-            /** Initial Speed */
             initial_speed?: number | null;
-            /** Style */
             style?: string;
-            /** Ego */
             ego?: boolean;
-            /** Crosses Anywhere */
             crosses_anywhere?: boolean;
-            /** Ignores Red */
             ignores_red?: boolean;
         };
-        /**
-         * AddFlowEdit
-         * @description Put a flow on a node (R44); ``fields`` are further fields of ``Flow``.
-         */
+        /** @description Put a flow on a node (R44); ``fields`` are further fields of ``Flow``. */
         AddFlowEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "add_flow";
-            /** Id */
             id?: string | null;
-            /** Spawn */
             spawn: string;
-            /** Goal */
             goal?: string | null;
-            /** Per Hour */
             per_hour: number;
-            /** Begin */
             begin?: number;
-            /** End */
             end?: number;
             mix?: {
                 car?: number;
@@ -2110,188 +849,128 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Speed */
             speed?: number | null;
-            /** Initial Speed */
             initial_speed?: number | null;
-            /** Profile */
             profile?: string | null;
         };
-        /**
-         * AddStageEdit
-         * @description Put a stage in, behind the stage ``after`` or at the end.
-         */
+        /** @description Put a stage in, behind the stage ``after`` or at the end. */
         AddStageEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "add_stage";
-            /** Id */
             id?: string;
-            /** Protected */
             protected?: string[];
-            /** Permissive */
             permissive?: string[];
-            /** Green */
             green?: number;
-            /** Min Green */
             min_green?: number | null;
-            /** Max Green */
             max_green?: number | null;
-            /** On Call */
             on_call?: boolean;
-            /** Junction */
             junction: string;
-            /** Stage */
             stage: string;
-            /** After */
             after?: string | null;
         };
-        /**
-         * AfterRule
-         * @description Another rule has started, or has ended, at least once.
-         */
+        /** @description Another rule has started, or has ended, at least once. */
         "AfterRule-Input": {
-            /** Id */
             id: string;
             /**
-             * Has
              * @default ended
              * @enum {string}
              */
             has?: "started" | "ended";
         };
-        /**
-         * AfterRule
-         * @description Another rule has started, or has ended, at least once.
-         */
+        /** @description Another rule has started, or has ended, at least once. */
         "AfterRule-Output": {
-            /** Id */
             id: string;
             /**
-             * Has
              * @default ended
              * @enum {string}
              */
             has: "started" | "ended";
         };
-        /**
-         * AfterTime
-         * @description Simulated time is ``after`` seconds or more.
-         */
+        /** @description Simulated time is ``after`` seconds or more. */
         AfterTime: {
-            /** After */
             after: number;
         };
         /**
-         * Appearing
          * @description Be there from now on: the actor is not on the road before, whatever its ``depart`` is.
          *
          *     It appears where it is placed, or ``at`` x, y and heading of its body's centre, with its initial
          *     speed or ``speed``.
          */
         "Appearing-Input": {
-            /** At */
             at?: [
                 number,
                 number,
                 number
             ] | null;
-            /** Speed */
             speed?: number | null;
         };
         /**
-         * Appearing
          * @description Be there from now on: the actor is not on the road before, whatever its ``depart`` is.
          *
          *     It appears where it is placed, or ``at`` x, y and heading of its body's centre, with its initial
          *     speed or ``speed``.
          */
         "Appearing-Output": {
-            /** At */
             at: [
                 number,
                 number,
                 number
             ] | null;
-            /** Speed */
             speed: number | null;
         };
         /**
-         * Arriving
          * @description Be at a place at the instant at which ``to`` is at another one.
          *
          *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
          *     it arrives at that, which it has already reached ``steady`` metres before.
          */
         "Arriving-Input": {
-            /** At */
             at: string | [
                 number,
                 number
             ];
-            /** To */
             to: string;
-            /** When At */
             when_at: string | [
                 number,
                 number
             ];
-            /** Speed */
             speed?: number | null;
-            /**
-             * Steady
-             * @default 0
-             */
+            /** @default 0 */
             steady?: number;
         };
         /**
-         * Arriving
          * @description Be at a place at the instant at which ``to`` is at another one.
          *
          *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
          *     it arrives at that, which it has already reached ``steady`` metres before.
          */
         "Arriving-Output": {
-            /** At */
             at: string | [
                 number,
                 number
             ];
-            /** To */
             to: string;
-            /** When At */
             when_at: string | [
                 number,
                 number
             ];
-            /** Speed */
             speed: number | null;
-            /**
-             * Steady
-             * @default 0
-             */
+            /** @default 0 */
             steady: number;
         };
-        /**
-         * AssetsInfo
-         * @description The asset catalogue, and the built-in day profiles: relative shares of equal slices.
-         */
+        /** @description The asset catalogue, and the built-in day profiles: relative shares of equal slices. */
         AssetsInfo: {
-            /** Categories */
             categories: components["schemas"]["CategoryInfo"][];
-            /** Blueprints */
             blueprints: components["schemas"]["BlueprintInfo"][];
-            /** Weather */
             weather: components["schemas"]["WeatherInfo"][];
-            /** Day Profiles */
             day_profiles: {
                 [key: string]: number[];
             };
         };
         /**
-         * Background
          * @description Vehicles that come and go anywhere in the region; one of the three says how many.
          *
          *     ``fill``, a share of those that fit, and ``per_km``, vehicles per kilometre of lane, are how
@@ -2299,16 +978,10 @@ export interface components {
          *     many depart in the window.
          */
         Background: {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
-            /** Profile */
             profile: string | null;
             mix: {
                 car?: number;
@@ -2319,259 +992,137 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Fill */
             fill: number | null;
-            /** Per Km */
             per_km: number | null;
-            /** Trips */
             trips: number | null;
         };
         /**
-         * Better
          * @description In which direction a figure is better.
          * @enum {string}
          */
         Better: "lower" | "higher" | "neither";
-        /**
-         * BlueprintInfo
-         * @description A model of road user; metres.
-         */
+        /** @description A model of road user; metres. */
         BlueprintInfo: {
-            /** Id */
             id: string;
             category: components["schemas"]["Category"];
-            /** Special Type */
             special_type: string;
-            /** Age */
             age: ("adult" | "child") | null;
-            /** Length */
             length: number;
-            /** Width */
             width: number;
-            /** Height */
             height: number;
         };
-        /** Body_add_map_api_maps_post */
         Body_add_map_api_maps_post: {
-            /**
-             * File
-             * @description A map of any format of `/map-importers`.
-             */
+            /** @description An OpenDRIVE map. */
             file: string;
-            /** Name */
             name?: string | null;
-            /** Converter */
             converter?: ("odscen" | "netconvert") | null;
-            /**
-             * Importer
-             * @description If several recognise the file.
-             */
-            importer?: string | null;
-            /**
-             * Options
-             * @description Of the importer, a JSON object.
-             */
-            options?: string | null;
         };
-        /** Body_import_files_api_imports__of__post */
         Body_import_files_api_imports__of__post: {
-            /**
-             * Files
-             * @description A scenario, and if need be its map (.xodr) and catalogs.
-             */
+            /** @description A scenario, and if need be its map (.xodr) and catalogs. */
             files: string[];
-            /** Ego */
             ego?: ("story" | "sumo") | null;
             /**
-             * Option
              * @description NAME=VALUE
              * @default []
              */
             option?: string[];
         };
-        /** Body_import_programs_api_scenarios__name__signal_times_import_post */
         Body_import_programs_api_scenarios__name__signal_times_import_post: {
-            /**
-             * File
-             * @description SUMO's programs: .tll.xml, .add.xml, .net.xml.
-             */
+            /** @description SUMO's programs: .tll.xml, .add.xml, .net.xml. */
             file: string;
-            /** Version */
             version: number;
-            /**
-             * Junction
-             * @description Only this light.
-             */
+            /** @description Only this light. */
             junction?: string | null;
         };
-        /** Body_table_api_scenarios__name__demand_table_post */
         Body_table_api_scenarios__name__demand_table_post: {
-            /**
-             * File
-             * @description Comma, semicolon or tab separated.
-             */
+            /** @description Comma, semicolon or tab separated. */
             file: string;
-            /** Version */
             version: number;
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "od" | "inputs" | "counts" | "profile" | "zones";
-            /**
-             * Part
-             * @description Name of what is read in.
-             */
+            /** @description Name of what is read in. */
             part?: string | null;
-            /**
-             * Day
-             * @description Day profile of trips.
-             */
+            /** @description Day profile of trips. */
             day?: string | null;
         };
-        /** Body_upload_api_scenarios_upload_post */
         Body_upload_api_scenarios_upload_post: {
-            /**
-             * File
-             * @description A scenario as JSON or GraphML.
-             */
+            /** @description A scenario as JSON or GraphML. */
             file: string;
-            /** Name */
             name?: string | null;
         };
-        /**
-         * Braking
-         * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
-         */
+        /** @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on. */
         "Braking-Input": {
-            /** By */
             by: number;
-            /** Hold */
             hold?: number | null;
         };
-        /**
-         * Braking
-         * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
-         */
+        /** @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on. */
         "Braking-Output": {
-            /** By */
             by: number;
-            /** Hold */
             hold: number | null;
         };
-        /**
-         * BrokenMapInfo
-         * @description A map of the catalogue that cannot be used, and why.
-         */
+        /** @description A map of the catalogue that cannot be used, and why. */
         BrokenMapInfo: {
-            /** Name */
             name: string;
-            /** Problem */
             problem: string;
         };
-        /**
-         * CarlaInfo
-         * @description Whether the CARLA server can be used, and what to do about it, in words.
-         */
+        /** @description Whether the CARLA server can be used, and what to do about it, in words. */
         CarlaInfo: {
-            /**
-             * State
-             * @enum {string}
-             */
+            /** @enum {string} */
             state: "connected" | "absent" | "wrong_version";
-            /** Address */
             address: string;
-            /** Message */
             message: string;
         };
-        /**
-         * CaseName
-         * @description Name of the scenario that a case becomes; made from the sweep's if not given.
-         */
+        /** @description Name of the scenario that a case becomes; made from the sweep's if not given. */
         CaseName: {
-            /** Name */
             name?: string | null;
         };
         /**
-         * Category
          * @description Exactly seven; the order is that of the interface.
          * @enum {string}
          */
         Category: "car" | "van" | "truck" | "bus" | "motorcycle" | "bicycle" | "pedestrian";
-        /**
-         * CategoryInfo
-         * @description A category of road users and its usual body; metres.
-         */
+        /** @description A category of road users and its usual body; metres. */
         CategoryInfo: {
             category: components["schemas"]["Category"];
-            /** Length */
             length: number;
-            /** Width */
             width: number;
-            /** Height */
             height: number;
         };
-        /**
-         * ChangeActorEdit
-         * @description Change fields of an actor that have no rule on the graph, for example ``speed`` or ``style``.
-         */
+        /** @description Change fields of an actor that have no rule on the graph, for example ``speed`` or ``style``. */
         ChangeActorEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "change_actor";
-            /** Id */
             id?: string;
             category?: components["schemas"]["Category"];
-            /** Model */
             model?: string | null;
-            /** Spawn */
             spawn?: string;
-            /** Goal */
             goal?: string | null;
-            /** Via */
             via?: string[];
-            /** Speed */
             speed?: number | null;
-            /** Lateral Offset */
             lateral_offset?: number;
-            /** Depart */
             depart?: number;
-            /** Initial Speed */
             initial_speed?: number | null;
-            /** Style */
             style?: string;
-            /** Ego */
             ego?: boolean;
-            /** Crosses Anywhere */
             crosses_anywhere?: boolean;
-            /** Ignores Red */
             ignores_red?: boolean;
-            /** Actor */
             actor: string;
         };
-        /**
-         * ChangeFlowEdit
-         * @description Change any fields of a flow.
-         */
+        /** @description Change any fields of a flow. */
         ChangeFlowEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "change_flow";
-            /** Id */
             id?: string;
-            /** Spawn */
             spawn?: string;
-            /** Goal */
             goal?: string | null;
-            /** Per Hour */
             per_hour?: number;
-            /** Begin */
             begin?: number;
-            /** End */
             end?: number;
             mix?: {
                 car?: number;
@@ -2582,149 +1133,89 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Speed */
             speed?: number | null;
-            /** Initial Speed */
             initial_speed?: number | null;
-            /** Profile */
             profile?: string | null;
-            /** Flow */
             flow: string;
         };
-        /**
-         * ChangedPermission
-         * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
-         */
+        /** @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``. */
         "ChangedPermission-Input": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin?: number;
-            /** End */
             end?: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "permission";
-            /** Places */
             places: string[];
-            /**
-             * Allowed
-             * @default []
-             */
+            /** @default [] */
             allowed?: components["schemas"]["Category"][];
-            /**
-             * Banned
-             * @default []
-             */
+            /** @default [] */
             banned?: components["schemas"]["Category"][];
         };
-        /**
-         * ChangedPermission
-         * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
-         */
+        /** @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``. */
         "ChangedPermission-Output": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "permission";
-            /** Places */
             places: string[];
-            /**
-             * Allowed
-             * @default []
-             */
+            /** @default [] */
             allowed: components["schemas"]["Category"][];
-            /**
-             * Banned
-             * @default []
-             */
+            /** @default [] */
             banned: components["schemas"]["Category"][];
         };
-        /**
-         * Choice
-         * @description One of ``values``, each with its weight (equal if there are none).
-         */
+        /** @description One of ``values``, each with its weight (equal if there are none). */
         "Choice-Input": {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "choice";
-            /** Values */
             values: number[];
-            /** Weights */
             weights?: number[] | null;
         };
-        /**
-         * Choice
-         * @description One of ``values``, each with its weight (equal if there are none).
-         */
+        /** @description One of ``values``, each with its weight (equal if there are none). */
         "Choice-Output": {
             /**
-             * Kind
              * @default choice
              * @constant
              */
             kind: "choice";
-            /** Values */
             values: number[];
-            /** Weights */
             weights: number[] | null;
         };
-        /**
-         * ChosenBehaviour
-         * @description An installed behaviour model by its name, and options that differ from its usual ones.
-         */
+        /** @description An installed behaviour model by its name, and options that differ from its usual ones. */
         ChosenBehaviour: {
-            /** Name */
             name: string;
-            /** Options */
             options?: {
                 [key: string]: boolean | number | string;
             };
         };
-        /**
-         * ChosenSimulator
-         * @description An installed simulator by its name, and options that differ from its usual ones.
-         */
+        /** @description An installed simulator by its name, and options that differ from its usual ones. */
         ChosenSimulator: {
-            /** Name */
             name: string;
-            /** Options */
             options?: {
                 [key: string]: boolean | number | string;
             };
         };
-        /**
-         * ClearTimingEdit
-         * @description Give the traffic light of one junction back to the map's program.
-         */
+        /** @description Give the traffic light of one junction back to the map's program. */
         ClearTimingEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "clear_timing";
-            /** Junction */
             junction: string;
         };
         /**
-         * Condition
          * @description One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
          *
          *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
@@ -2747,25 +1238,18 @@ export interface components {
             touched?: components["schemas"]["Touching-Input"] | null;
             off_road?: components["schemas"]["OneActor-Input"] | null;
             own?: components["schemas"]["OwnCondition-Input"] | null;
-            /** All */
             all?: components["schemas"]["Condition-Input"][] | null;
-            /** Any */
             any?: components["schemas"]["Condition-Input"][] | null;
             not?: components["schemas"]["Condition-Input"] | null;
-            /**
-             * Delay
-             * @default 0
-             */
+            /** @default 0 */
             delay?: number;
             /**
-             * Edge
              * @default none
              * @enum {string}
              */
             edge?: "none" | "rising";
         };
         /**
-         * Condition
          * @description One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
          *
          *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
@@ -2788,71 +1272,42 @@ export interface components {
             touched: components["schemas"]["Touching-Output"] | null;
             off_road: components["schemas"]["OneActor-Output"] | null;
             own: components["schemas"]["OwnCondition-Output"] | null;
-            /** All */
             all: components["schemas"]["Condition-Output"][] | null;
-            /** Any */
             any: components["schemas"]["Condition-Output"][] | null;
             not: components["schemas"]["Condition-Output"] | null;
-            /**
-             * Delay
-             * @default 0
-             */
+            /** @default 0 */
             delay: number;
             /**
-             * Edge
              * @default none
              * @enum {string}
              */
             edge: "none" | "rising";
         };
-        /**
-         * Constant
-         * @description Always ``value``.
-         */
+        /** @description Always ``value``. */
         "Constant-Input": {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "constant";
-            /** Value */
             value: number;
         };
-        /**
-         * Constant
-         * @description Always ``value``.
-         */
+        /** @description Always ``value``. */
         "Constant-Output": {
             /**
-             * Kind
              * @default constant
              * @constant
              */
             kind: "constant";
-            /** Value */
             value: number;
         };
-        /**
-         * ConversionEntry
-         * @description What became of one element, and why.
-         *
-         *     An importer of another format says how sure it is, 0 to 1, and the element's id in its file.
-         */
+        /** @description What became of one element, and why. */
         ConversionEntry: {
             fate: components["schemas"]["ElementOutcome"];
-            /** Element */
             element: string;
-            /** Reason */
             reason: string;
-            /** Confidence */
-            confidence: number | null;
-            /** Source Id */
-            source_id: string | null;
         };
-        /**
-         * ConversionInfo
-         * @description What became of all elements on the way to SUMO; figures of ``docs/sumo-network.md``.
-         */
+        /** @description What became of all elements on the way to SUMO; figures of ``docs/sumo-network.md``. */
         ConversionInfo: {
             counts: {
                 kept?: number;
@@ -2860,81 +1315,53 @@ export interface components {
                 guessed?: number;
                 lost?: number;
             };
-            /** Figures */
             figures: {
                 [key: string]: number;
             };
-            /** Entries */
             entries: components["schemas"]["ConversionEntry"][];
         };
-        /**
-         * CopyActorsEdit
-         * @description Copy actors to other nodes; ``copies`` maps the node of each copy to the actor's id.
-         */
+        /** @description Copy actors to other nodes; ``copies`` maps the node of each copy to the actor's id. */
         CopyActorsEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "copy_actors";
-            /** Copies */
             copies: {
                 [key: string]: string;
             };
         };
-        /**
-         * CopyName
-         * @description Name of a copy; made from the original's if not given.
-         */
+        /** @description Name of a copy; made from the original's if not given. */
         CopyName: {
-            /** Name */
             name?: string | null;
         };
-        /**
-         * Cordon
-         * @description Counts the vehicles that enter and leave an area, at all the lines around it.
-         */
+        /** @description Counts the vehicles that enter and leave an area, at all the lines around it. */
         Cordon: {
-            /** Id */
             id: string;
-            /** Entries */
             entries: string[];
-            /** Exits */
             exits: string[];
         };
         /**
-         * CorridorWish
          * @description Lights to be coordinated: junctions in driving order, or those along roads.
          *
          *     ``speed`` is that of progression, m/s; the speed limits if not given. ``cycle`` in seconds; the
          *     longest of the lights if not given.
          */
         CorridorWish: {
-            /** Version */
             version: number;
-            /**
-             * Junctions
-             * @default []
-             */
+            /** @default [] */
             junctions?: string[];
-            /**
-             * Along
-             * @default []
-             */
+            /** @default [] */
             along?: string[];
             /**
-             * Favoured
              * @default both
              * @enum {string}
              */
             favoured?: "both" | "out" | "back";
-            /** Speed */
             speed?: number | null;
-            /** Cycle */
             cycle?: number | null;
         };
         /**
-         * Counts
          * @description Vehicles that were counted: rows of place, begin and end of the slice, and number.
          *
          *     A place is one segment, or segments that are passed one after another, written
@@ -2943,10 +1370,8 @@ export interface components {
          *     none is, and other traffic is held against them.
          */
         Counts: {
-            /** Id */
             id: string;
             /**
-             * Use
              * @default generate
              * @enum {string}
              */
@@ -2960,7 +1385,6 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Rows */
             rows: [
                 string,
                 number,
@@ -2968,269 +1392,164 @@ export interface components {
                 number
             ][];
         };
-        /**
-         * CriterionInfo
-         * @description A criterion of the scenario: ``value`` in ``unit``, and when it came about, s.
-         */
+        /** @description A criterion of the scenario: ``value`` in ``unit``, and when it came about, s. */
         CriterionInfo: {
-            /** Criterion */
             criterion: string;
-            /** Words */
             words: string;
-            /** Value */
             value: number | null;
-            /** Unit */
             unit: string;
-            /** Passed */
             passed: boolean;
-            /** Time */
             time: number | null;
         };
-        /**
-         * CrosswalkInfo
-         * @description A crosswalk: its outline, and the line along which people walk; metres.
-         */
+        /** @description A crosswalk: its outline, and the line along which people walk; metres. */
         CrosswalkInfo: {
-            /** Id */
             id: string;
-            /** Road */
             road: string;
-            /** Polygon */
             polygon: [
                 number,
                 number
             ][];
-            /** From */
             from: [
                 number,
                 number
             ];
-            /** To */
             to: [
                 number,
                 number
             ];
-            /** Width */
             width: number;
         };
         /**
-         * CuttingIn
          * @description Change into the lane of ``to``, in front of it, ``over`` so many seconds.
          *
          *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
          */
         "CuttingIn-Input": {
-            /** To */
             to: string;
-            /** Gap */
             gap?: number | null;
-            /**
-             * Over
-             * @default 3
-             */
+            /** @default 3 */
             over?: number;
         };
         /**
-         * CuttingIn
          * @description Change into the lane of ``to``, in front of it, ``over`` so many seconds.
          *
          *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
          */
         "CuttingIn-Output": {
-            /** To */
             to: string;
-            /** Gap */
             gap: number | null;
-            /**
-             * Over
-             * @default 3
-             */
+            /** @default 3 */
             over: number;
         };
-        /**
-         * CycleWish
-         * @description Another cycle for a light, seconds; ``plan`` is a plan of the day where it has several.
-         */
+        /** @description Another cycle for a light, seconds; ``plan`` is a plan of the day where it has several. */
         CycleWish: {
-            /** Version */
             version: number;
-            /** Cycle */
             cycle: number;
-            /** Plan */
             plan?: string | null;
         };
         /**
-         * DayMade
          * @description A day of traffic that a scenario was given, and what it asks of the busiest junction.
          *
          *     ``volume`` and ``capacity`` are vehicles per hour at ``place`` in the busiest hour, in which
          *     ``peak_trips`` depart. ``found`` says what was tried by runs, and is null without a trial.
          */
         DayMade: {
-            /** Trips */
             trips: number;
-            /** Peak Trips */
             peak_trips: number;
-            /** Place */
             place: string;
-            /** Volume */
             volume: number;
-            /** Capacity */
             capacity: number;
-            /** Found */
             found: string | null;
         };
         /**
-         * DayPlan
          * @description One of several plans of a day: what differs in it from the program.
          *
          *     It runs from each time in ``times`` until another plan begins. ``stages`` has their order, and
          *     leaves out those that do not come; the times of stages are by their ids.
          */
         "DayPlan-Input": {
-            /** Id */
             id: string;
-            /**
-             * Times
-             * @default []
-             */
+            /** @default [] */
             times?: string[];
-            /** Cycle */
             cycle?: number | null;
-            /**
-             * Offset
-             * @default 0
-             */
+            /** @default 0 */
             offset?: number;
-            /**
-             * Stages
-             * @default []
-             */
+            /** @default [] */
             stages?: string[];
-            /** Green */
             green?: {
                 [key: string]: number;
             };
-            /** Min Green */
             min_green?: {
                 [key: string]: number;
             };
-            /** Max Green */
             max_green?: {
                 [key: string]: number;
             };
         };
         /**
-         * DayPlan
          * @description One of several plans of a day: what differs in it from the program.
          *
          *     It runs from each time in ``times`` until another plan begins. ``stages`` has their order, and
          *     leaves out those that do not come; the times of stages are by their ids.
          */
         "DayPlan-Output": {
-            /** Id */
             id: string;
-            /**
-             * Times
-             * @default []
-             */
+            /** @default [] */
             times: string[];
-            /** Cycle */
             cycle: number | null;
-            /**
-             * Offset
-             * @default 0
-             */
+            /** @default 0 */
             offset: number;
-            /**
-             * Stages
-             * @default []
-             */
+            /** @default [] */
             stages: string[];
-            /** Green */
             green: {
                 [key: string]: number;
             };
-            /** Min Green */
             min_green: {
                 [key: string]: number;
             };
-            /** Max Green */
             max_green: {
                 [key: string]: number;
             };
         };
         /**
-         * DayPlanInfo
          * @description A plan of the day; ``times`` are seconds of the day at which it begins, none if always.
          *
          *     ``begins`` are the seconds of a run at which it takes over. ``bars`` is the time bar as SVG, in
          *     which the cycle lasts from the first to the second share of the width.
          */
         DayPlanInfo: {
-            /** Id */
             id: string;
-            /** Cycle */
             cycle: number;
-            /** Offset */
             offset: number;
-            /** Times */
             times: number[];
-            /** Begins */
             begins: number[];
-            /** Stages */
             stages: components["schemas"]["StageInfo"][];
-            /** Phases */
             phases: components["schemas"]["PhaseInfo"][];
-            /** Bars */
             bars: string;
-            /** Plot */
             plot: [
                 number,
                 number
             ];
         };
         /**
-         * Demand
          * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
          *
          *     ``routes`` says how its trips choose their routes, ``parking`` which of them park.
          */
         Demand: {
-            /**
-             * Clock
-             * @default 0
-             */
+            /** @default 0 */
             clock: number;
-            /**
-             * Zones
-             * @default []
-             */
+            /** @default [] */
             zones: components["schemas"]["Zone"][];
-            /**
-             * Profiles
-             * @default []
-             */
+            /** @default [] */
             profiles: components["schemas"]["Profile"][];
-            /**
-             * Inputs
-             * @default []
-             */
+            /** @default [] */
             inputs: components["schemas"]["VehicleInput"][];
-            /**
-             * Matrices
-             * @default []
-             */
+            /** @default [] */
             matrices: components["schemas"]["Matrix"][];
-            /**
-             * Counts
-             * @default []
-             */
+            /** @default [] */
             counts: components["schemas"]["Counts"][];
-            /**
-             * Background
-             * @default []
-             */
+            /** @default [] */
             background: components["schemas"]["Background"][];
             /**
              * @default {
@@ -3255,18 +1574,12 @@ export interface components {
              */
             parking: components["schemas"]["TripParking"];
         };
-        /**
-         * Detector
-         * @description Counts vehicles, their speed, and the share of the time in which one is on it.
-         */
+        /** @description Counts vehicles, their speed, and the share of the time in which one is on it. */
         Detector: {
-            /** Id */
             id: string;
-            /** Nodes */
             nodes: string[];
         };
         /**
-         * DetectorInfo
          * @description A detector and what it is for; metres before the stop line, and seconds of its gap.
          *
          *     ``label`` names it in the pictures, where its shape has its id as ``data-detector``. ``bus`` if
@@ -3276,150 +1589,96 @@ export interface components {
          *     along it in driving direction, x and y in metres.
          */
         DetectorInfo: {
-            /** Id */
             id: string;
-            /** Label */
             label: string;
-            /** Stages */
             stages: string[];
-            /** Call */
             call: boolean;
-            /** Bus */
             bus: boolean;
-            /** Ahead */
             ahead: number;
-            /** Length */
             length: number;
-            /** Gap */
             gap: number;
-            /** Calls */
             calls: [
                 number,
                 number
             ][];
-            /** Place */
             place: [
                 number,
                 number
             ][];
         };
-        /**
-         * DetectorLaneInfo
-         * @description A lane before the light, and its approach; ``line`` leads to the stop line, metres.
-         */
+        /** @description A lane before the light, and its approach; ``line`` leads to the stop line, metres. */
         DetectorLaneInfo: {
-            /** At */
             at: string;
-            /** Approach */
             approach: string;
-            /** Line */
             line: [
                 number,
                 number
             ][];
         };
-        /**
-         * DistanceBounded
-         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
-         */
+        /** @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres. */
         "DistanceBounded-Input": {
-            /** Below */
             below?: number | null;
-            /** Above */
             above?: number | null;
-            /** Of */
             of?: string | null;
-            /** To */
             to?: string | null;
-            /** Place */
             place?: string | [
                 number,
                 number
             ] | null;
             /**
-             * Along
              * @default straight
              * @enum {string}
              */
             along?: "straight" | "longitudinal" | "lateral" | "lane";
-            /**
-             * Free
-             * @default true
-             */
+            /** @default true */
             free?: boolean;
         };
-        /**
-         * DistanceBounded
-         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
-         */
+        /** @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres. */
         "DistanceBounded-Output": {
-            /** Below */
             below: number | null;
-            /** Above */
             above: number | null;
-            /** Of */
             of: string | null;
-            /** To */
             to: string | null;
-            /** Place */
             place: string | [
                 number,
                 number
             ] | null;
             /**
-             * Along
              * @default straight
              * @enum {string}
              */
             along: "straight" | "longitudinal" | "lateral" | "lane";
-            /**
-             * Free
-             * @default true
-             */
+            /** @default true */
             free: boolean;
         };
-        /**
-         * DocumentChange
-         * @description One operation of JSON Patch; ``path`` is a JSON pointer, ``value`` is null for ``remove``.
-         */
+        /** @description One operation of JSON Patch; ``path`` is a JSON pointer, ``value`` is null for ``remove``. */
         DocumentChange: {
-            /**
-             * Op
-             * @enum {string}
-             */
+            /** @enum {string} */
             op: "add" | "remove" | "replace";
-            /** Path */
             path: string;
             value: components["schemas"]["JsonPart"];
         };
         /**
-         * DrawingColumns
          * @description What is drawn of a map, see ``docs/drawings.md``.
          *
          *     Areas have a level, a kind and rings; marks a level, a colour, a width, painted and gap of
          *     dashes if they are dashed, and lines; symbols a kind, x, y, heading and a text.
          */
         DrawingColumns: {
-            /** Format */
             format: string;
-            /** Version */
             version: number;
-            /** Name */
             name: string;
-            /** Bounds */
             bounds: [
                 number,
                 number,
                 number,
                 number
             ];
-            /** Areas */
             areas: [
                 number,
                 string,
                 components["schemas"]["PackedLines"]
             ][];
-            /** Marks */
             marks: [
                 number,
                 string,
@@ -3430,7 +1689,6 @@ export interface components {
                 ] | null,
                 components["schemas"]["PackedLines"]
             ][];
-            /** Symbols */
             symbols: [
                 string,
                 number,
@@ -3445,7 +1703,6 @@ export interface components {
             buildings: components["schemas"]["PackedLines"];
         };
         /**
-         * DriverSet
          * @description Drivers of one kind, by SUMO's own names of what is different from a driving style's.
          *
          *     ``parameters`` are numbers or distributions, of which each driver draws one by the scenario's
@@ -3453,27 +1710,22 @@ export interface components {
          *     and meanings. ``car_following`` is SUMO's model.
          */
         "DriverSet-Input": {
-            /** Id */
             id: string;
             /**
-             * Style
              * @default normal
              * @enum {string}
              */
             style?: "cautious" | "normal" | "sporty";
-            /** Parameters */
             parameters?: {
                 [key: string]: components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"];
             };
             /**
-             * Car Following
              * @default Krauss
              * @enum {string}
              */
             car_following?: "Krauss" | "IDM";
         };
         /**
-         * DriverSet
          * @description Drivers of one kind, by SUMO's own names of what is different from a driving style's.
          *
          *     ``parameters`` are numbers or distributions, of which each driver draws one by the scenario's
@@ -3481,29 +1733,24 @@ export interface components {
          *     and meanings. ``car_following`` is SUMO's model.
          */
         "DriverSet-Output": {
-            /** Id */
             id: string;
             /**
-             * Style
              * @default normal
              * @enum {string}
              */
             style: "cautious" | "normal" | "sporty";
-            /** Parameters */
             parameters: {
                 [key: string]: number | {
                     [key: string]: string | number | number[];
                 };
             };
             /**
-             * Car Following
              * @default Krauss
              * @enum {string}
              */
             car_following: "Krauss" | "IDM";
         };
         /**
-         * Drivers
          * @description What drivers of the style ``normal`` do; the other styles are set about it.
          *
          *     ``saturation_flow`` (vehicles per hour and lane that pass a stop line from a queue, cars on a
@@ -3515,164 +1762,90 @@ export interface components {
          *     demand each driver draws a style or set by ``shares``, and all are normal without.
          */
         Drivers: {
-            /** Saturation Flow */
             saturation_flow: number | null;
-            /** Headway */
             headway: number | null;
-            /**
-             * Gap Acceptance
-             * @default 0.3
-             */
+            /** @default 0.3 */
             gap_acceptance: number;
-            /**
-             * Lane Change Eagerness
-             * @default 1
-             */
+            /** @default 1 */
             lane_change_eagerness: number;
-            /**
-             * Sets
-             * @default []
-             */
+            /** @default [] */
             sets: components["schemas"]["DriverSet-Output"][];
-            /** Shares */
             shares: {
                 [key: string]: number;
             };
         };
-        /**
-         * EdgeColumns
-         * @description Edges between nodes; ``relation`` 0 is successor, 1 left, 2 right.
-         */
+        /** @description Edges between nodes; ``relation`` 0 is successor, 1 left, 2 right. */
         EdgeColumns: {
-            /** Source */
             source: number[];
-            /** Target */
             target: number[];
-            /** Relation */
             relation: number[];
         };
         /**
-         * EditRequest
          * @description Edits of one version: all of them or none, and one step for undo.
          *
          *     ``label`` says in words what they do together; needed only where there are several.
          */
         EditRequest: {
-            /** Version */
             version: number;
-            /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetParkingEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetGroupEdit"] | components["schemas"]["RemoveGroupEdit"] | components["schemas"]["AddStageEdit"] | components["schemas"]["RemoveStageEdit"] | components["schemas"]["SetIntergreenEdit"] | components["schemas"]["SetDetectorEdit"] | components["schemas"]["RemoveDetectorEdit"] | components["schemas"]["SetPlanEdit"] | components["schemas"]["RemovePlanEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ExtendRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["SetParameterEdit"] | components["schemas"]["RemoveParameterEdit"] | components["schemas"]["SetFormulaEdit"] | components["schemas"]["SetStudyEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetCriteriaEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetGreenEdit"] | components["schemas"]["SetOffsetEdit"] | components["schemas"]["SetStageEdit"] | components["schemas"]["SetTurnEdit"])[];
-            /** Label */
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetParkingEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["SetParameterEdit"] | components["schemas"]["RemoveParameterEdit"] | components["schemas"]["SetFormulaEdit"] | components["schemas"]["SetGroupEdit"] | components["schemas"]["RemoveGroupEdit"] | components["schemas"]["AddStageEdit"] | components["schemas"]["RemoveStageEdit"] | components["schemas"]["SetIntergreenEdit"] | components["schemas"]["SetDetectorEdit"] | components["schemas"]["RemoveDetectorEdit"] | components["schemas"]["SetPlanEdit"] | components["schemas"]["RemovePlanEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ExtendRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetCriteriaEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetGreenEdit"] | components["schemas"]["SetOffsetEdit"] | components["schemas"]["SetStageEdit"] | components["schemas"]["SetTurnEdit"] | components["schemas"]["SetStudyEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
             label?: string | null;
         };
         /**
-         * EgoOutcome
          * @description What became of a vehicle under test; seconds, m/s.
          *
          *     ``travel_time`` and ``delay`` are known of one that arrived.
          */
         EgoOutcome: {
-            /** Id */
             id: string;
             status: components["schemas"]["ActorStatus"];
-            /** Travel Time */
             travel_time: number | null;
-            /** Delay */
             delay: number | null;
-            /** Mean Speed */
             mean_speed: number | null;
-            /** Collisions */
             collisions: number;
-            /** Emergency Stops */
             emergency_stops: number;
-            /** Teleports */
             teleports: number;
         };
         /**
-         * ElementOutcome
          * @description What happened to an element.
-         *
-         *     Attributes
-         *     ----------
-         *     KEPT
-         *         It is there as it was.
-         *     REPAIRED
-         *         It was wrong, and is read as it must have been meant.
-         *     GUESSED
-         *         Something that the file does not say was completed.
-         *     LOST
-         *         It is not there any more.
          * @enum {string}
          */
         ElementOutcome: "kept" | "repaired" | "guessed" | "lost";
-        /**
-         * Ending
-         * @description End the run: it is complete with the step in which that is asked for.
-         */
+        /** @description End the run: it is complete with the step in which that is asked for. */
         Ending: Record<string, never>;
-        /**
-         * EntryPlace
-         * @description Where vehicles can drive into the region: lanes are OpenDRIVE ids, the outermost first.
-         */
+        /** @description Where vehicles can drive into the region: lanes are OpenDRIVE ids, the outermost first. */
         EntryPlace: {
-            /** Segment */
             segment: string;
-            /**
-             * Direction
-             * @enum {string}
-             */
+            /** @enum {string} */
             direction: "forward" | "backward";
-            /** Lanes */
             lanes: number[];
         };
-        /**
-         * Environment
-         * @description Weather and time of day: a preset of the asset catalogue and single values that differ.
-         */
+        /** @description Weather and time of day: a preset of the asset catalogue and single values that differ. */
         Environment: {
-            /**
-             * Preset
-             * @default ClearNoon
-             */
+            /** @default ClearNoon */
             preset: string;
-            /** Parameters */
             parameters: {
                 [key: string]: number;
             };
-            /**
-             * Affects Driving
-             * @default true
-             */
+            /** @default true */
             affects_driving: boolean;
         };
-        /**
-         * ErrorAnswer
-         * @description Body of every answer with a status of 400 or more.
-         */
+        /** @description Body of every answer with a status of 400 or more. */
         ErrorAnswer: {
             error: components["schemas"]["ErrorInfo"];
         };
         /**
-         * ErrorInfo
          * @description What is wrong: the error's type, its words, and all reasons where there are several.
          *
          *     ``current`` is the newest version, where another one was expected.
          */
         ErrorInfo: {
-            /** Kind */
             kind: string;
-            /** Message */
             message: string;
-            /**
-             * Problems
-             * @default []
-             */
+            /** @default [] */
             problems: string[];
-            /** Current */
             current: number | null;
         };
         /**
-         * EventKind
          * @description What can happen to an actor.
          *
          *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
@@ -3683,162 +1856,98 @@ export interface components {
          * @enum {string}
          */
         EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
-        /**
-         * ExpectationInfo
-         * @description An expectation, what came of it, and whether it was met.
-         */
+        /** @description An expectation, what came of it, and whether it was met. */
         ExpectationInfo: {
-            /** Expectation */
             expectation: string;
-            /** Value */
             value: number | null;
-            /** Passed */
             passed: boolean;
         };
-        /**
-         * ExportInfo
-         * @description Files of an export, and what its format says in part only, or not at all.
-         */
+        /** @description Files of an export, and what its format says in part only, or not at all. */
         ExportInfo: {
-            /** Files */
             files: string[];
-            /** Approximated */
             approximated: components["schemas"]["ExportNote"][];
-            /** Left Out */
             left_out: components["schemas"]["ExportNote"][];
         };
-        /**
-         * ExportNote
-         * @description A part of a scenario, and what becomes of it.
-         */
+        /** @description A part of a scenario, and what becomes of it. */
         ExportNote: {
-            /** Place */
             place: string;
-            /** Reason */
             reason: string;
         };
-        /**
-         * ExtendRoiEdit
-         * @description Add several segments to the region of interest at once, in any order (R29).
-         */
+        /** @description Add several segments to the region of interest at once, in any order (R29). */
         ExtendRoiEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "extend_roi";
-            /** Segments */
             segments: string[];
         };
-        /**
-         * FigureDisplay
-         * @description How to write a value: times ``factor``, in ``unit``; ``clock``: as minutes and seconds.
-         */
+        /** @description How to write a value: times ``factor``, in ``unit``; ``clock``: as minutes and seconds. */
         FigureDisplay: {
-            /** Unit */
             unit: string;
-            /** Factor */
             factor: number;
-            /** Digits */
             digits: number;
-            /** Clock */
             clock: boolean;
         };
         /**
-         * FigureGroup
          * @description A figure over the runs of a scenario and variant, or its differences from the first variant.
          *
          *     The 95 % confidence interval is ``mean`` +- ``half_width``; both are null of fewer than two
          *     values. ``values`` has one for each run that has the figure, in the order of the study.
          */
         FigureGroup: {
-            /** Scenario */
             scenario: string;
-            /** Variant */
             variant: string;
-            /** Runs */
             runs: number;
-            /** Mean */
             mean: number | null;
-            /** Half Width */
             half_width: number | null;
-            /** Values */
             values: number[];
         };
-        /**
-         * FigureInfo
-         * @description A figure of a run; ``part`` is where ``summary.json`` has it, "" for at its top.
-         */
+        /** @description A figure of a run; ``part`` is where ``summary.json`` has it, "" for at its top. */
         FigureInfo: {
-            /** Name */
             name: string;
             part: components["schemas"]["SummaryPart"];
-            /** Unit */
             unit: string;
-            /** Label */
             label: string;
-            /** Definition */
             definition: string;
-            /** Source */
             source: string;
             better: components["schemas"]["Better"];
-            /** On Page */
             on_page: boolean;
             display: components["schemas"]["FigureDisplay"];
         };
-        /**
-         * FillRoiEdit
-         * @description Put a crowd into the region in the place of all actors (R47); flows stay.
-         */
+        /** @description Put a crowd into the region in the place of all actors (R47); flows stay. */
         FillRoiEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "fill_roi";
-            /** Share */
             share: number;
-            /** Seed */
             seed?: number | null;
-            /** Generator */
             generator?: string | null;
-            /** Options */
             options?: {
                 [key: string]: boolean | number | string;
             } | null;
         };
         /**
-         * FitRow
          * @description One count of vehicles from ``begin`` to ``end`` (seconds) and what a run made of it.
          *
          *     ``x`` and ``y`` are where it was counted, metres; ``why`` says why it is not met.
          */
         FitRow: {
-            /** Counts */
             counts: string;
-            /** Place */
             place: string;
-            /** Begin */
             begin: number;
-            /** End */
             end: number;
-            /** Counted */
             counted: number;
-            /** Modelled */
             modelled: number;
-            /** Geh */
             geh: number;
-            /** Met */
             met: boolean;
-            /** Why */
             why: string;
-            /** X */
             x: number | null;
-            /** Y */
             y: number | null;
         };
         /**
-         * Flow
          * @description A flow of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
          *
          *     Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
@@ -3847,23 +1956,13 @@ export interface components {
          *     is that of its vehicles at departure, m/s; ``None`` is from rest.
          */
         Flow: {
-            /** Id */
             id: string;
-            /** Spawn */
             spawn: string;
-            /** Goal */
             goal: string | null;
-            /** Per Hour */
             per_hour: number;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /**
-             * End
-             * @default 3600
-             */
+            /** @default 3600 */
             end: number;
             mix: {
                 car?: number;
@@ -3874,136 +1973,74 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Speed */
             speed: number | null;
-            /** Initial Speed */
             initial_speed: number | null;
-            /** Profile */
             profile: string | null;
         };
-        /**
-         * FormatInfo
-         * @description A foreign format: what its files are of, whether it is read and written, and how.
-         */
+        /** @description A foreign format: what its files are of, whether it is read and written, and how. */
         FormatInfo: {
-            /** Id */
             id: string;
-            /** Title */
             title: string;
-            /** Description */
             description: string;
-            /** Of */
             of: ("scenario" | "run" | "map")[];
-            /** Suffixes */
             suffixes: string[];
-            /** Reads */
             reads: boolean;
-            /** Writes */
             writes: boolean;
-            /** Options */
             options: components["schemas"]["FormatOptionInfo"][];
         };
-        /**
-         * FormatOptionInfo
-         * @description Something that a format lets one choose; ``values`` are all there are, if they are listed.
-         */
+        /** @description Something that a format lets one choose; ``values`` are all there are, if they are listed. */
         FormatOptionInfo: {
-            /** Name */
             name: string;
-            /** Label */
             label: string;
-            /** Values */
             values: string[];
-            /** Default */
             default: string;
         };
         /**
-         * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
          *
          *     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
          */
         "GapKeeping-Input": {
-            /** To */
             to: string;
-            /** Metres */
             metres?: number | null;
-            /** Seconds */
             seconds?: number | null;
-            /**
-             * Ahead
-             * @default false
-             */
+            /** @default false */
             ahead?: boolean;
-            /** Lasting */
             lasting?: number | null;
-            /**
-             * Rate
-             * @default 3
-             */
+            /** @default 3 */
             rate?: number;
-            /**
-             * Once
-             * @default false
-             */
+            /** @default false */
             once?: boolean;
         };
         /**
-         * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
          *
          *     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
          */
         "GapKeeping-Output": {
-            /** To */
             to: string;
-            /** Metres */
             metres: number | null;
-            /** Seconds */
             seconds: number | null;
-            /**
-             * Ahead
-             * @default false
-             */
+            /** @default false */
             ahead: boolean;
-            /** Lasting */
             lasting: number | null;
-            /**
-             * Rate
-             * @default 3
-             */
+            /** @default 3 */
             rate: number;
-            /**
-             * Once
-             * @default false
-             */
+            /** @default false */
             once: boolean;
         };
-        /**
-         * GoOn
-         * @description Go on with an interrupted run; ``speed`` as in :class:`NewRun`.
-         */
+        /** @description Go on with an interrupted run; ``speed`` as in :class:`NewRun`. */
         GoOn: {
-            /** Speed */
             speed?: number | null;
         };
-        /**
-         * Goals
-         * @description Goal candidates of a spawn.
-         */
+        /** @description Goal candidates of a spawn. */
         Goals: {
-            /** Spawn */
             spawn: string;
-            /** Goals */
             goals: string[];
         };
-        /**
-         * Going
-         * @description SUMO chooses the speed again.
-         */
+        /** @description SUMO chooses the speed again. */
         Going: Record<string, never>;
         /**
-         * GraphColumns
          * @description The lane graph, the segments and the pedestrian graph.
          *
          *     Per lane its type, and the junction that it lies in. Per node ``speed_limit`` in m/s, if there
@@ -4011,83 +2048,46 @@ export interface components {
          *     1 where the simulator can place a road user exactly.
          */
         GraphColumns: {
-            /** Lane Keys */
             lane_keys: string[];
-            /** First Node */
             first_node: number[];
-            /** Lane */
             lane: number[];
-            /** X */
             x: number[];
-            /** Y */
             y: number[];
-            /** Hdg */
             hdg: number[];
-            /** Width */
             width: number[];
-            /** Segment */
             segment: number[];
-            /** Spacing */
             spacing: number;
-            /** Lane Types */
             lane_types: string[];
-            /** Lane Junctions */
             lane_junctions: (string | null)[];
-            /** S */
             s: number[];
-            /** Speed Limit */
             speed_limit: (number | null)[];
-            /** Left Lane */
             left_lane: number[];
-            /** Right Lane */
             right_lane: number[];
-            /** Spawnable */
             spawnable: number[];
             edges: components["schemas"]["EdgeColumns"];
-            /** Segments */
             segments: components["schemas"]["SegmentInfo"][];
             walks: components["schemas"]["WalkColumns"];
         };
-        /**
-         * GraphCounts
-         * @description Sizes of a map's graphs; ``spacing`` of the nodes in metres.
-         */
+        /** @description Sizes of a map's graphs; ``spacing`` of the nodes in metres. */
         GraphCounts: {
-            /** Spacing */
             spacing: number;
-            /** Nodes */
             nodes: number;
-            /** Successor Edges */
             successor_edges: number;
-            /** Left Edges */
             left_edges: number;
-            /** Right Edges */
             right_edges: number;
-            /** Segments */
             segments: number;
-            /** Pedestrian Nodes */
             pedestrian_nodes: number;
-            /** Pedestrian Edges */
             pedestrian_edges: number;
         };
-        /**
-         * GridlockInfo
-         * @description Gridlock and teleports: how often, and the first of the places.
-         */
+        /** @description Gridlock and teleports: how often, and the first of the places. */
         GridlockInfo: {
-            /** Jams */
             jams: number;
-            /** Jams At The End */
             jams_at_the_end: number;
-            /** Teleported */
             moved_on: number;
-            /** Not inserted */
             kept_out: number;
-            /** Places */
             places: components["schemas"]["Incident"][];
         };
         /**
-         * GroupPairInfo
          * @description A group that ends and one that begins; seconds of intergreen.
          *
          *     ``needed`` is what their paths need, ``given`` what the scenario says, ``used`` what is kept.
@@ -4095,145 +2095,75 @@ export interface components {
          *     ``beginning`` does.
          */
         GroupPairInfo: {
-            /** Ending */
             ending: string;
-            /** Beginning */
             beginning: string;
-            /** Needed */
             needed: number;
-            /** Given */
             given: number | null;
-            /** Used */
             used: number;
-            /**
-             * Together
-             * @enum {string}
-             */
+            /** @enum {string} */
             together: "free" | "yields" | "first" | "never";
         };
-        /**
-         * GrowRoiEdit
-         * @description Add a segment to the region of interest (R29).
-         */
+        /** @description Add a segment to the region of interest (R29). */
         GrowRoiEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "grow_roi";
-            /** Segment */
             segment: string;
         };
-        /**
-         * Health
-         * @description That the server is there.
-         */
+        /** @description That the server is there. */
         Health: {
-            /** Version */
             version: string;
-            /** Workspace */
             workspace: string;
         };
-        /**
-         * Honking
-         * @description Sound the horn.
-         */
+        /** @description Sound the horn. */
         Honking: Record<string, never>;
-        /**
-         * Ignoring
-         * @description Heed neither red lights nor right of way, or one of the two.
-         */
+        /** @description Heed neither red lights nor right of way, or one of the two. */
         "Ignoring-Input": {
-            /**
-             * Red
-             * @default true
-             */
+            /** @default true */
             red?: boolean;
-            /**
-             * Right Of Way
-             * @default false
-             */
+            /** @default false */
             right_of_way?: boolean;
         };
-        /**
-         * Ignoring
-         * @description Heed neither red lights nor right of way, or one of the two.
-         */
+        /** @description Heed neither red lights nor right of way, or one of the two. */
         "Ignoring-Output": {
-            /**
-             * Red
-             * @default true
-             */
+            /** @default true */
             red: boolean;
-            /**
-             * Right Of Way
-             * @default false
-             */
+            /** @default false */
             right_of_way: boolean;
         };
         /**
-         * ImportInfo
          * @description What became of each element of the file that a scenario was imported from.
          *
          *     ``added`` says whether its map came with it; ``sweep`` whether there is a plan of a sweep.
          */
         ImportInfo: {
-            /** Scenario */
             scenario: string;
-            /** File */
             file: string;
-            /** Map */
             map: string;
-            /** Added */
             added: boolean;
-            /** Sweep */
             sweep: boolean;
-            /** Refused */
             refused: components["schemas"]["ImportRow"][];
-            /** Approximated */
             approximated: components["schemas"]["ImportRow"][];
-            /** Ignored */
             ignored: components["schemas"]["ImportRow"][];
-            /** Taken */
             taken: components["schemas"]["ImportRow"][];
         };
         /**
-         * ImportRow
          * @description An element of a file, and why it is in its list.
          *
          *     ``x`` and ``y`` are metres in the OpenDRIVE frame: the place on the map that it is about, if
          *     that is known.
          */
         ImportRow: {
-            /** File */
             file: string;
-            /** Xpath */
             xpath: string;
-            /** Line */
             line: number;
-            /** Reason */
             reason: string;
-            /** X */
             x: number | null;
-            /** Y */
             y: number | null;
         };
         /**
-         * ImporterInfo
-         * @description A format that maps can have, with what can be chosen when one is added.
-         */
-        ImporterInfo: {
-            /** Name */
-            name: string;
-            /** Label */
-            label: string;
-            /** Suffixes */
-            suffixes: string[];
-            /** Options */
-            options: components["schemas"]["OptionInfo"][];
-        };
-        /**
-         * Incident
          * @description Vehicles gridlocked, teleported or not inserted at a place.
          *
          *     Attributes
@@ -4257,97 +2187,51 @@ export interface components {
          */
         Incident: {
             kind: components["schemas"]["IncidentKind"];
-            /** Time */
             time: number;
-            /** Until */
             until: number | null;
-            /** Actor */
             actor: string;
-            /** Count */
             count: number;
-            /** X */
             x: number | null;
-            /** Y */
             y: number | null;
-            /** Lane */
             lane: string | null;
-            /** Place */
             place: string | null;
-            /** Reason */
             reason: components["schemas"]["StopReason"] | string;
         };
         /**
-         * IncidentInfo
          * @description Something that happened to ``actor``; see :class:`~odscen.records.run_events.Event`.
          *
          *     What there is nothing to say of is left out.
          */
         IncidentInfo: {
-            /** Time */
             time: number;
             kind: components["schemas"]["EventKind"];
-            /** Actor */
             actor: string;
-            /**
-             * X
-             * @default null
-             */
+            /** @default null */
             x?: number;
-            /**
-             * Y
-             * @default null
-             */
+            /** @default null */
             y?: number;
-            /**
-             * Lane
-             * @default null
-             */
+            /** @default null */
             lane?: string;
-            /**
-             * Partner
-             * @default null
-             */
+            /** @default null */
             partner?: string;
-            /**
-             * Error
-             * @default null
-             */
+            /** @default null */
             error?: number;
-            /**
-             * Travel Time
-             * @default null
-             */
+            /** @default null */
             travel_time?: number;
-            /**
-             * Detail
-             * @default null
-             */
+            /** @default null */
             detail?: string;
-            /**
-             * Waited
-             * @default null
-             */
+            /** @default null */
             waited?: number;
-            /**
-             * Queue
-             * @default null
-             */
+            /** @default null */
             queue?: number;
-            /**
-             * Rule
-             * @default null
-             */
+            /** @default null */
             rule?: string;
-            /**
-             * Values
-             * @default null
-             */
+            /** @default null */
             values?: {
                 [key: string]: number;
             };
         };
         /**
-         * IncidentKind
          * @description What can go wrong with traffic at a place.
          *
          *     ``jam``: vehicles are stopped there for minutes; ``moved_on``: SUMO has teleported a vehicle,
@@ -4355,52 +2239,33 @@ export interface components {
          * @enum {string}
          */
         IncidentKind: "jam" | "moved_on" | "kept_out";
-        /**
-         * InstalledFigureInfo
-         * @description A figure of an installed package; ``error`` says why it cannot be used, or is empty.
-         */
+        /** @description A figure of an installed package; ``error`` says why it cannot be used, or is empty. */
         InstalledFigureInfo: {
-            /** Name */
             name: string;
-            /** Definition */
             definition: string;
-            /** Error */
             error: string;
         };
         /**
-         * JobInfo
          * @description How far a job is; ``share`` from 0 to 1. ``result`` is the name of what was made.
          *
          *     ``day`` is told of a day of traffic alone.
          */
         JobInfo: {
-            /** Id */
             id: string;
-            /**
-             * State
-             * @enum {string}
-             */
+            /** @enum {string} */
             state: "queued" | "running" | "done" | "failed" | "cancelled";
-            /** Step */
             step: string;
-            /** Share */
             share: number;
             error: components["schemas"]["ErrorInfo"] | null;
-            /** Result */
             result: string | null;
             day: components["schemas"]["DayMade"] | null;
         };
-        /**
-         * JobStarted
-         * @description Work has been taken on; ask for the job.
-         */
+        /** @description Work has been taken on; ask for the job. */
         JobStarted: {
-            /** Job */
             job: string;
         };
         JsonPart: unknown;
         /**
-         * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.
          *
          *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
@@ -4413,202 +2278,120 @@ export interface components {
          *     ``coordination`` have one cycle. ``bus_priority`` ``None`` is the scenario's.
          */
         JunctionTiming: {
-            /** Junction */
             junction: string;
-            /** Control */
             control: ("fixed" | "actuated") | null;
-            /**
-             * Offset
-             * @default 0
-             */
+            /** @default 0 */
             offset: number;
-            /**
-             * Green
-             * @default []
-             */
+            /** @default [] */
             green: number[];
-            /** Cycle */
             cycle: number | null;
-            /** Coordination */
             coordination: string | null;
-            /**
-             * Groups
-             * @default []
-             */
+            /** @default [] */
             groups: components["schemas"]["ProgramGroup-Output"][];
-            /**
-             * Stages
-             * @default []
-             */
+            /** @default [] */
             stages: components["schemas"]["ProgramStage-Output"][];
-            /**
-             * Intergreens
-             * @default []
-             */
+            /** @default [] */
             intergreens: [
                 string,
                 string,
                 number
             ][];
-            /**
-             * Detectors
-             * @default []
-             */
+            /** @default [] */
             detectors: components["schemas"]["SignalDetector-Output"][];
-            /**
-             * Plans
-             * @default []
-             */
+            /** @default [] */
             plans: components["schemas"]["DayPlan-Output"][];
-            /** Bus Priority */
             bus_priority: boolean | null;
         };
         /**
-         * LaneChange
          * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
          *
          *     It takes ``over`` seconds.
          */
         "LaneChange-Input": {
-            /** By */
             by?: number | null;
-            /** To */
             to?: string | [
                 number,
                 number
             ] | null;
-            /**
-             * Over
-             * @default 3
-             */
+            /** @default 3 */
             over?: number;
         };
         /**
-         * LaneChange
          * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
          *
          *     It takes ``over`` seconds.
          */
         "LaneChange-Output": {
-            /** By */
             by: number | null;
-            /** To */
             to: string | [
                 number,
                 number
             ] | null;
-            /**
-             * Over
-             * @default 3
-             */
+            /** @default 3 */
             over: number;
         };
         /**
-         * LaneIncident
          * @description A broken-down vehicle that blocks a lane.
          *
          *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
          *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
          */
         "LaneIncident-Input": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin?: number;
-            /** End */
             end?: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "incident";
-            /** Lane */
             lane: string;
-            /** S */
             s: number;
-            /**
-             * Length
-             * @default 5
-             */
+            /** @default 5 */
             length?: number;
         };
         /**
-         * LaneIncident
          * @description A broken-down vehicle that blocks a lane.
          *
          *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
          *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
          */
         "LaneIncident-Output": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "incident";
-            /** Lane */
             lane: string;
-            /** S */
             s: number;
-            /**
-             * Length
-             * @default 5
-             */
+            /** @default 5 */
             length: number;
         };
-        /**
-         * LateralMove
-         * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
-         */
+        /** @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds. */
         "LateralMove-Input": {
-            /** To */
             to: number;
-            /**
-             * Over
-             * @default 3
-             */
+            /** @default 3 */
             over?: number;
         };
-        /**
-         * LateralMove
-         * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
-         */
+        /** @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds. */
         "LateralMove-Output": {
-            /** To */
             to: number;
-            /**
-             * Over
-             * @default 3
-             */
+            /** @default 3 */
             over: number;
         };
-        /**
-         * LightGroupInfo
-         * @description A signal group: the letters of the light's states that are its own, and their movements.
-         */
+        /** @description A signal group: the letters of the light's states that are its own, and their movements. */
         LightGroupInfo: {
-            /** Id */
             id: string;
-            /** Movements */
             movements: string[];
-            /** Links */
             links: number[];
-            /** Walk */
             walk: boolean;
         };
         /**
-         * LightInfo
          * @description A traffic light: its SUMO id, by which live states are reported, and what scenarios call it.
          *
          *     ``green`` are the seconds of each stage in the map's program. For each letter of its state,
@@ -4617,24 +2400,17 @@ export interface components {
          *     ``walks`` says which letters are for crossings.
          */
         LightInfo: {
-            /** Id */
             id: string;
-            /** Names */
             names: string[];
-            /** Green */
             green: number[];
-            /** Signals */
             signals: string[][];
-            /** Paths */
             paths: [
                 number,
                 number
             ][][];
-            /** Walks */
             walks: boolean[];
         };
         /**
-         * LightProgramInfo
          * @description What a light is told to show. ``site`` is the junction with its detectors, as SVG.
          *
          *     ``ground`` is what the pictures of the stages refer to: it has to be in the page with them.
@@ -4643,54 +2419,28 @@ export interface components {
          *     none of these in a run.
          */
         LightProgramInfo: {
-            /** Id */
             id: string;
-            /** Junctions */
             junctions: string[];
-            /**
-             * Control
-             * @enum {string}
-             */
+            /** @enum {string} */
             control: "fixed" | "actuated";
-            /**
-             * Origin
-             * @enum {string}
-             */
+            /** @enum {string} */
             origin: "scenario" | "retimed" | "odscen" | "netconvert" | "file";
-            /** Groups */
             groups: components["schemas"]["LightGroupInfo"][];
-            /** Plans */
             plans: components["schemas"]["DayPlanInfo"][];
-            /** Detectors */
             detectors: components["schemas"]["DetectorInfo"][];
-            /** Turns */
             turns: components["schemas"]["TurnInfo"][];
-            /** Movements */
             movements: components["schemas"]["MovementInfo"][];
-            /** Pairs */
             pairs: components["schemas"]["GroupPairInfo"][];
-            /** Lanes */
             lanes: components["schemas"]["DetectorLaneInfo"][];
-            /** Site */
             site: string;
-            /** Ground */
             ground: string;
-            /** Legend */
             legend: components["schemas"]["PictureKey"][];
         };
-        /**
-         * MapDetails
-         * @description The same with what the map means, and its traffic lights.
-         */
+        /** @description The same with what the map means, and its traffic lights. */
         MapDetails: {
-            /** Name */
             name: string;
-            /** Sha256 */
             sha256: string;
-            /** Source */
             source: string;
-            /** Importer */
-            importer: string;
             opendrive: components["schemas"]["MapHeader"];
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
@@ -4702,41 +2452,25 @@ export interface components {
                 guessed?: number;
                 lost?: number;
             };
-            /** Preview */
             preview: string;
-            /** Outdated */
             outdated: boolean;
             semantics: components["schemas"]["SemanticsInfo"];
-            /** Lights */
             lights: components["schemas"]["LightInfo"][];
         };
-        /**
-         * MapHeader
-         * @description The map's version of OpenDRIVE, and on which side is driven: RHT, LHT or mixed.
-         */
+        /** @description The map's version of OpenDRIVE, and on which side is driven: RHT, LHT or mixed. */
         MapHeader: {
-            /** Version */
             version: string;
-            /** Rule */
             rule: string;
         };
         /**
-         * MapInfo
          * @description A map of the catalogue; ``report_counts`` says how many elements had which outcome.
-         *
-         *     ``importer`` has read its file ``source``: ``opendrive``, or that of another format.
          *
          *     An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
          */
         MapInfo: {
-            /** Name */
             name: string;
-            /** Sha256 */
             sha256: string;
-            /** Source */
             source: string;
-            /** Importer */
-            importer: string;
             opendrive: components["schemas"]["MapHeader"];
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
@@ -4748,28 +2482,17 @@ export interface components {
                 guessed?: number;
                 lost?: number;
             };
-            /** Preview */
             preview: string;
-            /** Outdated */
             outdated: boolean;
         };
-        /**
-         * MapReference
-         * @description The map, by name *and* content, and the spacing of the graph that node names refer to.
-         */
+        /** @description The map, by name *and* content, and the spacing of the graph that node names refer to. */
         MapReference: {
-            /** Name */
             name: string;
-            /** Sha256 */
             sha256: string;
-            /**
-             * Spacing
-             * @default 2
-             */
+            /** @default 2 */
             spacing: number;
         };
         /**
-         * MapStatistics
          * @description Figures of a map; metres and m/s.
          *
          *     Attributes
@@ -4790,59 +2513,37 @@ export interface components {
          *         ``RHT``, ``LHT`` or ``mixed``.
          */
         MapStatistics: {
-            /** Bounds */
             bounds: [
                 number,
                 number,
                 number,
                 number
             ];
-            /** Road Length */
             road_length: number;
-            /** Connecting Road Length */
             connecting_road_length: number;
-            /** Driving Lane Length */
             driving_lane_length: number;
-            /** Roads */
             roads: number;
-            /** Junctions */
             junctions: number;
-            /** Crosswalks */
             crosswalks: number;
-            /** Traffic Lights */
             traffic_lights: number;
-            /** Pedestrian Lights */
             pedestrian_lights: number;
-            /** Stop Signs */
             stop_signs: number;
-            /** Yield Signs */
             yield_signs: number;
-            /** Stop Lines */
             stop_lines: number;
-            /** Speed Limit Min */
             speed_limit_min: number | null;
-            /** Speed Limit Max */
             speed_limit_max: number | null;
-            /** Rule */
             rule: string;
         };
         /**
-         * Matrix
          * @description Trips from where to where: rows of origin, destination and number.
          *
          *     Origins and destinations are zones or segments. The numbers are those of the whole window.
          */
         Matrix: {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
-            /** Profile */
             profile: string | null;
             mix: {
                 car?: number;
@@ -4853,91 +2554,53 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Trips */
             trips: [
                 string,
                 string,
                 number
             ][];
         };
-        /**
-         * MoveActorEdit
-         * @description Place an actor on another node; a goal that cannot be reached from there is opened.
-         */
+        /** @description Place an actor on another node; a goal that cannot be reached from there is opened. */
         MoveActorEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "move_actor";
-            /** Actor */
             actor: string;
-            /** Spawn */
             spawn: string;
         };
-        /**
-         * MovementInfo
-         * @description A movement as a group names it, and the group that has it now; empty without one.
-         */
+        /** @description A movement as a group names it, and the group that has it now; empty without one. */
         MovementInfo: {
-            /** Name */
             name: string;
-            /** Walk */
             walk: boolean;
-            /** Group */
             group: string;
         };
-        /**
-         * NetCounts
-         * @description The SUMO network's file, and what is in it.
-         */
+        /** @description The SUMO network's file, and what is in it. */
         NetCounts: {
-            /** Net File */
             net_file: string;
-            /** Edges */
             edges: number;
-            /** Lanes */
             lanes: number;
-            /** Junctions */
             junctions: number;
-            /** Tl Logics */
             tl_logics: number;
-            /** Crossings */
             crossings: number;
-            /** Walking Areas */
             walking_areas: number;
         };
-        /**
-         * NetworkOrigin
-         * @description Who wrote the SUMO network; ``source`` is the file of one that was brought in.
-         */
+        /** @description Who wrote the SUMO network; ``source`` is the file of one that was brought in. */
         NetworkOrigin: {
-            /**
-             * Converter
-             * @enum {string}
-             */
+            /** @enum {string} */
             converter: "odscen" | "netconvert" | "file";
-            /** Source */
             source: string | null;
         };
-        /**
-         * NewGoal
-         * @description Go to another node of the map from here on.
-         */
+        /** @description Go to another node of the map from here on. */
         NewGoal: {
-            /** To */
             to: string;
         };
-        /**
-         * NewName
-         * @description Another name.
-         */
+        /** @description Another name. */
         NewName: {
-            /** Name */
             name: string;
         };
         /**
-         * NewRun
          * @description Run a scenario as it is now.
          *
          *     ``until``, ``seed`` and ``step_length`` stand in for the scenario's own. ``speed`` is in
@@ -4948,345 +2611,203 @@ export interface components {
          *     A ``simulator`` plays it instead of SUMO.
          */
         NewRun: {
-            /** Scenario */
             scenario: string;
-            /** Until */
             until?: number | null;
-            /** Seed */
             seed?: number | null;
-            /** Step Length */
             step_length?: number | null;
-            /** Speed */
             speed?: number | null;
-            /**
-             * Paused
-             * @default false
-             */
+            /** @default false */
             paused?: boolean;
-            /**
-             * Trajectories
-             * @default true
-             */
+            /** @default true */
             trajectories?: boolean;
-            /** Every */
             every?: number | null;
-            /**
-             * Carla
-             * @default false
-             */
+            /** @default false */
             carla?: boolean;
             behaviour?: components["schemas"]["ChosenBehaviour"] | null;
             simulator?: components["schemas"]["ChosenSimulator"] | null;
         };
         /**
-         * NewScenario
          * @description Start a scenario on a map; a free name is found if none is given.
          *
          *     With a ``template`` it is not empty; ``values`` are numbers that differ from the template's.
          */
         NewScenario: {
-            /** Map */
             map: string;
-            /** Name */
             name?: string | null;
-            /** Template */
             template?: string | null;
-            /**
-             * Values
-             * @default {}
-             */
+            /** @default {} */
             values?: {
                 [key: string]: number;
             };
         };
-        /**
-         * Normal
-         * @description Normal distribution, drawn again while outside ``low`` to ``high``.
-         */
+        /** @description Normal distribution, drawn again while outside ``low`` to ``high``. */
         "Normal-Input": {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "normal";
-            /** Mean */
             mean: number;
-            /** Std */
             std: number;
-            /** Low */
             low: number;
-            /** High */
             high: number;
         };
-        /**
-         * Normal
-         * @description Normal distribution, drawn again while outside ``low`` to ``high``.
-         */
+        /** @description Normal distribution, drawn again while outside ``low`` to ``high``. */
         "Normal-Output": {
             /**
-             * Kind
              * @default normal
              * @constant
              */
             kind: "normal";
-            /** Mean */
             mean: number;
-            /** Std */
             std: number;
-            /** Low */
             low: number;
-            /** High */
             high: number;
         };
-        /**
-         * OfVersion
-         * @description What is asked for holds for this version only.
-         */
+        /** @description What is asked for holds for this version only. */
         OfVersion: {
-            /** Version */
             version: number;
         };
-        /**
-         * OfferedInfo
-         * @description A generator or behaviour model to choose; ``error`` says why it cannot be, or is empty.
-         */
+        /** @description A generator or behaviour model to choose; ``error`` says why it cannot be, or is empty. */
         OfferedInfo: {
-            /** Name */
             name: string;
-            /** Summary */
             summary: string;
-            /** Options */
             options: components["schemas"]["OptionInfo"][];
-            /** Error */
             error: string;
         };
-        /**
-         * OneActor
-         * @description An actor, the rule's own if none is named.
-         */
+        /** @description An actor, the rule's own if none is named. */
         "OneActor-Input": {
-            /** Of */
             of?: string | null;
         };
-        /**
-         * OneActor
-         * @description An actor, the rule's own if none is named.
-         */
+        /** @description An actor, the rule's own if none is named. */
         "OneActor-Output": {
-            /** Of */
             of: string | null;
         };
-        /**
-         * OptionInfo
-         * @description An option of a generator or behaviour model; ``usual`` ``null`` has to be given.
-         */
+        /** @description An option of a generator or behaviour model; ``usual`` ``null`` has to be given. */
         OptionInfo: {
-            /** Name */
             name: string;
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "number" | "integer" | "boolean" | "string";
-            /** Title */
             title: string;
-            /** Meaning */
             meaning: string;
-            /** Usual */
             usual: boolean | number | string | null;
-            /** Low */
             low: number | null;
-            /** High */
             high: number | null;
-            /** Choices */
             choices: string[];
         };
-        /**
-         * OwnAction
-         * @description An action of an installed package.
-         */
+        /** @description An action of an installed package. */
         "OwnAction-Input": {
-            /** Kind */
             kind: string;
-            /** To */
             to?: string | null;
-            /** Place */
             place?: string | [
                 number,
                 number
             ] | null;
-            /** Values */
             values?: {
                 [key: string]: number | string;
             };
         };
-        /**
-         * OwnAction
-         * @description An action of an installed package.
-         */
+        /** @description An action of an installed package. */
         "OwnAction-Output": {
-            /** Kind */
             kind: string;
-            /** To */
             to: string | null;
-            /** Place */
             place: string | [
                 number,
                 number
             ] | null;
-            /** Values */
             values: {
                 [key: string]: number | string;
             };
         };
-        /**
-         * OwnBounded
-         * @description A value of one actor: ``of``, or the rule's own.
-         */
+        /** @description A value of one actor: ``of``, or the rule's own. */
         "OwnBounded-Input": {
-            /** Below */
             below?: number | null;
-            /** Above */
             above?: number | null;
-            /** Of */
             of?: string | null;
         };
-        /**
-         * OwnBounded
-         * @description A value of one actor: ``of``, or the rule's own.
-         */
+        /** @description A value of one actor: ``of``, or the rule's own. */
         "OwnBounded-Output": {
-            /** Below */
             below: number | null;
-            /** Above */
             above: number | null;
-            /** Of */
             of: string | null;
         };
         /**
-         * OwnCondition
          * @description A condition of an installed package; ``of`` is whose value it is, the rule's actor's if not.
          *
          *     See :mod:`odscen.scenario.story.own_kinds`.
          */
         "OwnCondition-Input": {
-            /** Kind */
             kind: string;
-            /** To */
             to?: string | null;
-            /** Place */
             place?: string | [
                 number,
                 number
             ] | null;
-            /** Values */
             values?: {
                 [key: string]: number | string;
             };
-            /** Of */
             of?: string | null;
         };
         /**
-         * OwnCondition
          * @description A condition of an installed package; ``of`` is whose value it is, the rule's actor's if not.
          *
          *     See :mod:`odscen.scenario.story.own_kinds`.
          */
         "OwnCondition-Output": {
-            /** Kind */
             kind: string;
-            /** To */
             to: string | null;
-            /** Place */
             place: string | [
                 number,
                 number
             ] | null;
-            /** Values */
             values: {
                 [key: string]: number | string;
             };
-            /** Of */
             of: string | null;
         };
-        /**
-         * PackedLines
-         * @description Lines or rings: how many points each has, and centimetres from each point to the next.
-         */
+        /** @description Lines or rings: how many points each has, and centimetres from each point to the next. */
         PackedLines: {
-            /** Sizes */
             sizes: number[];
-            /** Steps */
             steps: number[];
         };
-        /**
-         * PairBounded
-         * @description A value between two actors.
-         */
+        /** @description A value between two actors. */
         "PairBounded-Input": {
-            /** Below */
             below?: number | null;
-            /** Above */
             above?: number | null;
-            /** Of */
             of?: string | null;
-            /** To */
             to: string;
         };
-        /**
-         * PairBounded
-         * @description A value between two actors.
-         */
+        /** @description A value between two actors. */
         "PairBounded-Output": {
-            /** Below */
             below: number | null;
-            /** Above */
             above: number | null;
-            /** Of */
             of: string | null;
-            /** To */
             to: string;
         };
         /**
-         * Parameter
          * @description A named number with its unit and the bounds between which it makes sense.
          *
          *     Any number of the document may be written as a formula of parameters, ``"$gap"`` or
          *     ``"2 * $gap + 1"``, and so may the ``value`` of a later parameter.
          */
         Parameter: {
-            /** Value */
             value: number;
-            /**
-             * Unit
-             * @default
-             */
+            /** @default  */
             unit: string;
-            /** Min */
             min: number | null;
-            /** Max */
             max: number | null;
-            /**
-             * Description
-             * @default
-             */
+            /** @default  */
             description: string;
         };
-        /**
-         * Path
-         * @description Shortest path inside the region, with [x, y] of its nodes; empty if there is none.
-         */
+        /** @description Shortest path inside the region, with [x, y] of its nodes; empty if there is none. */
         Path: {
-            /** Nodes */
             nodes: string[];
-            /** Points */
             points: [
                 number,
                 number
             ][];
         };
         /**
-         * PathFollowing
          * @description Follow a line over the ground from where the actor is, through ``points``.
          *
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
@@ -5295,28 +2816,18 @@ export interface components {
          *     where it is and heads at the begin.
          */
         "PathFollowing-Input": {
-            /** Points */
             points: (string | [
                 number,
                 number
             ])[];
-            /** Speed */
             speed?: number | null;
-            /**
-             * Speeds
-             * @default []
-             */
+            /** @default [] */
             speeds?: number[];
-            /**
-             * Times
-             * @default []
-             */
+            /** @default [] */
             times?: number[];
-            /** Relative To */
             relative_to?: string | null;
         };
         /**
-         * PathFollowing
          * @description Follow a line over the ground from where the actor is, through ``points``.
          *
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
@@ -5325,52 +2836,30 @@ export interface components {
          *     where it is and heads at the begin.
          */
         "PathFollowing-Output": {
-            /** Points */
             points: (string | [
                 number,
                 number
             ])[];
-            /** Speed */
             speed: number | null;
-            /**
-             * Speeds
-             * @default []
-             */
+            /** @default [] */
             speeds: number[];
-            /**
-             * Times
-             * @default []
-             */
+            /** @default [] */
             times: number[];
-            /** Relative To */
             relative_to: string | null;
         };
-        /**
-         * PhaseInfo
-         * @description A state for so many seconds of the cycle; ``stage`` is empty if it is none's green.
-         */
+        /** @description A state for so many seconds of the cycle; ``stage`` is empty if it is none's green. */
         PhaseInfo: {
-            /** Seconds */
             seconds: number;
-            /** State */
             state: string;
-            /** Name */
             name: string;
-            /** Stage */
             stage: string;
         };
-        /**
-         * PictureKey
-         * @description A shape of the pictures in 24 by 14 pixels, as SVG, and what it means.
-         */
+        /** @description A shape of the pictures in 24 by 14 pixels, as SVG, and what it means. */
         PictureKey: {
-            /** Picture */
             picture: string;
-            /** Words */
             words: string;
         };
         /**
-         * PlannedColumns
          * @description Planned motion: rows ``first[i]`` up to ``first[i + 1]`` belong to ``users[i]``.
          *
          *     Per row a time (seconds after the start of the run), the centre of the body (metres) and its
@@ -5379,104 +2868,58 @@ export interface components {
          *     are than are planned at most.
          */
         PlannedColumns: {
-            /** Users */
             users: components["schemas"]["PlannedUser"][];
-            /** First */
             first: number[];
-            /** Time */
             time: number[];
-            /** X */
             x: number[];
-            /** Y */
             y: number[];
-            /** Hdg */
             hdg: number[];
-            /** Left Out */
             left_out: string[];
-            /** Not Planned */
             not_planned: number;
         };
         /**
-         * PlannedSweep
          * @description How many cases a sweep has, and what they will take, from a trial of ``tried``.
          *
          *     ``seconds`` is wall time of all cases, null if the one that was tried takes longer than
          *     ``patience`` seconds; ``disk`` and ``free`` are bytes.
          */
         PlannedSweep: {
-            /** Cases */
             cases: number;
-            /** Tried */
             tried: string;
-            /** Case Seconds */
             case_seconds: number;
-            /** Seconds */
             seconds: number | null;
-            /** Disk */
             disk: number;
-            /** Free */
             free: number;
-            /** Processes */
             processes: number;
-            /** Patience */
             patience: number;
         };
-        /**
-         * PlannedUser
-         * @description A road user that is planned; metres. ``flow`` is the flow that it is a member of.
-         */
+        /** @description A road user that is planned; metres. ``flow`` is the flow that it is a member of. */
         PlannedUser: {
-            /** Id */
             id: string;
             category: components["schemas"]["Category"];
-            /** Length */
             length: number;
-            /** Width */
             width: number;
-            /** Ego */
             ego: boolean;
-            /** Flow */
             flow: string | null;
         };
-        /**
-         * ProblemInfo
-         * @description One thing that is wrong with a scenario, see ``docs/scenario-format.md`` for the codes.
-         */
+        /** @description One thing that is wrong with a scenario, see ``docs/scenario-format.md`` for the codes. */
         ProblemInfo: {
-            /**
-             * Severity
-             * @enum {string}
-             */
+            /** @enum {string} */
             severity: "error" | "warning";
-            /** Code */
             code: string;
-            /** Where */
             where: string;
-            /** Message */
             message: string;
-            /**
-             * Nodes
-             * @default []
-             */
+            /** @default [] */
             nodes: string[];
-            /**
-             * Segments
-             * @default []
-             */
+            /** @default [] */
             segments: string[];
         };
-        /**
-         * Profile
-         * @description How demand is spread over a day: relative shares of equal slices, from midnight on.
-         */
+        /** @description How demand is spread over a day: relative shares of equal slices, from midnight on. */
         Profile: {
-            /** Id */
             id: string;
-            /** Shares */
             shares: number[];
         };
         /**
-         * ProgramGroup
          * @description A signal group: movements that always show the same.
          *
          *     A movement is named ``r12>r8`` (segment before, segment behind), ``r12 left`` (``straight``,
@@ -5487,19 +2930,13 @@ export interface components {
          *     it is to have it for ``min_green`` at least, over as many stages as it takes.
          */
         "ProgramGroup-Input": {
-            /** Id */
             id: string;
-            /** Movements */
             movements: string[];
-            /** Yellow */
             yellow?: number | null;
-            /** All Red */
             all_red?: number | null;
-            /** Min Green */
             min_green?: number | null;
         };
         /**
-         * ProgramGroup
          * @description A signal group: movements that always show the same.
          *
          *     A movement is named ``r12>r8`` (segment before, segment behind), ``r12 left`` (``straight``,
@@ -5510,19 +2947,13 @@ export interface components {
          *     it is to have it for ``min_green`` at least, over as many stages as it takes.
          */
         "ProgramGroup-Output": {
-            /** Id */
             id: string;
-            /** Movements */
             movements: string[];
-            /** Yellow */
             yellow: number | null;
-            /** All Red */
             all_red: number | null;
-            /** Min Green */
             min_green: number | null;
         };
         /**
-         * ProgramStage
          * @description Groups that have green together, and for how long.
          *
          *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
@@ -5531,32 +2962,18 @@ export interface components {
          *     if somebody waits at one of its crossings, or a vehicle for a green of it.
          */
         "ProgramStage-Input": {
-            /** Id */
             id: string;
-            /**
-             * Protected
-             * @default []
-             */
+            /** @default [] */
             protected?: string[];
-            /**
-             * Permissive
-             * @default []
-             */
+            /** @default [] */
             permissive?: string[];
-            /** Green */
             green: number;
-            /** Min Green */
             min_green?: number | null;
-            /** Max Green */
             max_green?: number | null;
-            /**
-             * On Call
-             * @default false
-             */
+            /** @default false */
             on_call?: boolean;
         };
         /**
-         * ProgramStage
          * @description Groups that have green together, and for how long.
          *
          *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
@@ -5565,347 +2982,212 @@ export interface components {
          *     if somebody waits at one of its crossings, or a vehicle for a green of it.
          */
         "ProgramStage-Output": {
-            /** Id */
             id: string;
-            /**
-             * Protected
-             * @default []
-             */
+            /** @default [] */
             protected: string[];
-            /**
-             * Permissive
-             * @default []
-             */
+            /** @default [] */
             permissive: string[];
-            /** Green */
             green: number;
-            /** Min Green */
             min_green: number | null;
-            /** Max Green */
             max_green: number | null;
-            /**
-             * On Call
-             * @default false
-             */
+            /** @default false */
             on_call: boolean;
         };
-        /**
-         * Reaching
-         * @description The centre of an actor's body is within so many metres of a place.
-         */
+        /** @description The centre of an actor's body is within so many metres of a place. */
         "Reaching-Input": {
-            /** Of */
             of?: string | null;
-            /** Place */
             place: string | [
                 number,
                 number
             ];
-            /**
-             * Within
-             * @default 1
-             */
+            /** @default 1 */
             within?: number;
         };
-        /**
-         * Reaching
-         * @description The centre of an actor's body is within so many metres of a place.
-         */
+        /** @description The centre of an actor's body is within so many metres of a place. */
         "Reaching-Output": {
-            /** Of */
             of: string | null;
-            /** Place */
             place: string | [
                 number,
                 number
             ];
-            /**
-             * Within
-             * @default 1
-             */
+            /** @default 1 */
             within: number;
         };
-        /**
-         * Releasing
-         * @description SUMO drives as if there had been no rule.
-         */
+        /** @description SUMO drives as if there had been no rule. */
         Releasing: Record<string, never>;
-        /**
-         * RemovalInfo
-         * @description What stays behind, and needs what is to be removed.
-         */
+        /** @description What stays behind, and needs what is to be removed. */
         RemovalInfo: {
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "map" | "scenario" | "run";
-            /** Name */
             name: string;
-            /** Scenarios */
             scenarios: number;
-            /** Runs */
             runs: number;
-            /** Live */
             live: number;
         };
-        /**
-         * RemoveActorsEdit
-         * @description Remove actors by id.
-         */
+        /** @description Remove actors by id. */
         RemoveActorsEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_actors";
-            /** Actors */
             actors: string[];
         };
-        /**
-         * RemoveDemandEdit
-         * @description Remove a zone, profile, input, matrix, set of counts or background traffic by its name.
-         */
+        /** @description Remove a zone, profile, input, matrix, set of counts or background traffic by its name. */
         RemoveDemandEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_demand";
-            /** Part */
             part: string;
         };
-        /**
-         * RemoveDetectorEdit
-         * @description Take a detector out.
-         */
+        /** @description Take a detector out. */
         RemoveDetectorEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_detector";
-            /** Junction */
             junction: string;
-            /** Detector */
             detector: string;
         };
-        /**
-         * RemoveFlowEdit
-         * @description Remove a flow.
-         */
+        /** @description Remove a flow. */
         RemoveFlowEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_flow";
-            /** Flow */
             flow: string;
         };
-        /**
-         * RemoveGroupEdit
-         * @description Take a signal group out; its movements join the group ``into``.
-         */
+        /** @description Take a signal group out; its movements join the group ``into``. */
         RemoveGroupEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_group";
-            /** Junction */
             junction: string;
-            /** Group */
             group: string;
-            /** Into */
             into: string;
         };
-        /**
-         * RemoveMeasureEdit
-         * @description Remove a measure by its id.
-         */
+        /** @description Remove a measure by its id. */
         RemoveMeasureEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_measure";
-            /** Measure */
             measure: string;
         };
-        /**
-         * RemoveParameterEdit
-         * @description Remove a parameter; numbers that were computed from it stay as they are, without formulas.
-         */
+        /** @description Remove a parameter; numbers that were computed from it stay as they are, without formulas. */
         RemoveParameterEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_parameter";
-            /** Parameter */
             parameter: string;
         };
-        /**
-         * RemovePlanEdit
-         * @description Take a plan of the day out; after the last one the program has its offset.
-         */
+        /** @description Take a plan of the day out; after the last one the program has its offset. */
         RemovePlanEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_plan";
-            /** Junction */
             junction: string;
-            /** Plan */
             plan: string;
         };
-        /**
-         * RemoveRuleEdit
-         * @description Remove a rule by its id; a rule that waits for it then has an error in the checks.
-         */
+        /** @description Remove a rule by its id; a rule that waits for it then has an error in the checks. */
         RemoveRuleEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_rule";
-            /** Rule */
             rule: string;
         };
-        /**
-         * RemoveStageEdit
-         * @description Take a stage out, and detectors that prolong nothing else.
-         */
+        /** @description Take a stage out, and detectors that prolong nothing else. */
         RemoveStageEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_stage";
-            /** Junction */
             junction: string;
-            /** Stage */
             stage: string;
         };
-        /**
-         * RemoveTransitEdit
-         * @description Remove a stop or a line by its name.
-         */
+        /** @description Remove a stop or a line by its name. */
         RemoveTransitEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "remove_transit";
-            /** Part */
             part: string;
         };
-        /**
-         * RemovedInfo
-         * @description Something in the wastebasket; ``removed`` and ``until`` are seconds since 1970.
-         */
+        /** @description Something in the wastebasket; ``removed`` and ``until`` are seconds since 1970. */
         RemovedInfo: {
-            /** Id */
             id: string;
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "map" | "scenario" | "run";
-            /** Name */
             name: string;
-            /** Removed */
             removed: number;
-            /** Until */
             until: number;
         };
-        /**
-         * RemovedRow
-         * @description The same with its size on the disk, bytes.
-         */
+        /** @description The same with its size on the disk, bytes. */
         RemovedRow: {
-            /** Id */
             id: string;
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "map" | "scenario" | "run";
-            /** Name */
             name: string;
-            /** Removed */
             removed: number;
-            /** Until */
             until: number;
-            /** Size */
             size: number;
         };
-        /**
-         * RenameEdit
-         * @description Give the scenario another name and, if given, another description.
-         */
+        /** @description Give the scenario another name and, if given, another description. */
         RenameEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "rename";
-            /** Name */
             name: string;
-            /** Description */
             description?: string | null;
         };
-        /**
-         * ReplayActor
-         * @description A road user in a recording; metres.
-         */
+        /** @description A road user in a recording; metres. */
         ReplayActor: {
-            /** Id */
             id: string;
             category: components["schemas"]["Category"];
-            /** Length */
             length: number;
-            /** Width */
             width: number;
-            /** Ego */
             ego: boolean;
         };
         /**
-         * ReplayColumns
          * @description Who was where: rows ``first[i]`` up to ``first[i + 1]`` belong to ``times[i]``, seconds.
          *
          *     Per row who it was (a row of ``actors``), the centre of the body (metres), its heading (radians)
          *     and its speed (m/s).
          */
         ReplayColumns: {
-            /** Times */
             times: number[];
-            /** First */
             first: number[];
-            /** Actor */
             actor: number[];
-            /** X */
             x: number[];
-            /** Y */
             y: number[];
-            /** Hdg */
             hdg: number[];
-            /** Speed */
             speed: number[];
-            /** Actors */
             actors: components["schemas"]["ReplayActor"][];
         };
         /**
-         * Replaying
          * @description Be where a recorded road user was: ``rows`` of seconds after the begin, x, y and heading.
          *
          *     Centre of the body, OpenDRIVE frame; metres, and radians counter-clockwise from x. Between rows
          *     it moves evenly.
          */
         Replaying: {
-            /** Rows */
             rows: [
                 number,
                 number,
@@ -5913,159 +3195,95 @@ export interface components {
                 number
             ][];
         };
-        /**
-         * ResumeStudy
-         * @description Run what is missing of a study; with ``failed`` those again that failed or were refused.
-         */
+        /** @description Run what is missing of a study; with ``failed`` those again that failed or were refused. */
         ResumeStudy: {
-            /**
-             * Processes
-             * @default 1
-             */
+            /** @default 1 */
             processes?: number;
-            /**
-             * Failed
-             * @default false
-             */
+            /** @default false */
             failed?: boolean;
         };
-        /**
-         * ResumeSweep
-         * @description Go on with a sweep that was stopped.
-         */
+        /** @description Go on with a sweep that was stopped. */
         ResumeSweep: {
-            /**
-             * Processes
-             * @default 1
-             */
+            /** @default 1 */
             processes?: number;
         };
-        /**
-         * RoadClosure
-         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
-         */
+        /** @description Segments, lanes or turns that no vehicle enters; who is on them drives out. */
         "RoadClosure-Input": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin?: number;
-            /** End */
             end?: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "closure";
-            /** Places */
             places: string[];
         };
-        /**
-         * RoadClosure
-         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
-         */
+        /** @description Segments, lanes or turns that no vehicle enters; who is on them drives out. */
         "RoadClosure-Output": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "closure";
-            /** Places */
             places: string[];
         };
         /**
-         * Roadworks
          * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
          *
          *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
          *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
          */
         "Roadworks-Input": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin?: number;
-            /** End */
             end?: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "roadworks";
-            /** Places */
             places: string[];
-            /** Speed */
             speed?: number | null;
-            /**
-             * Closed Lanes
-             * @default []
-             */
+            /** @default [] */
             closed_lanes?: string[];
-            /** Width */
             width?: number | null;
         };
         /**
-         * Roadworks
          * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
          *
          *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
          *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
          */
         "Roadworks-Output": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "roadworks";
-            /** Places */
             places: string[];
-            /** Speed */
             speed: number | null;
-            /**
-             * Closed Lanes
-             * @default []
-             */
+            /** @default [] */
             closed_lanes: string[];
-            /** Width */
             width: number | null;
         };
-        /**
-         * RoiInfo
-         * @description Segments of the region, and those that may be added or taken out now.
-         */
+        /** @description Segments of the region, and those that may be added or taken out now. */
         RoiInfo: {
-            /** Inside */
             inside: string[];
-            /** Candidates */
             candidates: string[];
-            /** Removable */
             removable: string[];
         };
         /**
-         * RouteChoice
          * @description How trips of inputs, matrices and background traffic choose their routes.
          *
          *     By ``length`` each takes the shortest. By ``travel_time`` the run is repeated, at most
@@ -6079,165 +3297,97 @@ export interface components {
          */
         RouteChoice: {
             /**
-             * By
              * @default length
              * @enum {string}
              */
             by: "length" | "travel_time";
-            /**
-             * Iterations
-             * @default 20
-             */
+            /** @default 20 */
             iterations: number;
-            /**
-             * Gap
-             * @default 0.01
-             */
+            /** @default 0.01 */
             gap: number;
-            /**
-             * Interval
-             * @default 900
-             */
+            /** @default 900 */
             interval: number;
-            /**
-             * Spread
-             * @default 0.03
-             */
+            /** @default 0.03 */
             spread: number;
-            /**
-             * Informed
-             * @default 0
-             */
+            /** @default 0 */
             informed: number;
-            /**
-             * Period
-             * @default 60
-             */
+            /** @default 60 */
             period: number;
-            /**
-             * Shares
-             * @default []
-             */
+            /** @default [] */
             shares: components["schemas"]["SharedRoutes"][];
         };
         /**
-         * RunContent
          * @description ``digest`` is the same where scenarios differ at most in name and description.
          *
          *     ``counts`` is how many counts of vehicles the scenario has.
          */
         RunContent: {
-            /** Digest */
             digest: string;
-            /** Counts */
             counts: number;
         };
         /**
-         * RunControl
          * @description Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
          *
          *     ``interrupt`` ends a long run at once, so that it can go on later.
          */
         RunControl: {
-            /**
-             * Action
-             * @enum {string}
-             */
+            /** @enum {string} */
             action: "pause" | "resume" | "step" | "speed" | "stop" | "interrupt";
-            /** Speed */
             speed?: number | null;
         };
-        /**
-         * RunCurve
-         * @description How many are on the road, have arrived, and wait to enter, at each ``time`` in seconds.
-         */
+        /** @description How many are on the road, have arrived, and wait to enter, at each ``time`` in seconds. */
         RunCurve: {
-            /** Time */
             time: number[];
-            /** Running */
             running: number[];
-            /** Arrived */
             arrived: number[];
-            /** Waiting */
             waiting: number[];
         };
-        /**
-         * RunCurves
-         * @description What a finished run looked like over time.
-         */
+        /** @description What a finished run looked like over time. */
         RunCurves: {
             counts: components["schemas"]["RunCurve"];
             speeds: components["schemas"]["RunSpeeds"];
             shares: components["schemas"]["RunShares"];
         };
-        /**
-         * RunEgos
-         * @description The vehicles under test of a finished run, in the order of the scenario.
-         */
+        /** @description The vehicles under test of a finished run, in the order of the scenario. */
         RunEgos: {
-            /** Egos */
             egos: components["schemas"]["EgoOutcome"][];
         };
-        /**
-         * RunEvents
-         * @description Incidents of a finished run, as the live view reports them; ``left_off`` were too many.
-         */
+        /** @description Incidents of a finished run, as the live view reports them; ``left_off`` were too many. */
         RunEvents: {
-            /** Events */
             events: components["schemas"]["IncidentInfo"][];
-            /** Left Off */
             left_off: number;
         };
-        /**
-         * RunFile
-         * @description A file of a run that can be downloaded; ``size`` in bytes.
-         */
+        /** @description A file of a run that can be downloaded; ``size`` in bytes. */
         RunFile: {
-            /** Name */
             name: string;
-            /** Size */
             size: number;
         };
         /**
-         * RunFit
          * @description All counts of a run's scenario against the run; ``rmse`` in vehicles per slice.
          *
          *     ``hours`` are those that slices of a place make up, ``hours_met`` how many of them are met.
          */
         RunFit: {
-            /** Rows */
             rows: components["schemas"]["FitRow"][];
-            /** Met */
             met: number;
-            /** Hours */
             hours: number;
-            /** Hours Met */
             hours_met: number;
-            /** Rmse */
             rmse: number | null;
-            /** Contradictions */
             contradictions: string[];
         };
         /**
-         * RunForecast
          * @description What a run will need, roughly: bytes, and how many will be on the road at a time at most.
          *
          *     ``free`` is what the disk has; ``planned`` is how many set out in all.
          */
         RunForecast: {
-            /** Planned */
             planned: number;
-            /** Running */
             running: number;
-            /** Disk */
             disk: number;
-            /** Memory */
             memory: number;
-            /** Free */
             free: number;
         };
         /**
-         * RunInfo
          * @description A run, going on or finished; ``summary`` is that of ``summary.json``.
          *
          *     ``finished`` is when its results were written, in seconds since 1970. ``preparing`` says how far
@@ -6246,36 +3396,22 @@ export interface components {
          *     ``slices``; one that is ``interrupted`` can go on from the last of them.
          */
         RunInfo: {
-            /** Run */
             run: string;
-            /**
-             * State
-             * @enum {string}
-             */
+            /** @enum {string} */
             state: "preparing" | "running" | "paused" | "finishing" | "completed" | "stopped" | "failed" | "interrupted";
-            /** Scenario */
             scenario: string;
-            /** Map */
             map: string | null;
-            /** Speed */
             speed: number | null;
             progress: components["schemas"]["RunProgress"] | null;
             summary: components["schemas"]["RunSummary"] | null;
-            /** Error */
             error: string | null;
-            /** Finished */
             finished: number | null;
-            /**
-             * Carla
-             * @default false
-             */
+            /** @default false */
             carla: boolean;
             slices: components["schemas"]["RunSlices"] | null;
-            /** Preparing */
             preparing: string | null;
         };
         /**
-         * RunLanes
          * @description What vehicles did on each lane in each interval of a run.
          *
          *     Interval ``i`` is from ``times[i]`` to ``times[i + 1]``, seconds; rows ``first[i]`` up to
@@ -6285,109 +3421,63 @@ export interface components {
          *     lie on lane ``node_lane[k]``.
          */
         RunLanes: {
-            /** Times */
             times: number[];
-            /** First */
             first: number[];
-            /** Lane */
             lane: number[];
-            /** Distance */
             distance: number[];
-            /** Seconds */
             seconds: number[];
-            /** Time Loss */
             time_loss: number[];
-            /** Lengths */
             lengths: number[];
-            /** Node First */
             node_first: number[];
-            /** Node End */
             node_end: number[];
-            /** Node Lane */
             node_lane: number[];
         };
-        /**
-         * RunProgress
-         * @description How far a run is; ``time_left`` in wall seconds at full speed, if it can be told.
-         */
+        /** @description How far a run is; ``time_left`` in wall seconds at full speed, if it can be told. */
         RunProgress: {
-            /** Time */
             time: number;
-            /** Until */
             until: number;
-            /** Running */
             running: number;
-            /** Departed */
             departed: number;
-            /** Arrived */
             arrived: number;
-            /** Planned */
             planned: number;
-            /** Time Left */
             time_left: number | null;
         };
-        /**
-         * RunShares
-         * @description Share of all vehicle time spent between ``edges[i]`` and ``edges[i + 1]``, m/s.
-         */
+        /** @description Share of all vehicle time spent between ``edges[i]`` and ``edges[i + 1]``, m/s. */
         RunShares: {
-            /** Edges */
             edges: number[];
-            /** Share */
             share: number[];
         };
-        /**
-         * RunSignals
-         * @description What the lights of a finished run showed; none if the map has none.
-         */
+        /** @description What the lights of a finished run showed; none if the map has none. */
         RunSignals: {
-            /** Lights */
             lights: components["schemas"]["ShownStates"][];
         };
         /**
-         * RunSlices
          * @description Slices of a long run: what was simulated up to ``time`` cannot be lost any more.
          *
          *     ``done`` is how many are complete, of ``length`` seconds each.
          */
         RunSlices: {
-            /** Done */
             done: number;
-            /** Length */
             length: number;
-            /** Time */
             time: number;
         };
-        /**
-         * RunSpeeds
-         * @description Speeds of all vehicles in m/s around each ``time``: mean, and 10th and 90th percentile.
-         */
+        /** @description Speeds of all vehicles in m/s around each ``time``: mean, and 10th and 90th percentile. */
         RunSpeeds: {
-            /** Time */
             time: number[];
-            /** Mean */
             mean: (number | null)[];
-            /** Low */
             low: (number | null)[];
-            /** High */
             high: (number | null)[];
         };
-        /**
-         * RunStarted
-         * @description The run's id.
-         */
+        /** @description The run's id. */
         RunStarted: {
-            /** Run */
             run: string;
         };
         /**
-         * RunStatus
          * @description How a run ended; one that a user has stopped early is ``completed``, too.
          * @enum {string}
          */
         RunStatus: "completed" | "failed";
         /**
-         * RunSummary
          * @description Key figures of a run that has ended; seconds, metres, m/s.
          *
          *     ``figures`` are those of ``docs/runs.md`` by name, null where there was nothing to measure.
@@ -6395,110 +3485,67 @@ export interface components {
          *     vehicles, if any. ``files`` are relative to the run's folder.
          */
         RunSummary: {
-            /** Format */
             format: string;
-            /** Version */
             version: number;
             usable: components["schemas"]["UsabilityInfo"] | null;
             status: components["schemas"]["RunStatus"];
-            /** Error */
             error: string | null;
-            /**
-             * Stopped
-             * @default false
-             */
+            /** @default false */
             stopped: boolean;
-            /** Scenario */
             scenario: string;
-            /** Map */
             map: string | null;
-            /** Map Sha256 */
             map_sha256: string | null;
-            /**
-             * Meso
-             * @default false
-             */
+            /** @default false */
             meso: boolean;
-            /** Driven By */
             driven_by: string | null;
-            /** Behaviour */
             behaviour: string | null;
-            /** Behaviour Options */
             behaviour_options: {
                 [key: string]: boolean | number | string;
             };
-            /** Seed */
             seed: number;
-            /** Until */
             until: number;
-            /** Step Length */
             step_length: number;
-            /** Sim Seconds */
             sim_seconds: number | null;
-            /** Steps */
             steps: number | null;
-            /** Wall Seconds */
             wall_seconds: number;
-            /** Real Time Factor */
             real_time_factor: number | null;
             actors: components["schemas"]["SummaryCounts"];
-            /** Insertion Error Max */
             insertion_error_max: number | null;
-            /** Figures */
             figures: {
                 [key: string]: number | null;
             };
             gridlock: components["schemas"]["GridlockInfo"] | null;
-            /** Criteria */
             criteria: components["schemas"]["CriterionInfo"][];
-            /** Expectations */
             expectations: components["schemas"]["ExpectationInfo"][];
-            /** Problems */
             problems: string[];
-            /** Notes */
             notes: string[];
-            /** Files */
             files: {
                 [key: string]: string;
             };
-            /** Versions */
             versions: {
                 [key: string]: string;
             };
             slices: components["schemas"]["SlicesInfo"] | null;
         };
-        /**
-         * Scenario
-         * @description The whole document.
-         */
+        /** @description The whole document. */
         Scenario: {
             /**
-             * Format
              * @default odscen-scenario
              * @constant
              */
             format: "odscen-scenario";
             /**
-             * Version
              * @default 1
              * @constant
              */
             version: 1;
-            /** Name */
             name: string;
-            /**
-             * Description
-             * @default
-             */
+            /** @default  */
             description: string;
             map: components["schemas"]["MapReference"];
             variant: components["schemas"]["Variant"] | null;
-            /**
-             * Seed
-             * @default 0
-             */
+            /** @default 0 */
             seed: number;
-            /** Roi */
             roi: string[];
             /**
              * @default {
@@ -6517,15 +3564,9 @@ export interface components {
              *     }
              */
             drivers: components["schemas"]["Drivers"];
-            /**
-             * Actors
-             * @default []
-             */
+            /** @default [] */
             actors: components["schemas"]["Actor"][];
-            /**
-             * Flows
-             * @default []
-             */
+            /** @default [] */
             flows: components["schemas"]["Flow"][];
             /**
              * @default {
@@ -6570,10 +3611,7 @@ export interface components {
              *     }
              */
             signals: components["schemas"]["Signals"];
-            /**
-             * Measures
-             * @default []
-             */
+            /** @default [] */
             measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
             /**
              * @default {
@@ -6593,178 +3631,106 @@ export interface components {
              *     }
              */
             study: components["schemas"]["Study"];
-            /**
-             * Rules
-             * @default []
-             */
+            /** @default [] */
             rules: components["schemas"]["StoryRule-Output"][];
-            /**
-             * Criteria
-             * @default []
-             */
+            /** @default [] */
             criteria: string[];
-            /** Parameters */
             parameters: {
                 [key: string]: components["schemas"]["Parameter"];
             };
-            /** Formulas */
             formulas: {
                 [key: string]: string;
             };
         };
         /**
-         * ScenarioPatch
          * @description What has become of a scenario since the version that was asked to change.
          *
          *     ``changes`` make the document of ``version`` from that of ``before``, in their order; problems
          *     are asked for apart.
          */
         ScenarioPatch: {
-            /** Name */
             name: string;
-            /** Before */
             before: number;
-            /** Version */
             version: number;
-            /** Changes */
             changes: components["schemas"]["DocumentChange"][];
-            /** Label */
             label: string;
-            /** Undo */
             undo: string | null;
-            /** Redo */
             redo: string | null;
         };
-        /**
-         * ScenarioProblems
-         * @description What is wrong with a scenario at a version.
-         */
+        /** @description What is wrong with a scenario at a version. */
         ScenarioProblems: {
-            /** Version */
             version: number;
-            /** Problems */
             problems: components["schemas"]["ProblemInfo"][];
         };
-        /**
-         * ScenarioRow
-         * @description A scenario in the list; ``error`` if its file cannot be read.
-         */
+        /** @description A scenario in the list; ``error`` if its file cannot be read. */
         ScenarioRow: {
-            /** Name */
             name: string;
-            /** Title */
             title: string | null;
-            /** Map */
             map: string | null;
-            /**
-             * Actors
-             * @default 0
-             */
+            /** @default 0 */
             actors: number;
-            /**
-             * Flows
-             * @default 0
-             */
+            /** @default 0 */
             flows: number;
-            /** Modified */
             modified: number;
-            /** Version */
             version: number;
-            /** Error */
             error: string | null;
         };
-        /**
-         * ScenarioState
-         * @description A scenario as it is now; ``undo`` and ``redo`` name the edit that they would take or give.
-         */
+        /** @description A scenario as it is now; ``undo`` and ``redo`` name the edit that they would take or give. */
         ScenarioState: {
-            /** Name */
             name: string;
-            /** Version */
             version: number;
             document: components["schemas"]["Scenario"];
-            /** Problems */
             problems: components["schemas"]["ProblemInfo"][];
-            /** Label */
             label: string;
-            /** Undo */
             undo: string | null;
-            /** Redo */
             redo: string | null;
         };
-        /**
-         * SegmentInfo
-         * @description A segment and its neighbours, which are rows.
-         */
+        /** @description A segment and its neighbours, which are rows. */
         SegmentInfo: {
-            /** Id */
             id: string;
-            /** Kind */
             kind: string;
-            /** Neighbours */
             neighbours: number[];
         };
-        /**
-         * SemanticsInfo
-         * @description Where the crosswalks, stop lines, lights and signs are.
-         */
+        /** @description Where the crosswalks, stop lines, lights and signs are. */
         SemanticsInfo: {
-            /** Crosswalks */
             crosswalks: components["schemas"]["CrosswalkInfo"][];
-            /** Stop Lines */
             stop_lines: components["schemas"]["StopLineInfo"][];
-            /** Signals */
             signals: components["schemas"]["SignalInfo"][];
         };
         /**
-         * ServedStop
          * @description A stop on a line.
          *
          *     ``after`` is the scheduled departure there, seconds after the departure of the trip; without it
          *     the vehicle goes on after its dwell time. ``dwell`` ``None`` is that of the line.
          */
         "ServedStop-Input": {
-            /** Stop */
             stop: string;
-            /** After */
             after?: number | null;
-            /** Dwell */
             dwell?: (components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"]) | null;
         };
         /**
-         * ServedStop
          * @description A stop on a line.
          *
          *     ``after`` is the scheduled departure there, seconds after the departure of the trip; without it
          *     the vehicle goes on after its dwell time. ``dwell`` ``None`` is that of the line.
          */
         "ServedStop-Output": {
-            /** Stop */
             stop: string;
-            /** After */
             after: number | null;
-            /** Dwell */
             dwell: number | {
                 [key: string]: string | number | number[];
             } | null;
         };
-        /**
-         * SetBackgroundEdit
-         * @description Add background traffic, or change that of this name.
-         */
+        /** @description Add background traffic, or change that of this name. */
         SetBackgroundEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_background";
-            /** Id */
             id?: string;
-            /** Begin */
             begin?: number;
-            /** End */
             end?: number | null;
-            /** Profile */
             profile?: string | null;
             mix?: {
                 car?: number;
@@ -6775,44 +3741,29 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Fill */
             fill?: number | null;
-            /** Per Km */
             per_km?: number | null;
-            /** Trips */
             trips?: number | null;
-            /** Background */
             background: string;
         };
-        /**
-         * SetClockEdit
-         * @description Set the time of day at the start of the run, seconds after midnight.
-         */
+        /** @description Set the time of day at the start of the run, seconds after midnight. */
         SetClockEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_clock";
-            /** Clock */
             clock: number;
         };
-        /**
-         * SetCountsEdit
-         * @description Add counts that traffic is to reproduce, or change those of that name.
-         */
+        /** @description Add counts that traffic is to reproduce, or change those of that name. */
         SetCountsEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_counts";
-            /** Id */
             id?: string;
-            /**
-             * Use
-             * @enum {string}
-             */
+            /** @enum {string} */
             use?: "generate" | "compare";
             mix?: {
                 car?: number;
@@ -6823,213 +3774,138 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Rows */
             rows?: [
                 string,
                 number,
                 number,
                 number
             ][];
-            /** Counts */
             counts: string;
         };
-        /**
-         * SetCriteriaEdit
-         * @description Say what must come out of a run for it to pass; the whole list, in its order.
-         */
+        /** @description Say what must come out of a run for it to pass; the whole list, in its order. */
         SetCriteriaEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_criteria";
-            /** Criteria */
             criteria: string[];
         };
-        /**
-         * SetDetectorEdit
-         * @description Lay a loop before a light, or change one.
-         */
+        /** @description Lay a loop before a light, or change one. */
         SetDetectorEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_detector";
-            /** Id */
             id?: string;
-            /** At */
             at?: string;
-            /** Before */
             before?: number;
-            /** Length */
             length?: number;
-            /** Stages */
             stages?: string[];
-            /** Gap */
             gap?: number;
-            /** Junction */
             junction: string;
-            /** Detector */
             detector: string;
         };
-        /**
-         * SetDriversEdit
-         * @description Change fields of :class:`~odscen.scenario.document.scenario_document.Drivers`.
-         */
+        /** @description Change fields of :class:`~odscen.scenario.document.scenario_document.Drivers`. */
         SetDriversEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_drivers";
-            /** Saturation Flow */
             saturation_flow?: number | null;
-            /** Headway */
             headway?: number | null;
-            /** Gap Acceptance */
             gap_acceptance?: number;
-            /** Lane Change Eagerness */
             lane_change_eagerness?: number;
-            /** Sets */
             sets?: components["schemas"]["DriverSet-Input"][];
-            /** Shares */
             shares?: {
                 [key: string]: number;
             };
         };
-        /**
-         * SetEgoEdit
-         * @description Make one vehicle the ego, and no other; ``None`` leaves none (R42).
-         */
+        /** @description Make one vehicle the ego, and no other; ``None`` leaves none (R42). */
         SetEgoEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_ego";
-            /** Actor */
             actor: string | null;
         };
-        /**
-         * SetEnvironmentEdit
-         * @description Change weather and time of day; a new preset drops the old parameters (R33).
-         */
+        /** @description Change weather and time of day; a new preset drops the old parameters (R33). */
         SetEnvironmentEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_environment";
-            /** Preset */
             preset?: string | null;
-            /** Parameters */
             parameters?: {
                 [key: string]: number;
             } | null;
-            /** Affects Driving */
             affects_driving?: boolean | null;
         };
-        /**
-         * SetFormulaEdit
-         * @description Compute a number of the document from parameters, or let it be a number again.
-         */
+        /** @description Compute a number of the document from parameters, or let it be a number again. */
         SetFormulaEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_formula";
-            /** Place */
             place: string;
-            /** Formula */
             formula: string | null;
         };
-        /**
-         * SetGoalEdit
-         * @description Set the goal of an actor; ``None`` leaves it to the seed.
-         */
+        /** @description Set the goal of an actor; ``None`` leaves it to the seed. */
         SetGoalEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_goal";
-            /** Actor */
             actor: string;
-            /** Goal */
             goal: string | null;
         };
-        /**
-         * SetGreenEdit
-         * @description Give one stage of a light another green; intergreens stay.
-         */
+        /** @description Give one stage of a light another green; intergreens stay. */
         SetGreenEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_green";
-            /** Junction */
             junction: string;
-            /** Stage */
             stage: string;
-            /** Green */
             green: number;
-            /** Plan */
             plan?: string | null;
-            /**
-             * Keep Cycle
-             * @default false
-             */
+            /** @default false */
             keep_cycle?: boolean;
         };
-        /**
-         * SetGroupEdit
-         * @description Put a signal group in, or change it; its movements leave the groups that had them.
-         */
+        /** @description Put a signal group in, or change it; its movements leave the groups that had them. */
         SetGroupEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_group";
-            /** Id */
             id?: string;
-            /** Movements */
             movements?: string[];
-            /** Yellow */
             yellow?: number | null;
-            /** All Red */
             all_red?: number | null;
-            /** Min Green */
             min_green?: number | null;
-            /** Junction */
             junction: string;
-            /** Group */
             group: string;
-            /** Protected */
             protected?: string[] | null;
-            /** Permissive */
             permissive?: string[] | null;
         };
-        /**
-         * SetInputEdit
-         * @description Add vehicles that drive in at the boundary of the region, or change those of that name.
-         */
+        /** @description Add vehicles that drive in at the boundary of the region, or change those of that name. */
         SetInputEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_input";
-            /** Id */
             id?: string;
-            /** Begin */
             begin?: number;
-            /** End */
             end?: number | null;
-            /** Profile */
             profile?: string | null;
             mix?: {
                 car?: number;
@@ -7040,96 +3916,60 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Segment */
             segment?: string;
-            /** Direction */
             direction?: ("forward" | "backward") | null;
-            /** Lanes */
             lanes?: number[];
-            /** Per Hour */
             per_hour?: number | null;
-            /** Volumes */
             volumes?: number[];
-            /** Interval */
             interval?: number;
-            /** To */
             to?: [
                 string,
                 number
             ][];
-            /** Inflow */
             inflow: string;
         };
-        /**
-         * SetIntergreenEdit
-         * @description Say how long after the end of green of a group another may begin.
-         */
+        /** @description Say how long after the end of green of a group another may begin. */
         SetIntergreenEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_intergreen";
-            /** Junction */
             junction: string;
-            /** Ending */
             ending: string;
-            /** Beginning */
             beginning: string;
-            /** Seconds */
             seconds: number | null;
         };
-        /**
-         * SetLineEdit
-         * @description Add a line, or change that of this name.
-         */
+        /** @description Add a line, or change that of this name. */
         SetLineEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_line";
-            /** Id */
             id?: string;
-            /** Start */
             start?: string;
-            /** Goal */
             goal?: string | null;
-            /** Stops */
             stops?: components["schemas"]["ServedStop-Input"][];
-            /** Headway */
             headway?: number | null;
-            /** Begin */
             begin?: number;
-            /** End */
             end?: number | null;
-            /** Departures */
             departures?: number[];
-            /** Dwell */
             dwell?: components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"];
             category?: components["schemas"]["Category"];
-            /** Model */
             model?: string | null;
-            /** Line */
             line: string;
         };
-        /**
-         * SetMatrixEdit
-         * @description Add trips from where to where, or change those of that name.
-         */
+        /** @description Add trips from where to where, or change those of that name. */
         SetMatrixEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_matrix";
-            /** Id */
             id?: string;
-            /** Begin */
             begin?: number;
-            /** End */
             end?: number | null;
-            /** Profile */
             profile?: string | null;
             mix?: {
                 car?: number;
@@ -7140,177 +3980,113 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Trips */
             trips?: [
                 string,
                 string,
                 number
             ][];
-            /** Matrix */
             matrix: string;
         };
-        /**
-         * SetMeasureEdit
-         * @description Add a measure, or put it in the place of that with its id; of another kind, too.
-         */
+        /** @description Add a measure, or put it in the place of that with its id; of another kind, too. */
         SetMeasureEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_measure";
-            /** Measure */
             measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
-            /** Instead Of */
             instead_of?: string | null;
         };
-        /**
-         * SetOffsetEdit
-         * @description Let the program of a light begin so many seconds into the scenario.
-         */
+        /** @description Let the program of a light begin so many seconds into the scenario. */
         SetOffsetEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_offset";
-            /** Junction */
             junction: string;
-            /** Offset */
             offset: number;
-            /** Plan */
             plan?: string | null;
         };
-        /**
-         * SetParameterEdit
-         * @description Add a parameter, or change one; every number that is computed from it follows.
-         */
+        /** @description Add a parameter, or change one; every number that is computed from it follows. */
         SetParameterEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_parameter";
-            /** Value */
             value?: number;
-            /** Unit */
             unit?: string;
-            /** Min */
             min?: number | null;
-            /** Max */
             max?: number | null;
-            /** Description */
             description?: string;
-            /** Parameter */
             parameter: string;
-            /** Instead Of */
             instead_of?: string | null;
         };
-        /**
-         * SetParkingEdit
-         * @description Change which trips of the demand begin and end in parking places.
-         */
+        /** @description Change which trips of the demand begin and end in parking places. */
         SetParkingEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_parking";
-            /** Begin */
             begin?: number;
-            /** End */
             end?: number;
-            /** Stay */
             stay?: components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"];
-            /** Within */
             within?: number;
         };
-        /**
-         * SetPlanEdit
-         * @description Put a plan of the day in, or change one.
-         */
+        /** @description Put a plan of the day in, or change one. */
         SetPlanEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_plan";
-            /** Id */
             id?: string;
-            /** Times */
             times?: string[];
-            /** Cycle */
             cycle?: number | null;
-            /** Offset */
             offset?: number;
-            /** Stages */
             stages?: string[];
-            /** Green */
             green?: {
                 [key: string]: number;
             };
-            /** Min Green */
             min_green?: {
                 [key: string]: number;
             };
-            /** Max Green */
             max_green?: {
                 [key: string]: number;
             };
-            /** Junction */
             junction: string;
-            /** Plan */
             plan: string;
         };
-        /**
-         * SetProfileEdit
-         * @description Give the scenario a day profile of its own; one of that name is replaced.
-         */
+        /** @description Give the scenario a day profile of its own; one of that name is replaced. */
         SetProfileEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_profile";
-            /** Profile */
             profile: string;
-            /** Shares */
             shares: number[];
         };
-        /**
-         * SetRoutesEdit
-         * @description Change how trips of the demand choose their routes.
-         */
+        /** @description Change how trips of the demand choose their routes. */
         SetRoutesEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_routes";
-            /**
-             * By
-             * @enum {string}
-             */
+            /** @enum {string} */
             by?: "length" | "travel_time";
-            /** Iterations */
             iterations?: number;
-            /** Gap */
             gap?: number;
-            /** Interval */
             interval?: number;
-            /** Spread */
             spread?: number;
-            /** Informed */
             informed?: number;
-            /** Period */
             period?: number;
-            /** Shares */
             shares?: components["schemas"]["SharedRoutes"][];
         };
-        /**
-         * SetRuleEdit
-         * @description Add a rule, or put it in the place of that with its id.
-         */
+        /** @description Add a rule, or put it in the place of that with its id. */
         SetRuleEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
@@ -7318,270 +4094,170 @@ export interface components {
              */
             kind: "set_rule";
             rule: components["schemas"]["StoryRule-Input"];
-            /** Instead Of */
             instead_of?: string | null;
         };
-        /**
-         * SetSeedEdit
-         * @description Set the random seed of the open goals and of the run.
-         */
+        /** @description Set the random seed of the open goals and of the run. */
         SetSeedEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_seed";
-            /** Seed */
             seed: number;
         };
-        /**
-         * SetSignalControlEdit
-         * @description Say how all traffic lights are run that have no control of their own.
-         */
+        /** @description Say how all traffic lights are run that have no control of their own. */
         SetSignalControlEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_signal_control";
-            /**
-             * Control
-             * @enum {string}
-             */
+            /** @enum {string} */
             control: "fixed" | "actuated";
         };
-        /**
-         * SetSimulationEdit
-         * @description Change fields of :class:`~odscen.scenario.document.scenario_document.Simulation`.
-         */
+        /** @description Change fields of :class:`~odscen.scenario.document.scenario_document.Simulation`. */
         SetSimulationEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_simulation";
-            /** Duration */
             duration?: number;
-            /** Step Length */
             step_length?: number;
-            /** Action Step */
             action_step?: number | null;
-            /** Lateral Resolution */
             lateral_resolution?: number | null;
-            /** Teleport After */
             teleport_after?: number;
-            /**
-             * Pedestrians
-             * @enum {string}
-             */
+            /** @enum {string} */
             pedestrians?: "striping" | "nonInteracting";
         };
-        /**
-         * SetStageEdit
-         * @description Change fields of a stage of a program of the scenario's own, such as ``on_call``.
-         */
+        /** @description Change fields of a stage of a program of the scenario's own, such as ``on_call``. */
         SetStageEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_stage";
-            /** Id */
             id?: string;
-            /** Protected */
             protected?: string[];
-            /** Permissive */
             permissive?: string[];
-            /** Green */
             green?: number;
-            /** Min Green */
             min_green?: number | null;
-            /** Max Green */
             max_green?: number | null;
-            /** On Call */
             on_call?: boolean;
-            /** Junction */
             junction: string;
-            /** Stage */
             stage: string;
         };
-        /**
-         * SetStopEdit
-         * @description Add a stop, or change that of this name.
-         */
+        /** @description Add a stop, or change that of this name. */
         SetStopEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_stop";
-            /** Id */
             id?: string;
-            /** Name */
             name?: string;
-            /** Node */
             node?: string;
-            /** Length */
             length?: number;
-            /** Bay */
             bay?: boolean;
-            /** Stop */
             stop: string;
         };
-        /**
-         * SetStudyEdit
-         * @description Change the warm-up, the analysis interval, or the stations.
-         */
+        /** @description Change the warm-up, the analysis interval, or the stations. */
         SetStudyEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_study";
-            /** Warm Up */
             warm_up?: number;
-            /** Interval */
             interval?: number | null;
-            /** Detectors */
             detectors?: components["schemas"]["Detector"][];
-            /** Sections */
             sections?: components["schemas"]["TravelTimeSection"][];
-            /** Cordons */
             cordons?: components["schemas"]["Cordon"][];
         };
-        /**
-         * SetTimingEdit
-         * @description Change how the traffic light of one junction is timed.
-         */
+        /** @description Change how the traffic light of one junction is timed. */
         SetTimingEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_timing";
-            /** Junction */
             junction: string;
-            /** Control */
             control?: ("fixed" | "actuated") | null;
-            /** Offset */
             offset?: number;
-            /** Green */
             green?: number[];
-            /** Cycle */
             cycle?: number | null;
-            /** Coordination */
             coordination?: string | null;
-            /** Groups */
             groups?: components["schemas"]["ProgramGroup-Input"][];
-            /** Stages */
             stages?: components["schemas"]["ProgramStage-Input"][];
-            /** Intergreens */
             intergreens?: [
                 string,
                 string,
                 number
             ][];
-            /** Detectors */
             detectors?: components["schemas"]["SignalDetector-Input"][];
-            /** Plans */
             plans?: components["schemas"]["DayPlan-Input"][];
-            /** Bus Priority */
             bus_priority?: boolean | null;
         };
-        /**
-         * SetTurnEdit
-         * @description Let a turn across oncoming traffic go through its gaps, with an arrow of its own, or both.
-         */
+        /** @description Let a turn across oncoming traffic go through its gaps, with an arrow of its own, or both. */
         SetTurnEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_turn";
-            /** Junction */
             junction: string;
-            /** Approach */
             approach: string;
-            /**
-             * Treatment
-             * @enum {string}
-             */
+            /** @enum {string} */
             treatment: "permissive" | "protected" | "both";
             /**
-             * Turn
              * @default left
              * @enum {string}
              */
             turn?: "left" | "right";
         };
-        /**
-         * SetZoneEdit
-         * @description Give segments a name that matrices can use; a zone of that name is replaced.
-         */
+        /** @description Give segments a name that matrices can use; a zone of that name is replaced. */
         SetZoneEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "set_zone";
-            /** Zone */
             zone: string;
-            /** Segments */
             segments: string[];
         };
         /**
-         * SharedRoutes
          * @description Trips from ``origin`` to ``destination`` are dealt out to routes by fixed shares.
          *
          *     Both are zones or segments. Each of ``routes`` is the segments it leads over and its share.
          */
         SharedRoutes: {
-            /** Origin */
             origin: string;
-            /** Destination */
             destination: string;
-            /** Routes */
             routes: [
                 string[],
                 number
             ][];
         };
-        /**
-         * ShownStates
-         * @description What a light showed: from ``times[i]`` on ``states[shown[i]]`` of ``plans[i]``; seconds.
-         */
+        /** @description What a light showed: from ``times[i]`` on ``states[shown[i]]`` of ``plans[i]``; seconds. */
         ShownStates: {
-            /** Light */
             light: string;
-            /** Times */
             times: number[];
-            /** Shown */
             shown: number[];
-            /** Plans */
             plans: string[];
-            /** States */
             states: string[];
         };
-        /**
-         * ShrinkRoiEdit
-         * @description Take a segment out of the region of interest (R29).
-         */
+        /** @description Take a segment out of the region of interest (R29). */
         ShrinkRoiEdit: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "shrink_roi";
-            /** Segment */
             segment: string;
-            /**
-             * With Actors
-             * @default false
-             */
+            /** @default false */
             with_actors?: boolean;
         };
         /**
-         * SignalDetector
          * @description A loop in the road, and the stages that it prolongs.
          *
          *     ``at`` is an approach (``r12``: a loop in each lane) or a lane (``12.0.-1``); ``before`` the
@@ -7589,30 +4265,17 @@ export interface components {
          *     pass between vehicles.
          */
         "SignalDetector-Input": {
-            /** Id */
             id: string;
-            /** At */
             at: string;
-            /**
-             * Before
-             * @default 30
-             */
+            /** @default 30 */
             before?: number;
-            /**
-             * Length
-             * @default 2
-             */
+            /** @default 2 */
             length?: number;
-            /** Stages */
             stages: string[];
-            /**
-             * Gap
-             * @default 3
-             */
+            /** @default 3 */
             gap?: number;
         };
         /**
-         * SignalDetector
          * @description A loop in the road, and the stages that it prolongs.
          *
          *     ``at`` is an approach (``r12``: a loop in each lane) or a lane (``12.0.-1``); ``before`` the
@@ -7620,183 +4283,126 @@ export interface components {
          *     pass between vehicles.
          */
         "SignalDetector-Output": {
-            /** Id */
             id: string;
-            /** At */
             at: string;
-            /**
-             * Before
-             * @default 30
-             */
+            /** @default 30 */
             before: number;
-            /**
-             * Length
-             * @default 2
-             */
+            /** @default 2 */
             length: number;
-            /** Stages */
             stages: string[];
-            /**
-             * Gap
-             * @default 3
-             */
+            /** @default 3 */
             gap: number;
         };
         /**
-         * SignalInfo
          * @description A light or sign; metres, ``value`` of a speed limit in m/s.
          *
          *     It holds for lanes from the first to the second of each pair; for all if there is none.
          */
         SignalInfo: {
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "traffic_light" | "pedestrian_light" | "stop" | "yield" | "speed_limit" | "other";
-            /** Id */
             id: string;
-            /** Road */
             road: string;
-            /** S */
             s: number;
-            /** T */
             t: number;
-            /** X */
             x: number;
-            /** Y */
             y: number;
-            /** Z */
             z: number;
-            /** Orientation */
             orientation: string;
-            /** Lanes */
             lanes: [
                 number,
                 number
             ][];
-            /** Value */
             value: number | null;
         };
         /**
-         * SignalOutage
          * @description A traffic light out of order.
          *
          *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
          *     named as in the timing of signals.
          */
         "SignalOutage-Input": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin?: number;
-            /** End */
             end?: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "signal_outage";
-            /** Junction */
             junction: string;
             /**
-             * Shows
              * @default off
              * @enum {string}
              */
             shows?: "off" | "flashing";
         };
         /**
-         * SignalOutage
          * @description A traffic light out of order.
          *
          *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
          *     named as in the timing of signals.
          */
         "SignalOutage-Output": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "signal_outage";
-            /** Junction */
             junction: string;
             /**
-             * Shows
              * @default off
              * @enum {string}
              */
             shows: "off" | "flashing";
         };
         /**
-         * SignalShows
          * @description A movement of a traffic light shows a colour.
          *
          *     ``light`` is the junction, ``movement`` a name as in signal programs, ``r1>r2`` or ``walk r1``.
          */
         SignalShows: {
-            /** Light */
             light: string;
-            /** Movement */
             movement: string;
-            /**
-             * Shows
-             * @enum {string}
-             */
+            /** @enum {string} */
             shows: "red" | "yellow" | "green";
         };
         /**
-         * SignalSwitch
          * @description Switch a traffic light.
          *
          *     ``green``: its program jumps to where ``movement`` has green, and resumes from there. ``off``:
          *     right of way as without lights. ``program``: the program that ran before.
          */
         "SignalSwitch-Input": {
-            /** Light */
             light: string;
             /**
-             * Shows
              * @default green
              * @enum {string}
              */
             shows?: "green" | "off" | "program";
-            /** Movement */
             movement?: string | null;
         };
         /**
-         * SignalSwitch
          * @description Switch a traffic light.
          *
          *     ``green``: its program jumps to where ``movement`` has green, and resumes from there. ``off``:
          *     right of way as without lights. ``program``: the program that ran before.
          */
         "SignalSwitch-Output": {
-            /** Light */
             light: string;
             /**
-             * Shows
              * @default green
              * @enum {string}
              */
             shows: "green" | "off" | "program";
-            /** Movement */
             movement: string | null;
         };
         /**
-         * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
          *
          *     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
@@ -7804,24 +4410,16 @@ export interface components {
          */
         Signals: {
             /**
-             * Control
              * @default fixed
              * @enum {string}
              */
             control: "fixed" | "actuated";
-            /**
-             * Bus Priority
-             * @default false
-             */
+            /** @default false */
             bus_priority: boolean;
-            /**
-             * Junctions
-             * @default []
-             */
+            /** @default [] */
             junctions: components["schemas"]["JunctionTiming"][];
         };
         /**
-         * Simulation
          * @description How the scenario is run unless the command says otherwise; seconds.
          *
          *     ``action_step`` is the time between decisions of a driver, where it is more than a step.
@@ -7830,152 +4428,94 @@ export interface components {
          *     is never. ``pedestrians`` is SUMO's model: in ``striping`` they walk around each other.
          */
         Simulation: {
-            /**
-             * Duration
-             * @default 600
-             */
+            /** @default 600 */
             duration: number;
-            /**
-             * Step Length
-             * @default 0.5
-             */
+            /** @default 0.5 */
             step_length: number;
-            /** Action Step */
             action_step: number | null;
-            /** Lateral Resolution */
             lateral_resolution: number | null;
-            /**
-             * Teleport After
-             * @default 300
-             */
+            /** @default 300 */
             teleport_after: number;
             /**
-             * Pedestrians
              * @default striping
              * @enum {string}
              */
             pedestrians: "striping" | "nonInteracting";
         };
-        /**
-         * SliceInfo
-         * @description A slice of a long run: its end, and what it took up to there; megabytes.
-         */
+        /** @description A slice of a long run: its end, and what it took up to there; megabytes. */
         SliceInfo: {
-            /** Time */
             time: number;
-            /** Running */
             running: number;
-            /** Steps */
             steps: number;
-            /** Wall Seconds */
             wall_seconds: number;
-            /** Memory Mb */
             memory_mb: number;
         };
-        /**
-         * SlicesInfo
-         * @description Slices that are complete, up to ``time`` in seconds.
-         */
+        /** @description Slices that are complete, up to ``time`` in seconds. */
         SlicesInfo: {
-            /** Time */
             time: number;
-            /** Done */
             done: components["schemas"]["SliceInfo"][];
         };
         /**
-         * SpeedChange
          * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
          *
          *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
          */
         "SpeedChange-Input": {
-            /** To */
             to: number;
             /**
-             * Shape
              * @default linear
              * @enum {string}
              */
             shape?: "step" | "linear" | "cosine";
-            /** Rate */
             rate?: number | null;
-            /** Over */
             over?: number | null;
-            /** Within */
             within?: number | null;
         };
         /**
-         * SpeedChange
          * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
          *
          *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
          */
         "SpeedChange-Output": {
-            /** To */
             to: number;
             /**
-             * Shape
              * @default linear
              * @enum {string}
              */
             shape: "step" | "linear" | "cosine";
-            /** Rate */
             rate: number | null;
-            /** Over */
             over: number | null;
-            /** Within */
             within: number | null;
         };
-        /**
-         * SpeedLimit
-         * @description Another speed limit, m/s; of several at a place the lowest holds.
-         */
+        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
         "SpeedLimit-Input": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin?: number;
-            /** End */
             end?: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "speed_limit";
-            /** Places */
             places: string[];
-            /** Speed */
             speed: number;
         };
-        /**
-         * SpeedLimit
-         * @description Another speed limit, m/s; of several at a place the lowest holds.
-         */
+        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
         "SpeedLimit-Output": {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "speed_limit";
-            /** Places */
             places: string[];
-            /** Speed */
             speed: number;
         };
         /**
-         * StageInfo
          * @description A stage in the cycle of a plan; seconds.
          *
          *     ``split`` lasts from ``begin`` until the next stage begins; ``least`` and ``most`` are those of
@@ -7983,241 +4523,138 @@ export interface components {
          *     gives way. ``picture`` is SVG.
          */
         StageInfo: {
-            /** Id */
             id: string;
-            /** Begin */
             begin: number;
-            /** End */
             end: number;
-            /** Split */
             split: number;
-            /** Least */
             least: number;
-            /** Most */
             most: number;
-            /** On Call */
             on_call: boolean;
-            /** Groups */
             groups: string[];
-            /** Permissive */
             permissive: string[];
-            /** Words */
             words: string;
-            /** Picture */
             picture: string;
         };
-        /**
-         * Standing
-         * @description An actor has been stopped for so many seconds.
-         */
+        /** @description An actor has been stopped for so many seconds. */
         "Standing-Input": {
-            /** Of */
             of?: string | null;
-            /**
-             * Seconds
-             * @default 0
-             */
+            /** @default 0 */
             seconds?: number;
         };
-        /**
-         * Standing
-         * @description An actor has been stopped for so many seconds.
-         */
+        /** @description An actor has been stopped for so many seconds. */
         "Standing-Output": {
-            /** Of */
             of: string | null;
-            /**
-             * Seconds
-             * @default 0
-             */
+            /** @default 0 */
             seconds: number;
         };
-        /**
-         * StopLineInfo
-         * @description A stop line from end to end.
-         */
+        /** @description A stop line from end to end. */
         StopLineInfo: {
-            /** Id */
             id: string;
-            /** Road */
             road: string;
-            /** Ends */
             ends: [
                 number,
                 number
             ][];
         };
         /**
-         * StopReason
          * @description Why vehicles are stopped for minutes, or are not inserted, as far as it shows.
          * @enum {string}
          */
         StopReason: "vehicles wait for each other in a circle" | "its lane does not lead on along its way" | "it did not get to the lane that its way needs" | "a red light" | "people on a crossing" | "it has to give way to traffic that does not end" | "no room on the road ahead" | "no room where they start" | "the reason does not show";
-        /**
-         * Stopping
-         * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
-         */
+        /** @description Come to a standstill after exactly ``within`` metres, or at once, until `go`. */
         "Stopping-Input": {
-            /** Within */
             within?: number | null;
         };
-        /**
-         * Stopping
-         * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
-         */
+        /** @description Come to a standstill after exactly ``within`` metres, or at once, until `go`. */
         "Stopping-Output": {
-            /** Within */
             within: number | null;
         };
         /**
-         * StoryRule
          * @description When a condition holds, an actor does something; items of ``then`` follow one another.
          *
          *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
          *     does is over.
          */
         "StoryRule-Input": {
-            /** Id */
             id: string;
-            /** Actor */
             actor: string;
             when: components["schemas"]["Condition-Input"];
-            /** Then */
             then: components["schemas"]["Action-Input"][];
-            /**
-             * Times
-             * @default 1
-             */
+            /** @default 1 */
             times?: number;
         };
         /**
-         * StoryRule
          * @description When a condition holds, an actor does something; items of ``then`` follow one another.
          *
          *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
          *     does is over.
          */
         "StoryRule-Output": {
-            /** Id */
             id: string;
-            /** Actor */
             actor: string;
             when: components["schemas"]["Condition-Output"];
-            /** Then */
             then: components["schemas"]["Action-Output"][];
-            /**
-             * Times
-             * @default 1
-             */
+            /** @default 1 */
             times: number;
         };
         /**
-         * Study
          * @description What of a run is analysed, and where it is measured besides.
          *
          *     ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
          *     over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
          */
         Study: {
-            /**
-             * Warm Up
-             * @default 0
-             */
+            /** @default 0 */
             warm_up: number;
-            /** Interval */
             interval: number | null;
-            /**
-             * Detectors
-             * @default []
-             */
+            /** @default [] */
             detectors: components["schemas"]["Detector"][];
-            /**
-             * Sections
-             * @default []
-             */
+            /** @default [] */
             sections: components["schemas"]["TravelTimeSection"][];
-            /**
-             * Cordons
-             * @default []
-             */
+            /** @default [] */
             cordons: components["schemas"]["Cordon"][];
         };
-        /**
-         * StudyFigure
-         * @description A figure that runs of a study have.
-         */
+        /** @description A figure that runs of a study have. */
         StudyFigure: {
-            /** Name */
             name: string;
-            /** Label */
             label: string;
-            /** Unit */
             unit: string;
         };
         /**
-         * StudyInfo
          * @description A study: what it runs, and how far it is.
          *
          *     ``elsewhere`` is whether another process works on it, which this server cannot stop.
          *     ``seconds_left`` is null while nothing is known of it.
          */
         StudyInfo: {
-            /** Study */
             study: string;
-            /**
-             * State
-             * @enum {string}
-             */
+            /** @enum {string} */
             state: "running" | "done" | "stopped" | "failed";
-            /** Elsewhere */
             elsewhere: boolean;
-            /** Scenarios */
             scenarios: string[];
-            /** Variants */
             variants: string[];
-            /** Seeds */
             seeds: number;
-            /** Runs */
             runs: number;
-            /** Ended */
             ended: number;
-            /** Completed */
             completed: number;
-            /** Problems */
             problems: components["schemas"]["StudyProblem"][];
-            /** Seconds Left */
             seconds_left: number | null;
-            /** Error */
             error: string | null;
-            /** Changed */
             changed: number;
         };
-        /**
-         * StudyProblem
-         * @description Why so many runs failed, or were not possible.
-         */
+        /** @description Why so many runs failed, or were not possible. */
         StudyProblem: {
-            /** Words */
             words: string;
-            /** Runs */
             runs: number;
         };
-        /**
-         * StudyResults
-         * @description One figure of a study, of all runs that have completed by now.
-         */
+        /** @description One figure of a study, of all runs that have completed by now. */
         StudyResults: {
-            /** Figures */
             figures: components["schemas"]["StudyFigure"][];
-            /** Figure */
             figure: string;
-            /** Groups */
             groups: components["schemas"]["FigureGroup"][];
-            /** Differences */
             differences: components["schemas"]["FigureGroup"][];
         };
         /**
-         * StudyWish
          * @description Scenarios as they are now, each with every weather and every seed.
          *
          *     ``weather`` are presets; the scenario as designed is run as well. ``seeds`` counts from 1,
@@ -8225,98 +4662,55 @@ export interface components {
          *     carried out at a time.
          */
         StudyWish: {
-            /** Name */
             name?: string | null;
-            /** Scenarios */
             scenarios: string[];
-            /**
-             * Seeds
-             * @default 1
-             */
+            /** @default 1 */
             seeds?: number;
-            /**
-             * Weather
-             * @default []
-             */
+            /** @default [] */
             weather?: string[];
-            /** Until */
             until?: number | null;
-            /**
-             * Processes
-             * @default 1
-             */
+            /** @default 1 */
             processes?: number;
         };
-        /**
-         * SummaryCounts
-         * @description Actors by outcome, see ``docs/runs.md``; a failed run has ``planned`` only.
-         */
+        /** @description Actors by outcome, see ``docs/runs.md``; a failed run has ``planned`` only. */
         SummaryCounts: {
-            /** Planned */
             planned: number;
-            /** Inserted */
             inserted: number | null;
-            /** Arrived */
             arrived: number | null;
-            /** Running */
             running: number | null;
-            /** Waiting */
             waiting: number | null;
-            /** Stranded */
             stranded: number | null;
-            /** Teleported */
             teleported: number | null;
-            /** Collided */
             collided: number | null;
-            /** Emergency Stopped */
             emergency_stopped: number | null;
         };
         /**
-         * SummaryPart
          * @description Parts of ``summary.json`` that hold figures; ``actors`` are counts of actors.
          * @enum {string}
          */
         SummaryPart: "" | "actors" | "figures";
         /**
-         * SweepCase
          * @description One case: values of the parameters and of the columns, in their order.
          *
          *     ``safe`` is null where it has not been run, and ``detail`` says why. ``collision`` is a column
          *     as well, 1 or 0.
          */
         SweepCase: {
-            /** Case */
             case: string;
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "completed" | "failed" | "refused" | "waiting";
-            /** Safe */
             safe: boolean | null;
-            /** Detail */
             detail: string | null;
-            /** Values */
             values: number[];
-            /** Measures */
             measures: (number | null)[];
         };
-        /**
-         * SweepCases
-         * @description The table of a sweep, and ends of the stretches of the boundary between safe and not.
-         */
+        /** @description The table of a sweep, and ends of the stretches of the boundary between safe and not. */
         SweepCases: {
-            /** Sweep */
             sweep: string;
-            /** Limits */
             limits: string[];
-            /** Parameters */
             parameters: components["schemas"]["SweepParameter"][];
-            /** Columns */
             columns: components["schemas"]["SweepColumn"][];
-            /** Cases */
             cases: components["schemas"]["SweepCase"][];
-            /** Boundary */
             boundary: [
                 [
                     number,
@@ -8328,64 +4722,38 @@ export interface components {
                 ]
             ][];
         };
-        /**
-         * SweepColumn
-         * @description A measure of cases.
-         */
+        /** @description A measure of cases. */
         SweepColumn: {
-            /** Name */
             name: string;
-            /** Unit */
             unit: string;
         };
         /**
-         * SweepInfo
          * @description A sweep: what is varied, and how far it is.
          *
          *     ``seconds_left`` is null while nothing is known of it. ``safe`` and ``unsafe`` count cases once
          *     all have ended.
          */
         SweepInfo: {
-            /** Sweep */
             sweep: string;
-            /** Scenario */
             scenario: string;
-            /**
-             * State
-             * @enum {string}
-             */
+            /** @enum {string} */
             state: "running" | "done" | "stopped" | "failed";
-            /** Parameters */
             parameters: string[];
-            /** Method */
             method: string;
-            /** Cases */
             cases: number;
-            /** Ended */
             ended: number;
-            /** Seconds Left */
             seconds_left: number | null;
-            /** Safe */
             safe: number | null;
-            /** Unsafe */
             unsafe: number | null;
-            /** Error */
             error: string | null;
-            /** Changed */
             changed: number;
         };
-        /**
-         * SweepParameter
-         * @description What is varied.
-         */
+        /** @description What is varied. */
         SweepParameter: {
-            /** Name */
             name: string;
-            /** Unit */
             unit: string;
         };
         /**
-         * SweepWish
          * @description A sweep of a scenario as it is now; parameters that are not varied keep their values.
          *
          *     ``samples`` is how many cases, of all methods but the grid, and ``sample_seed`` is of them.
@@ -8393,218 +4761,118 @@ export interface components {
          *     ``seed`` stands in for the scenario's, ``processes`` is how many cases run at a time.
          */
         SweepWish: {
-            /** Scenario */
             scenario: string;
-            /** Vary */
             vary: (components["schemas"]["VaryWish"] | components["schemas"]["TableWish"])[];
-            /**
-             * Method
-             * @default grid
-             */
+            /** @default grid */
             method?: string;
-            /** Samples */
             samples?: number | null;
-            /**
-             * Sample Seed
-             * @default 0
-             */
+            /** @default 0 */
             sample_seed?: number;
-            /**
-             * Safe
-             * @default []
-             */
+            /** @default [] */
             safe?: string[];
-            /**
-             * Figures
-             * @default []
-             */
+            /** @default [] */
             figures?: string[];
-            /** Seed */
             seed?: number | null;
-            /**
-             * Processes
-             * @default 1
-             */
+            /** @default 1 */
             processes?: number;
         };
-        /**
-         * TableWish
-         * @description Parameters that take values together: each row of ``table`` has one for each of them.
-         */
+        /** @description Parameters that take values together: each row of ``table`` has one for each of them. */
         TableWish: {
-            /** Parameters */
             parameters: string[];
-            /** Table */
             table: number[][];
         };
-        /**
-         * TemplateInfo
-         * @description A scene that can be placed on maps.
-         */
+        /** @description A scene that can be placed on maps. */
         TemplateInfo: {
-            /** Name */
             name: string;
-            /** Title */
             title: string;
-            /** Summary */
             summary: string;
-            /** Source */
             source: string;
-            /** Needs */
             needs: string;
-            /** Numbers */
             numbers: components["schemas"]["TemplateNumber"][];
         };
-        /**
-         * TemplateNumber
-         * @description A number of a template; ``usual`` ``null`` follows from the others, as ``meaning`` says.
-         */
+        /** @description A number of a template; ``usual`` ``null`` follows from the others, as ``meaning`` says. */
         TemplateNumber: {
-            /** Name */
             name: string;
-            /** Usual */
             usual: number | null;
-            /** Low */
             low: number;
-            /** High */
             high: number;
-            /** Unit */
             unit: string;
-            /** Meaning */
             meaning: string;
         };
         /**
-         * TimedSignalsState
          * @description A scenario whose lights have been timed, and in words what came of it.
          *
          *     ``picture`` is the time-space diagram of a corridor as SVG, else empty.
          */
         TimedSignalsState: {
             state: components["schemas"]["ScenarioState"];
-            /** Notes */
             notes: string[];
-            /** Picture */
             picture: string;
         };
-        /**
-         * Touching
-         * @description The body of an actor touches that of another one, or of any that a rule names.
-         */
+        /** @description The body of an actor touches that of another one, or of any that a rule names. */
         "Touching-Input": {
-            /** Of */
             of?: string | null;
-            /** To */
             to?: string | null;
         };
-        /**
-         * Touching
-         * @description The body of an actor touches that of another one, or of any that a rule names.
-         */
+        /** @description The body of an actor touches that of another one, or of any that a rule names. */
         "Touching-Output": {
-            /** Of */
             of: string | null;
-            /** To */
             to: string | null;
         };
-        /**
-         * Transit
-         * @description Stops and lines of a scenario.
-         */
+        /** @description Stops and lines of a scenario. */
         Transit: {
-            /**
-             * Stops
-             * @default []
-             */
+            /** @default [] */
             stops: components["schemas"]["TransitStop"][];
-            /**
-             * Lines
-             * @default []
-             */
+            /** @default [] */
             lines: components["schemas"]["TransitLine"][];
         };
         /**
-         * TransitLine
          * @description A line: trips from the node ``start`` by its stops to the node ``goal``.
          *
          *     Trips depart every ``headway`` seconds from ``begin`` until before ``end`` (``None``: the end of
          *     the run), or at the times ``departures``. Dwell times (s) are drawn for each trip and stop.
          */
         TransitLine: {
-            /** Id */
             id: string;
-            /** Start */
             start: string;
-            /** Goal */
             goal: string | null;
-            /** Stops */
             stops: components["schemas"]["ServedStop-Output"][];
-            /** Headway */
             headway: number | null;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
-            /**
-             * Departures
-             * @default []
-             */
+            /** @default [] */
             departures: number[];
-            /**
-             * Dwell
-             * @default 20
-             */
+            /** @default 20 */
             dwell: number | {
                 [key: string]: string | number | number[];
             };
             /** @default bus */
             category: components["schemas"]["Category"];
-            /** Model */
             model: string | null;
         };
         /**
-         * TransitStop
          * @description A place where vehicles of lines stop; ``node`` is in the middle of its ``length`` (metres).
          *
          *     In a ``bay`` they stand beside the lane and hold up no other vehicle.
          */
         TransitStop: {
-            /** Id */
             id: string;
-            /**
-             * Name
-             * @default
-             */
+            /** @default  */
             name: string;
-            /** Node */
             node: string;
-            /**
-             * Length
-             * @default 15
-             */
+            /** @default 15 */
             length: number;
-            /**
-             * Bay
-             * @default false
-             */
+            /** @default false */
             bay: boolean;
         };
-        /**
-         * TravelTimeSection
-         * @description Measures the time from one line to another, of the vehicles that cross both.
-         */
+        /** @description Measures the time from one line to another, of the vehicles that cross both. */
         TravelTimeSection: {
-            /** Id */
             id: string;
-            /** Begin */
             begin: string[];
-            /** End */
             end: string[];
         };
         /**
-         * TripParking
          * @description Shares of the cars of matrices, inputs and background that park.
          *
          *     ``begin`` is the share that begin in a parking place (inputs begin at the boundary), ``end``
@@ -8613,108 +4881,68 @@ export interface components {
          *     metres from where the trip would begin or end; elsewhere anywhere in the region.
          */
         TripParking: {
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /**
-             * End
-             * @default 0
-             */
+            /** @default 0 */
             end: number;
-            /**
-             * Stay
-             * @default 3600
-             */
+            /** @default 3600 */
             stay: number | {
                 [key: string]: string | number | number[];
             };
-            /**
-             * Within
-             * @default 300
-             */
+            /** @default 300 */
             within: number;
         };
         /**
-         * TurnInfo
          * @description A turn across oncoming traffic, and how it is treated in the first plan.
          *
          *     ``both`` is protected in one stage and permissive in another. ``alone`` if no other movement
          *     uses its lanes, so that it can have an arrow.
          */
         TurnInfo: {
-            /** Approach */
             approach: string;
-            /**
-             * Turn
-             * @enum {string}
-             */
+            /** @enum {string} */
             turn: "left" | "right";
-            /**
-             * Treatment
-             * @enum {string}
-             */
+            /** @enum {string} */
             treatment: "permissive" | "protected" | "both";
-            /** Alone */
             alone: boolean;
         };
-        /**
-         * Uniform
-         * @description Any number from ``low`` to ``high``.
-         */
+        /** @description Any number from ``low`` to ``high``. */
         "Uniform-Input": {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "uniform";
-            /** Low */
             low: number;
-            /** High */
             high: number;
         };
-        /**
-         * Uniform
-         * @description Any number from ``low`` to ``high``.
-         */
+        /** @description Any number from ``low`` to ``high``. */
         "Uniform-Output": {
             /**
-             * Kind
              * @default uniform
              * @constant
              */
             kind: "uniform";
-            /** Low */
             low: number;
-            /** High */
             high: number;
         };
-        /**
-         * UsabilityInfo
-         * @description Whether the figures of a run can be used, in one line and reason by reason.
-         */
+        /** @description Whether the figures of a run can be used, in one line and reason by reason. */
         UsabilityInfo: {
             level: components["schemas"]["UsabilityLevel"];
-            /** Headline */
             headline: string;
-            /** Reasons */
             reasons: components["schemas"]["UsabilityReason"][];
         };
         /**
-         * UsabilityKind
          * @description What can be wrong with a run as a whole.
          * @enum {string}
          */
         UsabilityKind: "failed" | "gridlock" | "not inserted" | "teleported" | "demand not served" | "latent delay" | "stopped early";
         /**
-         * UsabilityLevel
          * @description Whether the figures of a run can be used.
          * @enum {string}
          */
         UsabilityLevel: "usable" | "usable with reservations" | "not usable";
         /**
-         * UsabilityReason
          * @description One thing that is wrong.
          *
          *     Attributes
@@ -8733,25 +4961,15 @@ export interface components {
         UsabilityReason: {
             kind: components["schemas"]["UsabilityKind"];
             level: components["schemas"]["UsabilityLevel"];
-            /** Value */
             value: number | null;
-            /** Count */
             count: number;
-            /** Words */
             words: string;
-            /**
-             * Places
-             * @default []
-             */
+            /** @default [] */
             places: string[];
         };
-        /**
-         * Vanishing
-         * @description Leave the simulation.
-         */
+        /** @description Leave the simulation. */
         Vanishing: Record<string, never>;
         /**
-         * Variant
          * @description The scenario that a variant was made of, and the edits that made it.
          *
          *     ``parent`` is the name of its file, ``parent_sha256`` and ``sha256`` are of the content of the
@@ -8759,37 +4977,26 @@ export interface components {
          *     ``kind`` and arguments, as :mod:`odscen.scenario.edits` has them.
          */
         Variant: {
-            /** Parent */
             parent: string;
-            /** Parent Sha256 */
             parent_sha256: string;
-            /** Sha256 */
             sha256: string;
-            /** Edits */
             edits: {
                 [key: string]: null | boolean | number | string | unknown[] | Record<string, never>;
             }[];
         };
         /**
-         * VaryWish
          * @description A parameter that takes values from ``low`` to ``high``, or those of a set.
          *
          *     ``steps`` is how many of the range a grid has, both ends included.
          */
         VaryWish: {
-            /** Parameter */
             parameter: string;
-            /** Low */
             low?: number | null;
-            /** High */
             high?: number | null;
-            /** Steps */
             steps?: number | null;
-            /** Values */
             values?: number[] | null;
         };
         /**
-         * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
          *
          *     They come on the lanes that begin on ``segment``, or on some of them: ``lanes`` are ids of
@@ -8799,16 +5006,10 @@ export interface components {
          *     are zones or segments with their shares; without it, each draws one of the ends of the region.
          */
         VehicleInput: {
-            /** Id */
             id: string;
-            /**
-             * Begin
-             * @default 0
-             */
+            /** @default 0 */
             begin: number;
-            /** End */
             end: number | null;
-            /** Profile */
             profile: string | null;
             mix: {
                 car?: number;
@@ -8819,279 +5020,163 @@ export interface components {
                 bicycle?: number;
                 pedestrian?: number;
             };
-            /** Segment */
             segment: string;
-            /** Direction */
             direction: ("forward" | "backward") | null;
-            /**
-             * Lanes
-             * @default []
-             */
+            /** @default [] */
             lanes: number[];
-            /** Per Hour */
             per_hour: number | null;
-            /**
-             * Volumes
-             * @default []
-             */
+            /** @default [] */
             volumes: number[];
-            /**
-             * Interval
-             * @default 900
-             */
+            /** @default 900 */
             interval: number;
-            /**
-             * To
-             * @default []
-             */
+            /** @default [] */
             to: [
                 string,
                 number
             ][];
         };
-        /**
-         * VehicleLights
-         * @description Set lights of a vehicle: what is not given is off; without any the driver sets them again.
-         */
+        /** @description Set lights of a vehicle: what is not given is off; without any the driver sets them again. */
         "VehicleLights-Input": {
-            /** Indicator */
             indicator?: ("off" | "left" | "right" | "hazard") | null;
-            /** Brake */
             brake?: boolean | null;
-            /** Front */
             front?: boolean | null;
-            /** High Beam */
             high_beam?: boolean | null;
-            /** Fog */
             fog?: boolean | null;
-            /** Emergency */
             emergency?: boolean | null;
         };
-        /**
-         * VehicleLights
-         * @description Set lights of a vehicle: what is not given is off; without any the driver sets them again.
-         */
+        /** @description Set lights of a vehicle: what is not given is off; without any the driver sets them again. */
         "VehicleLights-Output": {
-            /** Indicator */
             indicator: ("off" | "left" | "right" | "hazard") | null;
-            /** Brake */
             brake: boolean | null;
-            /** Front */
             front: boolean | null;
-            /** High Beam */
             high_beam: boolean | null;
-            /** Fog */
             fog: boolean | null;
-            /** Emergency */
             emergency: boolean | null;
         };
         /**
-         * WalkColumns
          * @description The pedestrian graph; ``kind`` of an edge: 0 sidewalk, 1 roadside, 2 crosswalk, 3 joint.
          *
          *     ``walkable`` is 1 where the simulator can place a road user exactly.
          */
         WalkColumns: {
-            /** Lane Keys */
             lane_keys: string[];
-            /** First Node */
             first_node: number[];
-            /** Lane */
             lane: number[];
-            /** X */
             x: number[];
-            /** Y */
             y: number[];
-            /** Hdg */
             hdg: number[];
-            /** Width */
             width: number[];
-            /** Segment */
             segment: number[];
-            /** Walkable */
             walkable: number[];
-            /** Source */
             source: number[];
-            /** Target */
             target: number[];
-            /** Kind */
             kind: number[];
         };
-        /**
-         * Walking
-         * @description Walk straight to a place, through others if given, wherever that leads.
-         */
+        /** @description Walk straight to a place, through others if given, wherever that leads. */
         "Walking-Input": {
-            /** To */
             to: string | [
                 number,
                 number
             ];
-            /**
-             * Through
-             * @default []
-             */
+            /** @default [] */
             through?: (string | [
                 number,
                 number
             ])[];
-            /** Speed */
             speed?: number | null;
         };
-        /**
-         * Walking
-         * @description Walk straight to a place, through others if given, wherever that leads.
-         */
+        /** @description Walk straight to a place, through others if given, wherever that leads. */
         "Walking-Output": {
-            /** To */
             to: string | [
                 number,
                 number
             ];
-            /**
-             * Through
-             * @default []
-             */
+            /** @default [] */
             through: (string | [
                 number,
                 number
             ])[];
-            /** Speed */
             speed: number | null;
         };
-        /**
-         * WeatherInfo
-         * @description A weather preset; parameters have CARLA's names and units.
-         */
+        /** @description A weather preset; parameters have CARLA's names and units. */
         WeatherInfo: {
-            /** Name */
             name: string;
-            /** Kind */
             kind: string;
-            /**
-             * Time Of Day
-             * @enum {string}
-             */
+            /** @enum {string} */
             time_of_day: "day" | "sunset" | "night";
-            /** Parameters */
             parameters: {
                 [key: string]: number;
             };
         };
         /**
-         * WebsterWish
          * @description Lights to be timed after the demand: all, or these junctions.
          *
          *     With ``turn_arrows`` turns get a protected stage first where the volumes ask for it.
          */
         WebsterWish: {
-            /** Version */
             version: number;
-            /**
-             * Junctions
-             * @default []
-             */
+            /** @default [] */
             junctions?: string[];
-            /**
-             * Turn Arrows
-             * @default false
-             */
+            /** @default false */
             turn_arrows?: boolean;
         };
         /**
-         * WholeDay
          * @description Give a scenario a day of traffic on its whole map.
          *
          *     With a ``trial``, its busiest hour is run, and there are as many trips as it carries.
          */
         WholeDay: {
-            /** Version */
             version: number;
             /**
-             * Day
              * @default weekday
              * @enum {string}
              */
             day?: "weekday" | "weekend";
-            /**
-             * Trips
-             * @default 51000
-             */
+            /** @default 51000 */
             trips?: number;
-            /**
-             * Trial
-             * @default true
-             */
+            /** @default true */
             trial?: boolean;
         };
-        /**
-         * Zone
-         * @description Segments that demand calls by one name.
-         */
+        /** @description Segments that demand calls by one name. */
         Zone: {
-            /** Id */
             id: string;
-            /** Segments */
             segments: string[];
         };
-        /**
-         * LiveActor
-         * @description A road user that will ever be in a frame, and the row by which frames name them; metres.
-         */
+        /** @description A road user that will ever be in a frame, and the row by which frames name them; metres. */
         LiveActor: {
-            /** Index */
             index: number;
-            /** Id */
             id: string;
             category: components["schemas"]["Category"];
-            /** Model */
             model: string | null;
-            /** Length */
             length: number;
-            /** Width */
             width: number;
-            /** Ego */
             ego: boolean;
-            /** Flow */
             flow: string | null;
-            /** Depart */
             depart: number;
         };
-        /**
-         * LiveDetectors
-         * @description Detectors of traffic lights that road users came onto or left, by id: whether on them now.
-         */
+        /** @description Detectors of traffic lights that road users came onto or left, by id: whether on them now. */
         LiveDetectors: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "detectors";
-            /** Detectors */
             detectors: {
                 [key: string]: boolean;
             };
         };
-        /**
-         * LiveEnd
-         * @description The run has ended; nothing follows.
-         */
+        /** @description The run has ended; nothing follows. */
         LiveEnd: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "end";
-            /**
-             * State
-             * @enum {string}
-             */
+            /** @enum {string} */
             state: "preparing" | "running" | "paused" | "finishing" | "completed" | "stopped" | "failed" | "interrupted";
-            /** Error */
             error: string | null;
         };
         /**
-         * LiveHello
          * @description What the run is, once; ``origin`` is what is subtracted from all x and y in frames.
          *
          *     Made by :func:`introduction` without this class, for it may be large.
@@ -9102,2424 +5187,56 @@ export interface components {
              * @enum {string}
              */
             type: "hello";
-            /** Scenario */
             scenario: string;
-            /** Until */
             until: number;
-            /** Step Length */
             step_length: number;
-            /** Origin */
             origin: [
                 number,
                 number
             ];
-            /** Actors */
             actors: components["schemas"]["LiveActor"][];
         };
-        /**
-         * LiveIncidents
-         * @description What has happened since the last of these.
-         */
+        /** @description What has happened since the last of these. */
         LiveIncidents: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "events";
-            /** Events */
             events: components["schemas"]["IncidentInfo"][];
         };
-        /**
-         * LiveLights
-         * @description Traffic lights that have changed, by id: a letter per link as SUMO writes it.
-         */
+        /** @description Traffic lights that have changed, by id: a letter per link as SUMO writes it. */
         LiveLights: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "lights";
-            /** Lights */
             lights: {
                 [key: string]: string;
             };
         };
-        /**
-         * LiveState
-         * @description What the run does now, and how fast it is to go; ``None`` is as fast as it can.
-         */
+        /** @description What the run does now, and how fast it is to go; ``None`` is as fast as it can. */
         LiveState: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "state";
-            /**
-             * State
-             * @enum {string}
-             */
+            /** @enum {string} */
             state: "preparing" | "running" | "paused" | "finishing" | "completed" | "stopped" | "failed" | "interrupted";
-            /** Speed */
             speed: number | null;
         };
         LiveMessage: components["schemas"]["LiveHello"] | components["schemas"]["LiveState"] | components["schemas"]["LiveLights"] | components["schemas"]["LiveDetectors"] | components["schemas"]["LiveIncidents"] | components["schemas"]["LiveEnd"];
-        /**
-         * Action
-         * @description One kind of action, or several that run together.
-         */
-        "Action-File": {
-            /** @default null */
-            speed?: components["schemas"]["SpeedChange-File"] | null;
-            /** @default null */
-            brake?: components["schemas"]["Braking-File"] | null;
-            /** @default null */
-            stop?: components["schemas"]["Stopping-File"] | null;
-            /** @default null */
-            go?: components["schemas"]["Going-File"] | null;
-            /** @default null */
-            lane?: components["schemas"]["LaneChange-File"] | null;
-            /** @default null */
-            offset?: components["schemas"]["LateralMove-File"] | null;
-            /** @default null */
-            keep_gap?: components["schemas"]["GapKeeping-File"] | null;
-            /** @default null */
-            walk?: components["schemas"]["Walking-File"] | null;
-            /** @default null */
-            cut_in?: components["schemas"]["CuttingIn-File"] | null;
-            /** @default null */
-            goal?: components["schemas"]["NewGoal-File"] | null;
-            /** @default null */
-            path?: components["schemas"]["PathFollowing-File"] | null;
-            /** @default null */
-            replay?: components["schemas"]["Replaying-File"] | null;
-            /** @default null */
-            arrive?: components["schemas"]["Arriving-File"] | null;
-            /** @default null */
-            appear?: components["schemas"]["Appearing-File"] | null;
-            /** @default null */
-            vanish?: components["schemas"]["Vanishing-File"] | null;
-            /** @default null */
-            end?: components["schemas"]["Ending-File"] | null;
-            /** @default null */
-            signal?: components["schemas"]["SignalSwitch-File"] | null;
-            /** @default null */
-            lights?: components["schemas"]["VehicleLights-File"] | null;
-            /** @default null */
-            horn?: components["schemas"]["Honking-File"] | null;
-            /** @default null */
-            ignore?: components["schemas"]["Ignoring-File"] | null;
-            /** @default null */
-            release?: components["schemas"]["Releasing-File"] | null;
-            /** @default null */
-            own?: components["schemas"]["OwnAction-File"] | null;
-            /**
-             * Together
-             * @default null
-             */
-            together?: components["schemas"]["Action-File"][] | null;
-        };
-        /**
-         * Actor
-         * @description One road user, placed by hand or sampled.
-         *
-         *     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
-         *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
-         *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-         *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
-         *     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
-         *     their order; an open goal is one that can be reached from the last of them.
-         */
-        "Actor-File": {
-            /** Id */
-            id: string;
-            category: components["schemas"]["Category-File"];
-            /**
-             * Model
-             * @default null
-             */
-            model?: string | null;
-            /** Spawn */
-            spawn: string;
-            /**
-             * Goal
-             * @default null
-             */
-            goal?: string | null;
-            /**
-             * Via
-             * @default []
-             */
-            via?: string[];
-            /**
-             * Speed
-             * @default null
-             */
-            speed?: number | null;
-            /**
-             * Lateral Offset
-             * @default 0
-             */
-            lateral_offset?: number;
-            /**
-             * Depart
-             * @default 0
-             */
-            depart?: number;
-            /**
-             * Initial Speed
-             * @default null
-             */
-            initial_speed?: number | null;
-            /**
-             * Style
-             * @default normal
-             */
-            style?: string;
-            /**
-             * Ego
-             * @default false
-             */
-            ego?: boolean;
-            /**
-             * Crosses Anywhere
-             * @default false
-             */
-            crosses_anywhere?: boolean;
-            /**
-             * Ignores Red
-             * @default false
-             */
-            ignores_red?: boolean;
-        };
-        /**
-         * AfterRule
-         * @description Another rule has started, or has ended, at least once.
-         */
-        "AfterRule-File": {
-            /** Id */
-            id: string;
-            /**
-             * Has
-             * @default ended
-             * @enum {string}
-             */
-            has?: "started" | "ended";
-        };
-        /**
-         * AfterTime
-         * @description Simulated time is ``after`` seconds or more.
-         */
-        "AfterTime-File": {
-            /** After */
-            after: number;
-        };
-        /**
-         * Appearing
-         * @description Be there from now on: the actor is not on the road before, whatever its ``depart`` is.
-         *
-         *     It appears where it is placed, or ``at`` x, y and heading of its body's centre, with its initial
-         *     speed or ``speed``.
-         */
-        "Appearing-File": {
-            /**
-             * At
-             * @default null
-             */
-            at?: [
-                number,
-                number,
-                number
-            ] | null;
-            /**
-             * Speed
-             * @default null
-             */
-            speed?: number | null;
-        };
-        /**
-         * Arriving
-         * @description Be at a place at the instant at which ``to`` is at another one.
-         *
-         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then. With a ``speed``
-         *     it arrives at that, which it has already reached ``steady`` metres before.
-         */
-        "Arriving-File": {
-            /** At */
-            at: string | [
-                number,
-                number
-            ];
-            /** To */
-            to: string;
-            /** When At */
-            when_at: string | [
-                number,
-                number
-            ];
-            /**
-             * Speed
-             * @default null
-             */
-            speed?: number | null;
-            /**
-             * Steady
-             * @default 0
-             */
-            steady?: number;
-        };
-        /**
-         * Background
-         * @description Vehicles that come and go anywhere in the region; one of the three says how many.
-         *
-         *     ``fill``, a share of those that fit, and ``per_km``, vehicles per kilometre of lane, are how
-         *     many are to be on the road at a time; with a profile, on average over a day. ``trips`` is how
-         *     many depart in the window.
-         */
-        "Background-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * Profile
-             * @default null
-             */
-            profile?: string | null;
-            mix?: {
-                car?: number;
-                van?: number;
-                truck?: number;
-                bus?: number;
-                motorcycle?: number;
-                bicycle?: number;
-                pedestrian?: number;
-            };
-            /**
-             * Fill
-             * @default null
-             */
-            fill?: number | null;
-            /**
-             * Per Km
-             * @default null
-             */
-            per_km?: number | null;
-            /**
-             * Trips
-             * @default null
-             */
-            trips?: number | null;
-        };
-        /**
-         * Braking
-         * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
-         */
-        "Braking-File": {
-            /** By */
-            by: number;
-            /**
-             * Hold
-             * @default null
-             */
-            hold?: number | null;
-        };
-        /**
-         * Category
-         * @description Exactly seven; the order is that of the interface.
-         * @enum {string}
-         */
-        "Category-File": "car" | "van" | "truck" | "bus" | "motorcycle" | "bicycle" | "pedestrian";
-        /**
-         * ChangedPermission
-         * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
-         */
-        "ChangedPermission-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "permission";
-            /** Places */
-            places: string[];
-            /**
-             * Allowed
-             * @default []
-             */
-            allowed?: components["schemas"]["Category-File"][];
-            /**
-             * Banned
-             * @default []
-             */
-            banned?: components["schemas"]["Category-File"][];
-        };
-        /**
-         * Choice
-         * @description One of ``values``, each with its weight (equal if there are none).
-         */
-        "Choice-File": {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "choice";
-            /** Values */
-            values: number[];
-            /**
-             * Weights
-             * @default null
-             */
-            weights?: number[] | null;
-        };
-        /**
-         * Condition
-         * @description One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
-         *
-         *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
-         *     from the instant at which it comes true, and not if it is true when it is first looked at.
-         */
-        "Condition-File": {
-            /** @default null */
-            time?: components["schemas"]["AfterTime-File"] | null;
-            /** @default null */
-            ttc?: components["schemas"]["PairBounded-File"] | null;
-            /** @default null */
-            headway?: components["schemas"]["PairBounded-File"] | null;
-            /** @default null */
-            distance?: components["schemas"]["DistanceBounded-File"] | null;
-            /** @default null */
-            relative_speed?: components["schemas"]["PairBounded-File"] | null;
-            /** @default null */
-            speed?: components["schemas"]["OwnBounded-File"] | null;
-            /** @default null */
-            acceleration?: components["schemas"]["OwnBounded-File"] | null;
-            /** @default null */
-            stopped?: components["schemas"]["Standing-File"] | null;
-            /** @default null */
-            reaches?: components["schemas"]["Reaching-File"] | null;
-            /** @default null */
-            travelled?: components["schemas"]["OwnBounded-File"] | null;
-            /** @default null */
-            signal?: components["schemas"]["SignalShows-File"] | null;
-            /** @default null */
-            rule?: components["schemas"]["AfterRule-File"] | null;
-            /** @default null */
-            appeared?: components["schemas"]["OneActor-File"] | null;
-            /** @default null */
-            touched?: components["schemas"]["Touching-File"] | null;
-            /** @default null */
-            off_road?: components["schemas"]["OneActor-File"] | null;
-            /** @default null */
-            own?: components["schemas"]["OwnCondition-File"] | null;
-            /**
-             * All
-             * @default null
-             */
-            all?: components["schemas"]["Condition-File"][] | null;
-            /**
-             * Any
-             * @default null
-             */
-            any?: components["schemas"]["Condition-File"][] | null;
-            /** @default null */
-            not?: components["schemas"]["Condition-File"] | null;
-            /**
-             * Delay
-             * @default 0
-             */
-            delay?: number;
-            /**
-             * Edge
-             * @default none
-             * @enum {string}
-             */
-            edge?: "none" | "rising";
-        };
-        /**
-         * Constant
-         * @description Always ``value``.
-         */
-        "Constant-File": {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "constant";
-            /** Value */
-            value: number;
-        };
-        /**
-         * Cordon
-         * @description Counts the vehicles that enter and leave an area, at all the lines around it.
-         */
-        "Cordon-File": {
-            /** Id */
-            id: string;
-            /** Entries */
-            entries: string[];
-            /** Exits */
-            exits: string[];
-        };
-        /**
-         * Counts
-         * @description Vehicles that were counted: rows of place, begin and end of the slice, and number.
-         *
-         *     A place is one segment, or segments that are passed one after another, written
-         *     ``r12>j54>r8``: two count those who go from one into the next, three or more a turn. Traffic is
-         *     made that reproduces the counts, of vehicles in the shares of ``mix``; with ``use`` ``compare``
-         *     none is, and other traffic is held against them.
-         */
-        "Counts-File": {
-            /** Id */
-            id: string;
-            /**
-             * Use
-             * @default generate
-             * @enum {string}
-             */
-            use?: "generate" | "compare";
-            mix?: {
-                car?: number;
-                van?: number;
-                truck?: number;
-                bus?: number;
-                motorcycle?: number;
-                bicycle?: number;
-                pedestrian?: number;
-            };
-            /** Rows */
-            rows: [
-                string,
-                number,
-                number,
-                number
-            ][];
-        };
-        /**
-         * CuttingIn
-         * @description Change into the lane of ``to``, in front of it, ``over`` so many seconds.
-         *
-         *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
-         */
-        "CuttingIn-File": {
-            /** To */
-            to: string;
-            /**
-             * Gap
-             * @default null
-             */
-            gap?: number | null;
-            /**
-             * Over
-             * @default 3
-             */
-            over?: number;
-        };
-        /**
-         * DayPlan
-         * @description One of several plans of a day: what differs in it from the program.
-         *
-         *     It runs from each time in ``times`` until another plan begins. ``stages`` has their order, and
-         *     leaves out those that do not come; the times of stages are by their ids.
-         */
-        "DayPlan-File": {
-            /** Id */
-            id: string;
-            /**
-             * Times
-             * @default []
-             */
-            times?: string[];
-            /**
-             * Cycle
-             * @default null
-             */
-            cycle?: number | null;
-            /**
-             * Offset
-             * @default 0
-             */
-            offset?: number;
-            /**
-             * Stages
-             * @default []
-             */
-            stages?: string[];
-            /** Green */
-            green?: {
-                [key: string]: number;
-            };
-            /** Min Green */
-            min_green?: {
-                [key: string]: number;
-            };
-            /** Max Green */
-            max_green?: {
-                [key: string]: number;
-            };
-        };
-        /**
-         * Demand
-         * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
-         *
-         *     ``routes`` says how its trips choose their routes, ``parking`` which of them park.
-         */
-        "Demand-File": {
-            /**
-             * Clock
-             * @default 0
-             */
-            clock?: number;
-            /**
-             * Zones
-             * @default []
-             */
-            zones?: components["schemas"]["Zone-File"][];
-            /**
-             * Profiles
-             * @default []
-             */
-            profiles?: components["schemas"]["Profile-File"][];
-            /**
-             * Inputs
-             * @default []
-             */
-            inputs?: components["schemas"]["VehicleInput-File"][];
-            /**
-             * Matrices
-             * @default []
-             */
-            matrices?: components["schemas"]["Matrix-File"][];
-            /**
-             * Counts
-             * @default []
-             */
-            counts?: components["schemas"]["Counts-File"][];
-            /**
-             * Background
-             * @default []
-             */
-            background?: components["schemas"]["Background-File"][];
-            /**
-             * @default {
-             *       "by": "length",
-             *       "iterations": 20,
-             *       "gap": 0.01,
-             *       "interval": 900,
-             *       "spread": 0.03,
-             *       "informed": 0,
-             *       "period": 60,
-             *       "shares": []
-             *     }
-             */
-            routes?: components["schemas"]["RouteChoice-File"];
-            /**
-             * @default {
-             *       "begin": 0,
-             *       "end": 0,
-             *       "stay": 3600,
-             *       "within": 300
-             *     }
-             */
-            parking?: components["schemas"]["TripParking-File"];
-        };
-        /**
-         * Detector
-         * @description Counts vehicles, their speed, and the share of the time in which one is on it.
-         */
-        "Detector-File": {
-            /** Id */
-            id: string;
-            /** Nodes */
-            nodes: string[];
-        };
-        /**
-         * DistanceBounded
-         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
-         */
-        "DistanceBounded-File": {
-            /**
-             * Below
-             * @default null
-             */
-            below?: number | null;
-            /**
-             * Above
-             * @default null
-             */
-            above?: number | null;
-            /**
-             * Of
-             * @default null
-             */
-            of?: string | null;
-            /**
-             * To
-             * @default null
-             */
-            to?: string | null;
-            /**
-             * Place
-             * @default null
-             */
-            place?: string | [
-                number,
-                number
-            ] | null;
-            /**
-             * Along
-             * @default straight
-             * @enum {string}
-             */
-            along?: "straight" | "longitudinal" | "lateral" | "lane";
-            /**
-             * Free
-             * @default true
-             */
-            free?: boolean;
-        };
-        /**
-         * DriverSet
-         * @description Drivers of one kind, by SUMO's own names of what is different from a driving style's.
-         *
-         *     ``parameters`` are numbers or distributions, of which each driver draws one by the scenario's
-         *     seed; :data:`~odscen.scenario.document.driver_parameters.DRIVER_PARAMETERS` has names, ranges
-         *     and meanings. ``car_following`` is SUMO's model.
-         */
-        "DriverSet-File": {
-            /** Id */
-            id: string;
-            /**
-             * Style
-             * @default normal
-             * @enum {string}
-             */
-            style?: "cautious" | "normal" | "sporty";
-            /** Parameters */
-            parameters?: {
-                [key: string]: components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"];
-            };
-            /**
-             * Car Following
-             * @default Krauss
-             * @enum {string}
-             */
-            car_following?: "Krauss" | "IDM";
-        };
-        /**
-         * Drivers
-         * @description What drivers of the style ``normal`` do; the other styles are set about it.
-         *
-         *     ``saturation_flow`` (vehicles per hour and lane that pass a stop line from a queue, cars on a
-         *     straight approach with a limit of 50 km/h) is another way to give the ``headway``, the desired
-         *     time from the rear of the vehicle in front, s. ``gap_acceptance`` is 0 for those who only take
-         *     gaps in which nobody else has to brake, and 1 for those who take any that is safe.
-         *     ``lane_change_eagerness`` multiplies the eagerness to change lanes in order to drive faster.
-         *     ``sets`` are further kinds of drivers, whose ids actors name as their ``style``; of flows and
-         *     demand each driver draws a style or set by ``shares``, and all are normal without.
-         */
-        "Drivers-File": {
-            /**
-             * Saturation Flow
-             * @default null
-             */
-            saturation_flow?: number | null;
-            /**
-             * Headway
-             * @default null
-             */
-            headway?: number | null;
-            /**
-             * Gap Acceptance
-             * @default 0.3
-             */
-            gap_acceptance?: number;
-            /**
-             * Lane Change Eagerness
-             * @default 1
-             */
-            lane_change_eagerness?: number;
-            /**
-             * Sets
-             * @default []
-             */
-            sets?: components["schemas"]["DriverSet-File"][];
-            /** Shares */
-            shares?: {
-                [key: string]: number;
-            };
-        };
-        /**
-         * Ending
-         * @description End the run: it is complete with the step in which that is asked for.
-         */
-        "Ending-File": Record<string, never>;
-        /**
-         * Environment
-         * @description Weather and time of day: a preset of the asset catalogue and single values that differ.
-         */
-        "Environment-File": {
-            /**
-             * Preset
-             * @default ClearNoon
-             */
-            preset?: string;
-            /** Parameters */
-            parameters?: {
-                [key: string]: number;
-            };
-            /**
-             * Affects Driving
-             * @default true
-             */
-            affects_driving?: boolean;
-        };
-        /**
-         * Flow
-         * @description A flow of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
-         *
-         *     Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
-         *     actor of the flow draws its own goal from the candidates. With a ``profile``, ``per_hour`` is
-         *     the mean of a day, and the profile says when there are more and when fewer. ``initial_speed``
-         *     is that of its vehicles at departure, m/s; ``None`` is from rest.
-         */
-        "Flow-File": {
-            /** Id */
-            id: string;
-            /** Spawn */
-            spawn: string;
-            /**
-             * Goal
-             * @default null
-             */
-            goal?: string | null;
-            /** Per Hour */
-            per_hour: number;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default 3600
-             */
-            end?: number;
-            mix?: {
-                car?: number;
-                van?: number;
-                truck?: number;
-                bus?: number;
-                motorcycle?: number;
-                bicycle?: number;
-                pedestrian?: number;
-            };
-            /**
-             * Speed
-             * @default null
-             */
-            speed?: number | null;
-            /**
-             * Initial Speed
-             * @default null
-             */
-            initial_speed?: number | null;
-            /**
-             * Profile
-             * @default null
-             */
-            profile?: string | null;
-        };
-        /**
-         * GapKeeping
-         * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
-         *
-         *     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
-         */
-        "GapKeeping-File": {
-            /** To */
-            to: string;
-            /**
-             * Metres
-             * @default null
-             */
-            metres?: number | null;
-            /**
-             * Seconds
-             * @default null
-             */
-            seconds?: number | null;
-            /**
-             * Ahead
-             * @default false
-             */
-            ahead?: boolean;
-            /**
-             * Lasting
-             * @default null
-             */
-            lasting?: number | null;
-            /**
-             * Rate
-             * @default 3
-             */
-            rate?: number;
-            /**
-             * Once
-             * @default false
-             */
-            once?: boolean;
-        };
-        /**
-         * Going
-         * @description SUMO chooses the speed again.
-         */
-        "Going-File": Record<string, never>;
-        /**
-         * Honking
-         * @description Sound the horn.
-         */
-        "Honking-File": Record<string, never>;
-        /**
-         * Ignoring
-         * @description Heed neither red lights nor right of way, or one of the two.
-         */
-        "Ignoring-File": {
-            /**
-             * Red
-             * @default true
-             */
-            red?: boolean;
-            /**
-             * Right Of Way
-             * @default false
-             */
-            right_of_way?: boolean;
-        };
-        /**
-         * JunctionTiming
-         * @description The traffic light of one junction, where it differs from the map's program.
-         *
-         *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
-         *     ``control`` ``None`` is the scenario's. Either the map's stages are kept, and ``green`` has the
-         *     seconds of green of each in order; or ``groups`` and ``stages`` are a program of its own.
-         *     ``intergreens`` are rows of the group that ends, the one that begins, and the seconds from the
-         *     end of green to the begin of green; pairs without a row have what their paths need. With
-         *     ``cycle``, greens and intergreens have to add up to it, and actuated control keeps to it. The
-         *     program begins ``offset`` seconds into the scenario, as if it had run before. Lights of one
-         *     ``coordination`` have one cycle. ``bus_priority`` ``None`` is the scenario's.
-         */
-        "JunctionTiming-File": {
-            /** Junction */
-            junction: string;
-            /**
-             * Control
-             * @default null
-             */
-            control?: ("fixed" | "actuated") | null;
-            /**
-             * Offset
-             * @default 0
-             */
-            offset?: number;
-            /**
-             * Green
-             * @default []
-             */
-            green?: number[];
-            /**
-             * Cycle
-             * @default null
-             */
-            cycle?: number | null;
-            /**
-             * Coordination
-             * @default null
-             */
-            coordination?: string | null;
-            /**
-             * Groups
-             * @default []
-             */
-            groups?: components["schemas"]["ProgramGroup-File"][];
-            /**
-             * Stages
-             * @default []
-             */
-            stages?: components["schemas"]["ProgramStage-File"][];
-            /**
-             * Intergreens
-             * @default []
-             */
-            intergreens?: [
-                string,
-                string,
-                number
-            ][];
-            /**
-             * Detectors
-             * @default []
-             */
-            detectors?: components["schemas"]["SignalDetector-File"][];
-            /**
-             * Plans
-             * @default []
-             */
-            plans?: components["schemas"]["DayPlan-File"][];
-            /**
-             * Bus Priority
-             * @default null
-             */
-            bus_priority?: boolean | null;
-        };
-        /**
-         * LaneChange
-         * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
-         *
-         *     It takes ``over`` seconds.
-         */
-        "LaneChange-File": {
-            /**
-             * By
-             * @default null
-             */
-            by?: number | null;
-            /**
-             * To
-             * @default null
-             */
-            to?: string | [
-                number,
-                number
-            ] | null;
-            /**
-             * Over
-             * @default 3
-             */
-            over?: number;
-        };
-        /**
-         * LaneIncident
-         * @description A broken-down vehicle that blocks a lane.
-         *
-         *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
-         *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
-         */
-        "LaneIncident-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "incident";
-            /** Lane */
-            lane: string;
-            /** S */
-            s: number;
-            /**
-             * Length
-             * @default 5
-             */
-            length?: number;
-        };
-        /**
-         * LateralMove
-         * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
-         */
-        "LateralMove-File": {
-            /** To */
-            to: number;
-            /**
-             * Over
-             * @default 3
-             */
-            over?: number;
-        };
-        /**
-         * MapReference
-         * @description The map, by name *and* content, and the spacing of the graph that node names refer to.
-         */
-        "MapReference-File": {
-            /** Name */
-            name: string;
-            /** Sha256 */
-            sha256: string;
-            /**
-             * Spacing
-             * @default 2
-             */
-            spacing?: number;
-        };
-        /**
-         * Matrix
-         * @description Trips from where to where: rows of origin, destination and number.
-         *
-         *     Origins and destinations are zones or segments. The numbers are those of the whole window.
-         */
-        "Matrix-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * Profile
-             * @default null
-             */
-            profile?: string | null;
-            mix?: {
-                car?: number;
-                van?: number;
-                truck?: number;
-                bus?: number;
-                motorcycle?: number;
-                bicycle?: number;
-                pedestrian?: number;
-            };
-            /** Trips */
-            trips: [
-                string,
-                string,
-                number
-            ][];
-        };
-        /**
-         * NewGoal
-         * @description Go to another node of the map from here on.
-         */
-        "NewGoal-File": {
-            /** To */
-            to: string;
-        };
-        /**
-         * Normal
-         * @description Normal distribution, drawn again while outside ``low`` to ``high``.
-         */
-        "Normal-File": {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "normal";
-            /** Mean */
-            mean: number;
-            /** Std */
-            std: number;
-            /** Low */
-            low: number;
-            /** High */
-            high: number;
-        };
-        /**
-         * OneActor
-         * @description An actor, the rule's own if none is named.
-         */
-        "OneActor-File": {
-            /**
-             * Of
-             * @default null
-             */
-            of?: string | null;
-        };
-        /**
-         * OwnAction
-         * @description An action of an installed package.
-         */
-        "OwnAction-File": {
-            /** Kind */
-            kind: string;
-            /**
-             * To
-             * @default null
-             */
-            to?: string | null;
-            /**
-             * Place
-             * @default null
-             */
-            place?: string | [
-                number,
-                number
-            ] | null;
-            /** Values */
-            values?: {
-                [key: string]: number | string;
-            };
-        };
-        /**
-         * OwnBounded
-         * @description A value of one actor: ``of``, or the rule's own.
-         */
-        "OwnBounded-File": {
-            /**
-             * Below
-             * @default null
-             */
-            below?: number | null;
-            /**
-             * Above
-             * @default null
-             */
-            above?: number | null;
-            /**
-             * Of
-             * @default null
-             */
-            of?: string | null;
-        };
-        /**
-         * OwnCondition
-         * @description A condition of an installed package; ``of`` is whose value it is, the rule's actor's if not.
-         *
-         *     See :mod:`odscen.scenario.story.own_kinds`.
-         */
-        "OwnCondition-File": {
-            /** Kind */
-            kind: string;
-            /**
-             * To
-             * @default null
-             */
-            to?: string | null;
-            /**
-             * Place
-             * @default null
-             */
-            place?: string | [
-                number,
-                number
-            ] | null;
-            /** Values */
-            values?: {
-                [key: string]: number | string;
-            };
-            /**
-             * Of
-             * @default null
-             */
-            of?: string | null;
-        };
-        /**
-         * PairBounded
-         * @description A value between two actors.
-         */
-        "PairBounded-File": {
-            /**
-             * Below
-             * @default null
-             */
-            below?: number | null;
-            /**
-             * Above
-             * @default null
-             */
-            above?: number | null;
-            /**
-             * Of
-             * @default null
-             */
-            of?: string | null;
-            /** To */
-            to: string;
-        };
-        /**
-         * Parameter
-         * @description A named number with its unit and the bounds between which it makes sense.
-         *
-         *     Any number of the document may be written as a formula of parameters, ``"$gap"`` or
-         *     ``"2 * $gap + 1"``, and so may the ``value`` of a later parameter.
-         */
-        "Parameter-File": {
-            /** Value */
-            value: number;
-            /**
-             * Unit
-             * @default
-             */
-            unit?: string;
-            /**
-             * Min
-             * @default null
-             */
-            min?: number | null;
-            /**
-             * Max
-             * @default null
-             */
-            max?: number | null;
-            /**
-             * Description
-             * @default
-             */
-            description?: string;
-        };
-        /**
-         * PathFollowing
-         * @description Follow a line over the ground from where the actor is, through ``points``.
-         *
-         *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
-         *     the begin at which it is there; none of them leaves the speed as it is.
-         *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
-         *     where it is and heads at the begin.
-         */
-        "PathFollowing-File": {
-            /** Points */
-            points: (string | [
-                number,
-                number
-            ])[];
-            /**
-             * Speed
-             * @default null
-             */
-            speed?: number | null;
-            /**
-             * Speeds
-             * @default []
-             */
-            speeds?: number[];
-            /**
-             * Times
-             * @default []
-             */
-            times?: number[];
-            /**
-             * Relative To
-             * @default null
-             */
-            relative_to?: string | null;
-        };
-        /**
-         * Profile
-         * @description How demand is spread over a day: relative shares of equal slices, from midnight on.
-         */
-        "Profile-File": {
-            /** Id */
-            id: string;
-            /** Shares */
-            shares: number[];
-        };
-        /**
-         * ProgramGroup
-         * @description A signal group: movements that always show the same.
-         *
-         *     A movement is named ``r12>r8`` (segment before, segment behind), ``r12 left`` (``straight``,
-         *     ``right``, ``turnaround``), ``r12`` (all of the approach), ``12.0.-1>8.1.-1`` (from lane to
-         *     lane) or ``walk r12`` (the crossings over a leg). ``yellow`` ``None`` follows from the speed
-         *     limit: 3 s up to 50 km/h, 4 s up to 60 km/h, 5 s above. With ``all_red``, what begins after this
-         *     group waits for yellow and all-red; otherwise as long as the paths need. Whenever it has green,
-         *     it is to have it for ``min_green`` at least, over as many stages as it takes.
-         */
-        "ProgramGroup-File": {
-            /** Id */
-            id: string;
-            /** Movements */
-            movements: string[];
-            /**
-             * Yellow
-             * @default null
-             */
-            yellow?: number | null;
-            /**
-             * All Red
-             * @default null
-             */
-            all_red?: number | null;
-            /**
-             * Min Green
-             * @default null
-             */
-            min_green?: number | null;
-        };
-        /**
-         * ProgramStage
-         * @description Groups that have green together, and for how long.
-         *
-         *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
-         *     meet. ``green`` is what the stage lasts with fixed-time control; actuated control keeps it
-         *     between ``min_green`` and ``max_green`` (``None``: ``green``). A stage ``on_call`` comes only
-         *     if somebody waits at one of its crossings, or a vehicle for a green of it.
-         */
-        "ProgramStage-File": {
-            /** Id */
-            id: string;
-            /**
-             * Protected
-             * @default []
-             */
-            protected?: string[];
-            /**
-             * Permissive
-             * @default []
-             */
-            permissive?: string[];
-            /** Green */
-            green: number;
-            /**
-             * Min Green
-             * @default null
-             */
-            min_green?: number | null;
-            /**
-             * Max Green
-             * @default null
-             */
-            max_green?: number | null;
-            /**
-             * On Call
-             * @default false
-             */
-            on_call?: boolean;
-        };
-        /**
-         * Reaching
-         * @description The centre of an actor's body is within so many metres of a place.
-         */
-        "Reaching-File": {
-            /**
-             * Of
-             * @default null
-             */
-            of?: string | null;
-            /** Place */
-            place: string | [
-                number,
-                number
-            ];
-            /**
-             * Within
-             * @default 1
-             */
-            within?: number;
-        };
-        /**
-         * Releasing
-         * @description SUMO drives as if there had been no rule.
-         */
-        "Releasing-File": Record<string, never>;
-        /**
-         * Replaying
-         * @description Be where a recorded road user was: ``rows`` of seconds after the begin, x, y and heading.
-         *
-         *     Centre of the body, OpenDRIVE frame; metres, and radians counter-clockwise from x. Between rows
-         *     it moves evenly.
-         */
-        "Replaying-File": {
-            /** Rows */
-            rows: [
-                number,
-                number,
-                number,
-                number
-            ][];
-        };
-        /**
-         * RoadClosure
-         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
-         */
-        "RoadClosure-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "closure";
-            /** Places */
-            places: string[];
-        };
-        /**
-         * Roadworks
-         * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
-         *
-         *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
-         *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
-         */
-        "Roadworks-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "roadworks";
-            /** Places */
-            places: string[];
-            /**
-             * Speed
-             * @default null
-             */
-            speed?: number | null;
-            /**
-             * Closed Lanes
-             * @default []
-             */
-            closed_lanes?: string[];
-            /**
-             * Width
-             * @default null
-             */
-            width?: number | null;
-        };
-        /**
-         * RouteChoice
-         * @description How trips of inputs, matrices and background traffic choose their routes.
-         *
-         *     By ``length`` each takes the shortest. By ``travel_time`` the run is repeated, at most
-         *     ``iterations`` times, and each time some trips change to the route that was quickest, until
-         *     ``gap``, the share of travel time that could be saved, is small enough. Travel times are means
-         *     of ``interval`` seconds. With a ``spread`` drivers tell routes apart only roughly: of two routes
-         *     one of which takes longer by that share of the time, it is taken ``e`` times as rarely.
-         *
-         *     ``informed`` is the share of drivers who look for a quicker route on the way, every ``period``
-         *     seconds, whichever route they began with. ``shares`` deal out trips to routes beforehand.
-         */
-        "RouteChoice-File": {
-            /**
-             * By
-             * @default length
-             * @enum {string}
-             */
-            by?: "length" | "travel_time";
-            /**
-             * Iterations
-             * @default 20
-             */
-            iterations?: number;
-            /**
-             * Gap
-             * @default 0.01
-             */
-            gap?: number;
-            /**
-             * Interval
-             * @default 900
-             */
-            interval?: number;
-            /**
-             * Spread
-             * @default 0.03
-             */
-            spread?: number;
-            /**
-             * Informed
-             * @default 0
-             */
-            informed?: number;
-            /**
-             * Period
-             * @default 60
-             */
-            period?: number;
-            /**
-             * Shares
-             * @default []
-             */
-            shares?: components["schemas"]["SharedRoutes-File"][];
-        };
-        /**
-         * ServedStop
-         * @description A stop on a line.
-         *
-         *     ``after`` is the scheduled departure there, seconds after the departure of the trip; without it
-         *     the vehicle goes on after its dwell time. ``dwell`` ``None`` is that of the line.
-         */
-        "ServedStop-File": {
-            /** Stop */
-            stop: string;
-            /**
-             * After
-             * @default null
-             */
-            after?: number | null;
-            /**
-             * Dwell
-             * @default null
-             */
-            dwell?: (components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"]) | null;
-        };
-        /**
-         * SharedRoutes
-         * @description Trips from ``origin`` to ``destination`` are dealt out to routes by fixed shares.
-         *
-         *     Both are zones or segments. Each of ``routes`` is the segments it leads over and its share.
-         */
-        "SharedRoutes-File": {
-            /** Origin */
-            origin: string;
-            /** Destination */
-            destination: string;
-            /** Routes */
-            routes: [
-                string[],
-                number
-            ][];
-        };
-        /**
-         * SignalDetector
-         * @description A loop in the road, and the stages that it prolongs.
-         *
-         *     ``at`` is an approach (``r12``: a loop in each lane) or a lane (``12.0.-1``); ``before`` the
-         *     metres from its front end to the stop line. A stage goes on while fewer than ``gap`` seconds
-         *     pass between vehicles.
-         */
-        "SignalDetector-File": {
-            /** Id */
-            id: string;
-            /** At */
-            at: string;
-            /**
-             * Before
-             * @default 30
-             */
-            before?: number;
-            /**
-             * Length
-             * @default 2
-             */
-            length?: number;
-            /** Stages */
-            stages: string[];
-            /**
-             * Gap
-             * @default 3
-             */
-            gap?: number;
-        };
-        /**
-         * SignalOutage
-         * @description A traffic light out of order.
-         *
-         *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
-         *     named as in the timing of signals.
-         */
-        "SignalOutage-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "signal_outage";
-            /** Junction */
-            junction: string;
-            /**
-             * Shows
-             * @default off
-             * @enum {string}
-             */
-            shows?: "off" | "flashing";
-        };
-        /**
-         * SignalShows
-         * @description A movement of a traffic light shows a colour.
-         *
-         *     ``light`` is the junction, ``movement`` a name as in signal programs, ``r1>r2`` or ``walk r1``.
-         */
-        "SignalShows-File": {
-            /** Light */
-            light: string;
-            /** Movement */
-            movement: string;
-            /**
-             * Shows
-             * @enum {string}
-             */
-            shows: "red" | "yellow" | "green";
-        };
-        /**
-         * SignalSwitch
-         * @description Switch a traffic light.
-         *
-         *     ``green``: its program jumps to where ``movement`` has green, and resumes from there. ``off``:
-         *     right of way as without lights. ``program``: the program that ran before.
-         */
-        "SignalSwitch-File": {
-            /** Light */
-            light: string;
-            /**
-             * Shows
-             * @default green
-             * @enum {string}
-             */
-            shows?: "green" | "off" | "program";
-            /**
-             * Movement
-             * @default null
-             */
-            movement?: string | null;
-        };
-        /**
-         * Signals
-         * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
-         *
-         *     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
-         *     that waits elsewhere.
-         */
-        "Signals-File": {
-            /**
-             * Control
-             * @default fixed
-             * @enum {string}
-             */
-            control?: "fixed" | "actuated";
-            /**
-             * Bus Priority
-             * @default false
-             */
-            bus_priority?: boolean;
-            /**
-             * Junctions
-             * @default []
-             */
-            junctions?: components["schemas"]["JunctionTiming-File"][];
-        };
-        /**
-         * Simulation
-         * @description How the scenario is run unless the command says otherwise; seconds.
-         *
-         *     ``action_step`` is the time between decisions of a driver, where it is more than a step.
-         *     ``lateral_resolution`` (metres) lets vehicles share a lane side by side, as two-wheelers do.
-         *     ``teleport_after`` is how long the first vehicle of a lane may wait before SUMO teleports it; 0
-         *     is never. ``pedestrians`` is SUMO's model: in ``striping`` they walk around each other.
-         */
-        "Simulation-File": {
-            /**
-             * Duration
-             * @default 600
-             */
-            duration?: number;
-            /**
-             * Step Length
-             * @default 0.5
-             */
-            step_length?: number;
-            /**
-             * Action Step
-             * @default null
-             */
-            action_step?: number | null;
-            /**
-             * Lateral Resolution
-             * @default null
-             */
-            lateral_resolution?: number | null;
-            /**
-             * Teleport After
-             * @default 300
-             */
-            teleport_after?: number;
-            /**
-             * Pedestrians
-             * @default striping
-             * @enum {string}
-             */
-            pedestrians?: "striping" | "nonInteracting";
-        };
-        /**
-         * SpeedChange
-         * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
-         *
-         *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
-         */
-        "SpeedChange-File": {
-            /** To */
-            to: number;
-            /**
-             * Shape
-             * @default linear
-             * @enum {string}
-             */
-            shape?: "step" | "linear" | "cosine";
-            /**
-             * Rate
-             * @default null
-             */
-            rate?: number | null;
-            /**
-             * Over
-             * @default null
-             */
-            over?: number | null;
-            /**
-             * Within
-             * @default null
-             */
-            within?: number | null;
-        };
-        /**
-         * SpeedLimit
-         * @description Another speed limit, m/s; of several at a place the lowest holds.
-         */
-        "SpeedLimit-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            /** Places */
-            places: string[];
-            /** Speed */
-            speed: number;
-        };
-        /**
-         * Standing
-         * @description An actor has been stopped for so many seconds.
-         */
-        "Standing-File": {
-            /**
-             * Of
-             * @default null
-             */
-            of?: string | null;
-            /**
-             * Seconds
-             * @default 0
-             */
-            seconds?: number;
-        };
-        /**
-         * Stopping
-         * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
-         */
-        "Stopping-File": {
-            /**
-             * Within
-             * @default null
-             */
-            within?: number | null;
-        };
-        /**
-         * StoryRule
-         * @description When a condition holds, an actor does something; items of ``then`` follow one another.
-         *
-         *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
-         *     does is over.
-         */
-        "StoryRule-File": {
-            /** Id */
-            id: string;
-            /** Actor */
-            actor: string;
-            when: components["schemas"]["Condition-File"];
-            /** Then */
-            then: components["schemas"]["Action-File"][];
-            /**
-             * Times
-             * @default 1
-             */
-            times?: number;
-        };
-        /**
-         * Study
-         * @description What of a run is analysed, and where it is measured besides.
-         *
-         *     ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
-         *     over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
-         */
-        "Study-File": {
-            /**
-             * Warm Up
-             * @default 0
-             */
-            warm_up?: number;
-            /**
-             * Interval
-             * @default null
-             */
-            interval?: number | null;
-            /**
-             * Detectors
-             * @default []
-             */
-            detectors?: components["schemas"]["Detector-File"][];
-            /**
-             * Sections
-             * @default []
-             */
-            sections?: components["schemas"]["TravelTimeSection-File"][];
-            /**
-             * Cordons
-             * @default []
-             */
-            cordons?: components["schemas"]["Cordon-File"][];
-        };
-        /**
-         * Touching
-         * @description The body of an actor touches that of another one, or of any that a rule names.
-         */
-        "Touching-File": {
-            /**
-             * Of
-             * @default null
-             */
-            of?: string | null;
-            /**
-             * To
-             * @default null
-             */
-            to?: string | null;
-        };
-        /**
-         * Transit
-         * @description Stops and lines of a scenario.
-         */
-        "Transit-File": {
-            /**
-             * Stops
-             * @default []
-             */
-            stops?: components["schemas"]["TransitStop-File"][];
-            /**
-             * Lines
-             * @default []
-             */
-            lines?: components["schemas"]["TransitLine-File"][];
-        };
-        /**
-         * TransitLine
-         * @description A line: trips from the node ``start`` by its stops to the node ``goal``.
-         *
-         *     Trips depart every ``headway`` seconds from ``begin`` until before ``end`` (``None``: the end of
-         *     the run), or at the times ``departures``. Dwell times (s) are drawn for each trip and stop.
-         */
-        "TransitLine-File": {
-            /** Id */
-            id: string;
-            /** Start */
-            start: string;
-            /**
-             * Goal
-             * @default null
-             */
-            goal?: string | null;
-            /** Stops */
-            stops: components["schemas"]["ServedStop-File"][];
-            /**
-             * Headway
-             * @default null
-             */
-            headway?: number | null;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * Departures
-             * @default []
-             */
-            departures?: number[];
-            /**
-             * Dwell
-             * @default {
-             *       "kind": "constant",
-             *       "value": 20
-             *     }
-             */
-            dwell?: components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"];
-            /** @default bus */
-            category?: components["schemas"]["Category-File"];
-            /**
-             * Model
-             * @default null
-             */
-            model?: string | null;
-        };
-        /**
-         * TransitStop
-         * @description A place where vehicles of lines stop; ``node`` is in the middle of its ``length`` (metres).
-         *
-         *     In a ``bay`` they stand beside the lane and hold up no other vehicle.
-         */
-        "TransitStop-File": {
-            /** Id */
-            id: string;
-            /**
-             * Name
-             * @default
-             */
-            name?: string;
-            /** Node */
-            node: string;
-            /**
-             * Length
-             * @default 15
-             */
-            length?: number;
-            /**
-             * Bay
-             * @default false
-             */
-            bay?: boolean;
-        };
-        /**
-         * TravelTimeSection
-         * @description Measures the time from one line to another, of the vehicles that cross both.
-         */
-        "TravelTimeSection-File": {
-            /** Id */
-            id: string;
-            /** Begin */
-            begin: string[];
-            /** End */
-            end: string[];
-        };
-        /**
-         * TripParking
-         * @description Shares of the cars of matrices, inputs and background that park.
-         *
-         *     ``begin`` is the share that begin in a parking place (inputs begin at the boundary), ``end``
-         *     the share that end in one. ``stay`` is how long a place is taken, seconds: before a trip that
-         *     begins there, and after one that has ended there. Between zones, places are at most ``within``
-         *     metres from where the trip would begin or end; elsewhere anywhere in the region.
-         */
-        "TripParking-File": {
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default 0
-             */
-            end?: number;
-            /**
-             * Stay
-             * @default {
-             *       "kind": "constant",
-             *       "value": 3600
-             *     }
-             */
-            stay?: components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"];
-            /**
-             * Within
-             * @default 300
-             */
-            within?: number;
-        };
-        /**
-         * Uniform
-         * @description Any number from ``low`` to ``high``.
-         */
-        "Uniform-File": {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "uniform";
-            /** Low */
-            low: number;
-            /** High */
-            high: number;
-        };
-        /**
-         * Vanishing
-         * @description Leave the simulation.
-         */
-        "Vanishing-File": Record<string, never>;
-        /**
-         * Variant
-         * @description The scenario that a variant was made of, and the edits that made it.
-         *
-         *     ``parent`` is the name of its file, ``parent_sha256`` and ``sha256`` are of the content of the
-         *     parent and of this scenario when it was made, seed and name apart. An edit is an object with its
-         *     ``kind`` and arguments, as :mod:`odscen.scenario.edits` has them.
-         */
-        "Variant-File": {
-            /** Parent */
-            parent: string;
-            /** Parent Sha256 */
-            parent_sha256: string;
-            /** Sha256 */
-            sha256: string;
-            /** Edits */
-            edits: {
-                [key: string]: null | boolean | number | string | unknown[] | Record<string, never>;
-            }[];
-        };
-        /**
-         * VehicleInput
-         * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
-         *
-         *     They come on the lanes that begin on ``segment``, or on some of them: ``lanes`` are ids of
-         *     OpenDRIVE lanes. ``direction`` is needed where vehicles come in both ways, and is ``forward``
-         *     with growing s. ``per_hour`` are all lanes together, with a ``profile`` on average over a day;
-         *     or ``volumes`` are counted vehicles of slices of ``interval`` seconds from ``begin`` on. ``to``
-         *     are zones or segments with their shares; without it, each draws one of the ends of the region.
-         */
-        "VehicleInput-File": {
-            /** Id */
-            id: string;
-            /**
-             * Begin
-             * @default 0
-             */
-            begin?: number;
-            /**
-             * End
-             * @default null
-             */
-            end?: number | null;
-            /**
-             * Profile
-             * @default null
-             */
-            profile?: string | null;
-            mix?: {
-                car?: number;
-                van?: number;
-                truck?: number;
-                bus?: number;
-                motorcycle?: number;
-                bicycle?: number;
-                pedestrian?: number;
-            };
-            /** Segment */
-            segment: string;
-            /**
-             * Direction
-             * @default null
-             */
-            direction?: ("forward" | "backward") | null;
-            /**
-             * Lanes
-             * @default []
-             */
-            lanes?: number[];
-            /**
-             * Per Hour
-             * @default null
-             */
-            per_hour?: number | null;
-            /**
-             * Volumes
-             * @default []
-             */
-            volumes?: number[];
-            /**
-             * Interval
-             * @default 900
-             */
-            interval?: number;
-            /**
-             * To
-             * @default []
-             */
-            to?: [
-                string,
-                number
-            ][];
-        };
-        /**
-         * VehicleLights
-         * @description Set lights of a vehicle: what is not given is off; without any the driver sets them again.
-         */
-        "VehicleLights-File": {
-            /**
-             * Indicator
-             * @default null
-             */
-            indicator?: ("off" | "left" | "right" | "hazard") | null;
-            /**
-             * Brake
-             * @default null
-             */
-            brake?: boolean | null;
-            /**
-             * Front
-             * @default null
-             */
-            front?: boolean | null;
-            /**
-             * High Beam
-             * @default null
-             */
-            high_beam?: boolean | null;
-            /**
-             * Fog
-             * @default null
-             */
-            fog?: boolean | null;
-            /**
-             * Emergency
-             * @default null
-             */
-            emergency?: boolean | null;
-        };
-        /**
-         * Walking
-         * @description Walk straight to a place, through others if given, wherever that leads.
-         */
-        "Walking-File": {
-            /** To */
-            to: string | [
-                number,
-                number
-            ];
-            /**
-             * Through
-             * @default []
-             */
-            through?: (string | [
-                number,
-                number
-            ])[];
-            /**
-             * Speed
-             * @default null
-             */
-            speed?: number | null;
-        };
-        /**
-         * Zone
-         * @description Segments that demand calls by one name.
-         */
-        "Zone-File": {
-            /** Id */
-            id: string;
-            /** Segments */
-            segments: string[];
-        };
-        /**
-         * Scenario
-         * @description The whole document.
-         */
-        "Scenario-File": {
-            /**
-             * Format
-             * @default odscen-scenario
-             * @constant
-             */
-            format?: "odscen-scenario";
-            /**
-             * Version
-             * @default 1
-             * @constant
-             */
-            version?: 1;
-            /** Name */
-            name: string;
-            /**
-             * Description
-             * @default
-             */
-            description?: string;
-            map: components["schemas"]["MapReference-File"];
-            /** @default null */
-            variant?: components["schemas"]["Variant-File"] | null;
-            /**
-             * Seed
-             * @default 0
-             */
-            seed?: number;
-            /** Roi */
-            roi: string[];
-            /**
-             * @default {
-             *       "preset": "ClearNoon",
-             *       "parameters": {},
-             *       "affects_driving": true
-             *     }
-             */
-            environment?: components["schemas"]["Environment-File"];
-            /**
-             * @default {
-             *       "saturation_flow": null,
-             *       "headway": null,
-             *       "gap_acceptance": 0.3,
-             *       "lane_change_eagerness": 1,
-             *       "sets": [],
-             *       "shares": {}
-             *     }
-             */
-            drivers?: components["schemas"]["Drivers-File"];
-            /**
-             * Actors
-             * @default []
-             */
-            actors?: components["schemas"]["Actor-File"][];
-            /**
-             * Flows
-             * @default []
-             */
-            flows?: components["schemas"]["Flow-File"][];
-            /**
-             * @default {
-             *       "clock": 0,
-             *       "zones": [],
-             *       "profiles": [],
-             *       "inputs": [],
-             *       "matrices": [],
-             *       "counts": [],
-             *       "background": [],
-             *       "routes": {
-             *         "by": "length",
-             *         "gap": 0.01,
-             *         "informed": 0,
-             *         "interval": 900,
-             *         "iterations": 20,
-             *         "period": 60,
-             *         "shares": [],
-             *         "spread": 0.03
-             *       },
-             *       "parking": {
-             *         "begin": 0,
-             *         "end": 0,
-             *         "stay": 3600,
-             *         "within": 300
-             *       }
-             *     }
-             */
-            demand?: components["schemas"]["Demand-File"];
-            /**
-             * @default {
-             *       "stops": [],
-             *       "lines": []
-             *     }
-             */
-            transit?: components["schemas"]["Transit-File"];
-            /**
-             * @default {
-             *       "control": "fixed",
-             *       "bus_priority": false,
-             *       "junctions": []
-             *     }
-             */
-            signals?: components["schemas"]["Signals-File"];
-            /**
-             * Measures
-             * @default []
-             */
-            measures?: (components["schemas"]["RoadClosure-File"] | components["schemas"]["Roadworks-File"] | components["schemas"]["LaneIncident-File"] | components["schemas"]["SpeedLimit-File"] | components["schemas"]["ChangedPermission-File"] | components["schemas"]["SignalOutage-File"])[];
-            /**
-             * @default {
-             *       "duration": 600,
-             *       "step_length": 0.5,
-             *       "action_step": null,
-             *       "lateral_resolution": null,
-             *       "teleport_after": 300,
-             *       "pedestrians": "striping"
-             *     }
-             */
-            simulation?: components["schemas"]["Simulation-File"];
-            /**
-             * @default {
-             *       "warm_up": 0,
-             *       "interval": null,
-             *       "detectors": [],
-             *       "sections": [],
-             *       "cordons": []
-             *     }
-             */
-            study?: components["schemas"]["Study-File"];
-            /**
-             * Rules
-             * @default []
-             */
-            rules?: components["schemas"]["StoryRule-File"][];
-            /**
-             * Criteria
-             * @default []
-             */
-            criteria?: string[];
-            /** Parameters */
-            parameters?: {
-                [key: string]: components["schemas"]["Parameter-File"];
-            };
-            /** Formulas */
-            formulas?: {
-                [key: string]: string;
+    };
+    responses: {
+        /** @description 400: The request cannot be read. 401: The token is missing. 403: The request comes from a foreign page, or for another host. 404: There is no such thing. 408: The rest of the request did not come in time. 409: It is taken, in use, damaged, or has changed meanwhile. 413: Too large. 422: What was sent cannot be used; the message says why. 503: The workspace cannot be read or written now, or memory is short. 507: The disk is full. */
+        Error: {
+            content: {
+                "application/json": components["schemas"]["ErrorAnswer"];
             };
         };
     };
-    responses: never;
     parameters: never;
     requestBodies: never;
     headers: never;
@@ -11528,2017 +5245,241 @@ export interface components {
 export type $defs = Record<string, never>;
 export interface operations {
     health_api_health_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["Health"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_maps_api_maps_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["MapInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     add_map_api_maps_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         requestBody: {
             content: {
-                "multipart/form-data": components["schemas"]["Body_add_map_api_maps_post"];
+                "multipart/form-data": FormData;
             };
         };
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["JobStarted"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_broken_maps_api_broken_maps_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["BrokenMapInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     show_map_api_maps__name__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["MapDetails"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     remove_map_api_maps__name__delete: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovedInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     preview_api_maps__name__preview_svg_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "image/svg+xml": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     drawing_api_maps__name__drawing_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["DrawingColumns"];
                 };
             };
             /** @description What the client has is right. */
             304: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     graph_api_maps__name__graph_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["GraphColumns"];
                 };
             };
             /** @description What the client has is right. */
             304: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     report_api_maps__name__report_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ConversionInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-        };
-    };
-    list_map_importers_api_map_importers_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ImporterInfo"][];
-                };
-            };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     add_shipped_maps_api_maps_shipped_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["JobStarted"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     show_job_api_jobs__job__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 job: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["JobInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     cancel_job_api_jobs__job__delete: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 job: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["JobInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     assets_api_assets_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["AssetsInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_generators_api_generators_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["OfferedInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_behaviours_api_behaviours_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["OfferedInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_simulators_api_simulators_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["OfferedInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_unsupported_api_simulators__simulator__unsupported_get: {
@@ -13546,232 +5487,32 @@ export interface operations {
             query: {
                 scenario: string;
             };
-            header?: never;
             path: {
                 simulator: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ProblemInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_scenarios_api_scenarios_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioRow"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     create_api_scenarios_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         requestBody: {
             content: {
                 "application/json": components["schemas"]["NewScenario"];
@@ -13780,451 +5521,66 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             201: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     upload_api_scenarios_upload_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         requestBody: {
             content: {
-                "multipart/form-data": components["schemas"]["Body_upload_api_scenarios_upload_post"];
+                "multipart/form-data": FormData;
             };
         };
         responses: {
             /** @description Successful Response */
             201: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     show_api_scenarios__name__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     remove_scenario_api_scenarios__name__delete: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovedInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     rename_api_scenarios__name__name_put: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -14234,215 +5590,27 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     problems_api_scenarios__name__problems_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioProblems"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     edit_api_scenarios__name__edits_post: {
@@ -14451,11 +5619,9 @@ export interface operations {
                 /** @description Answer with what has changed, in place of all, and without problems. */
                 changes?: boolean;
             };
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -14465,103 +5631,11 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     undo_api_scenarios__name__undo_post: {
@@ -14570,11 +5644,9 @@ export interface operations {
                 /** @description Answer with what has changed, in place of all, and without problems. */
                 changes?: boolean;
             };
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -14584,103 +5656,11 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     redo_api_scenarios__name__redo_post: {
@@ -14689,11 +5669,9 @@ export interface operations {
                 /** @description Answer with what has changed, in place of all, and without problems. */
                 changes?: boolean;
             };
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -14703,113 +5681,18 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"] | components["schemas"]["ScenarioPatch"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     copy_api_scenarios__name__copy_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -14819,103 +5702,11 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             201: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     goals_api_scenarios__name__goals_get: {
@@ -14923,113 +5714,18 @@ export interface operations {
             query: {
                 spawn: string;
             };
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["Goals"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     path_api_scenarios__name__path_get: {
@@ -15038,344 +5734,53 @@ export interface operations {
                 spawn: string;
                 goal: string;
             };
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["Path"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     plan_api_scenarios__name__plan_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["PlannedColumns"];
                 };
             };
             /** @description What the client has is right. */
             304: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     roi_api_scenarios__name__roi_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RoiInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     download_api_scenarios__name__download_get: {
@@ -15383,342 +5788,56 @@ export interface operations {
             query?: {
                 form?: "json" | "graphml";
             };
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
-                    "application/json": components["schemas"]["Scenario-File"];
+                    "application/json": string;
                     "application/xml": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     table_api_scenarios__name__demand_table_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
-                "multipart/form-data": components["schemas"]["Body_table_api_scenarios__name__demand_table_post"];
+                "multipart/form-data": FormData;
             };
         };
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     entries_api_scenarios__name__demand_entries_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["EntryPlace"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_runs_api_runs_get: {
@@ -15726,120 +5845,18 @@ export interface operations {
             query?: {
                 scenario?: string | null;
             };
-            header?: never;
-            path?: never;
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     start_api_runs_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         requestBody: {
             content: {
                 "application/json": components["schemas"]["NewRun"];
@@ -15848,112 +5865,14 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunStarted"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     forecast_api_runs_forecast_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         requestBody: {
             content: {
                 "application/json": components["schemas"]["NewRun"];
@@ -15962,113 +5881,18 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunForecast"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     resume_api_runs__run__resume_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -16078,337 +5902,50 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunStarted"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     show_api_runs__run__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     remove_run_api_runs__run__delete: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovedInfo"] | null;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     control_api_runs__run__control_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -16418,775 +5955,107 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     report_api_runs__run__report_html_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "text/html": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     summary_api_runs__run__summary_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunSummary"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     content_api_runs__run__content_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunContent"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     events_api_runs__run__events_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunEvents"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     egos_api_runs__run__egos_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunEgos"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     curves_api_runs__run__curves_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunCurves"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     trajectories_api_runs__run__trajectories_get: {
@@ -17196,239 +6065,35 @@ export interface operations {
                 /** @description Rows at most; fewer steps if need be. */
                 most?: number | null;
             };
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ReplayColumns"];
                 };
             };
             /** @description What the client has is right. */
             304: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_studies_api_studies_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["StudyInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     start_api_studies_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         requestBody: {
             content: {
                 "application/json": components["schemas"]["StudyWish"];
@@ -17437,447 +6102,63 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["StudyInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     show_api_studies__study__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 study: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["StudyInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     remove_api_studies__study__delete: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 study: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             204: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     stop_api_studies__study__stop_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 study: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["StudyInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     resume_api_studies__study__resume_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 study: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -17887,103 +6168,11 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["StudyInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     results_api_studies__study__results_get: {
@@ -17991,226 +6180,35 @@ export interface operations {
             query?: {
                 figure?: string | null;
             };
-            header?: never;
             path: {
                 study: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["StudyResults"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     file_api_studies__study__files__name__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 study: string;
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "*/*": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_sweeps_api_sweeps_get: {
@@ -18218,120 +6216,18 @@ export interface operations {
             query?: {
                 scenario?: string | null;
             };
-            header?: never;
-            path?: never;
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["SweepInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     start_api_sweeps_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         requestBody: {
             content: {
                 "application/json": components["schemas"]["SweepWish"];
@@ -18340,112 +6236,14 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["SweepInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     plan_api_sweeps_plan_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
         requestBody: {
             content: {
                 "application/json": components["schemas"]["SweepWish"];
@@ -18454,447 +6252,63 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["PlannedSweep"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     show_api_sweeps__sweep__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 sweep: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["SweepInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     remove_api_sweeps__sweep__delete: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 sweep: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             204: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     stop_api_sweeps__sweep__stop_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 sweep: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["SweepInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     resume_api_sweeps__sweep__resume_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 sweep: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -18904,226 +6318,35 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["SweepInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     cases_api_sweeps__sweep__cases_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 sweep: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["SweepCases"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     open_case_api_sweeps__sweep__cases__case__scenario_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 sweep: string;
                 case: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -19133,340 +6356,53 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             201: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     file_api_sweeps__sweep__files__name__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 sweep: string;
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "*/*": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     of_scenario_api_scenarios__name__signals__junction__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
                 junction: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["LightProgramInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     set_cycle_api_scenarios__name__signals__junction__cycle_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
                 junction: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -19476,114 +6412,19 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     take_over_api_scenarios__name__signals__junction__own_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
                 junction: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -19593,113 +6434,18 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     webster_api_scenarios__name__signal_times_webster_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -19709,113 +6455,18 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["TimedSignalsState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     corridor_api_scenarios__name__signal_times_corridor_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -19825,2473 +6476,337 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["TimedSignalsState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     import_programs_api_scenarios__name__signal_times_import_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
-                "multipart/form-data": components["schemas"]["Body_import_programs_api_scenarios__name__signal_times_import_post"];
+                "multipart/form-data": FormData;
             };
         };
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["TimedSignalsState"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     export_programs_api_scenarios__name__signals_add_xml_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/xml": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     of_run_api_runs__run__signals_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunSignals"];
                 };
             };
             /** @description What the client has is right. */
             304: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     light_of_run_api_runs__run__signals__junction__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
                 junction: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["LightProgramInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     files_api_runs__run__files_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunFile"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     file_api_runs__run__files__name__get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "*/*": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     fit_api_runs__run__fit_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunFit"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     lanes_api_runs__run__lanes_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RunLanes"];
                 };
             };
             /** @description What the client has is right. */
             304: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     actor_measures_api_figures_actors_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ActorMeasureInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     installed_api_figures_installed_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["InstalledFigureInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     figures_api_figures_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["FigureInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     carla_api_carla_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["CarlaInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     camera_api_runs__run__camera_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "multipart/x-mixed-replace": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     parity_api_runs__run__parity_html_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "text/html": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     map_removal_api_maps__name__removal_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovalInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     scenario_removal_api_scenarios__name__removal_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovalInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     run_removal_api_runs__run__removal_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovalInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_trash_api_trash_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovedRow"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     restore_api_trash__item__restore_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 item: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovedInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     delete_item_api_trash__item__delete: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 item: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["RemovedInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     list_templates_api_templates_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["TemplateInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     day_api_scenarios__name__demand_day_post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
@@ -22301,553 +6816,75 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["JobStarted"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     formats_api_formats_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["FormatInfo"][];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     import_files_api_imports__of__post: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 of: string;
             };
-            cookie?: never;
         };
         requestBody: {
             content: {
-                "multipart/form-data": components["schemas"]["Body_import_files_api_imports__of__post"];
+                "multipart/form-data": FormData;
             };
         };
         responses: {
             /** @description Successful Response */
             202: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["JobStarted"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     import_report_api_scenarios__name__import_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ImportInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     import_plan_api_scenarios__name__import_plan_get: {
         parameters: {
-            query?: never;
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     export_run_api_runs__run__export_get: {
@@ -22858,113 +6895,18 @@ export interface operations {
                 /** @description NAME=VALUE */
                 option?: string[];
             };
-            header?: never;
             path: {
                 run: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/zip": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     export_notes_api_scenarios__name__export_notes_get: {
@@ -22975,113 +6917,18 @@ export interface operations {
                 /** @description NAME=VALUE */
                 option?: string[];
             };
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/json": components["schemas"]["ExportInfo"];
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
     export_scenario_api_scenarios__name__export_get: {
@@ -23092,113 +6939,18 @@ export interface operations {
                 /** @description NAME=VALUE */
                 option?: string[];
             };
-            header?: never;
             path: {
                 name: string;
             };
-            cookie?: never;
         };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
-                headers: {
-                    [name: string]: unknown;
-                };
                 content: {
                     "application/zip": string;
                 };
             };
-            /** @description The request cannot be read. */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The token is missing. */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The request comes from a foreign page, or for another host. */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description There is no such thing. */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The rest of the request did not come in time. */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description It is taken, in use, damaged, or has changed meanwhile. */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description Too large. */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description What was sent cannot be used; the message says why. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The workspace cannot be read or written now, or memory is short. */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
-            /** @description The disk is full. */
-            507: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ErrorAnswer"];
-                };
-            };
+            default: components["responses"]["Error"];
         };
     };
 }

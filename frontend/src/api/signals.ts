@@ -22,38 +22,39 @@ export type CorridorWish = Omit<Schemas["CorridorWish"], "version">;
 
 export const signals = {
   ofScenario: (name: string, junction: string) =>
-    call("get", "/api/scenarios/{name}/signals/{junction}", { path: { name, junction } }),
+    call("get", "/api/scenarios/{name}/signals/{junction}", { params: { path: { name, junction } } }),
   ofRun: (run: string, junction: string) =>
-    call("get", "/api/runs/{run}/signals/{junction}", { path: { run, junction } }),
+    call("get", "/api/runs/{run}/signals/{junction}", { params: { path: { run, junction } } }),
   /** What all lights showed in a finished run. */
-  shown: (run: string) => call("get", "/api/runs/{run}/signals", { path: { run } }),
+  shown: (run: string) => call("get", "/api/runs/{run}/signals", { params: { path: { run } } }),
   /** Another cycle: greens in proportion to what they are. */
   setCycle: (name: string, version: number, junction: string, cycle: number, plan: string | null) =>
     call("post", "/api/scenarios/{name}/signals/{junction}/cycle", {
-      path: { name, junction },
+      params: { path: { name, junction } },
       body: { version, cycle, plan },
     }),
   /** Makes the map's program one of the scenario. */
   takeOver: (name: string, version: number, junction: string) =>
     call("post", "/api/scenarios/{name}/signals/{junction}/own", {
-      path: { name, junction },
+      params: { path: { name, junction } },
       body: { version },
     }),
   /** Times lights after the demand; all if no junction is named. */
   webster: (name: string, version: number, junctions: readonly string[], arrows: boolean) =>
     call("post", "/api/scenarios/{name}/signal-times/webster", {
-      path: { name },
+      params: { path: { name } },
       body: { version, junctions: [...junctions], turn_arrows: arrows },
     }),
   corridor: (name: string, version: number, wish: CorridorWish) =>
     call("post", "/api/scenarios/{name}/signal-times/corridor", {
-      path: { name },
+      params: { path: { name } },
       body: { version, ...wish },
     }),
   import: (name: string, version: number, file: File, junction: string | null) =>
     call("post", "/api/scenarios/{name}/signal-times/import", {
-      path: { name },
+      params: { path: { name } },
       body: form({ version: String(version), file, junction }),
     }),
-  exportUrl: (name: string) => address("/api/scenarios/{name}/signals.add.xml", { path: { name } }),
+  exportUrl: (name: string) =>
+    address("/api/scenarios/{name}/signals.add.xml", { params: { path: { name } } }),
 };

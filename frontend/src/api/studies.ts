@@ -15,17 +15,16 @@ export const studies = {
   /** The newest last. */
   list: () => call("get", "/api/studies"),
   start: (wish: StudyWish) => call("post", "/api/studies", { body: wish }),
-  info: (study: string) => call("get", "/api/studies/{study}", { path: { study } }),
-  stop: (study: string) => call("post", "/api/studies/{study}/stop", { path: { study } }),
+  info: (study: string) => call("get", "/api/studies/{study}", { params: { path: { study } } }),
+  stop: (study: string) => call("post", "/api/studies/{study}/stop", { params: { path: { study } } }),
   /** Runs what is missing; `failed` those again that failed. */
   resume: (study: string, processes: number, failed = false) =>
-    call("post", "/api/studies/{study}/resume", { path: { study }, body: { processes, failed } }),
-  remove: (study: string) => call("delete", "/api/studies/{study}", { path: { study } }),
+    call("post", "/api/studies/{study}/resume", { params: { path: { study } }, body: { processes, failed } }),
+  remove: (study: string) => call("delete", "/api/studies/{study}", { params: { path: { study } } }),
   results: (study: string, figure: string | null) =>
     call("get", "/api/studies/{study}/results", {
-      path: { study },
-      query: figure === null ? {} : { figure },
+      params: { path: { study }, query: figure === null ? {} : { figure } },
     }),
   fileUrl: (study: string, name: string) =>
-    address("/api/studies/{study}/files/{name}", { path: { study, name } }),
+    address("/api/studies/{study}/files/{name}", { params: { path: { study, name } } }),
 };

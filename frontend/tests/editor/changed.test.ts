@@ -4,6 +4,7 @@ import type { DocumentChange, Edit, ScenarioState } from "../../src/api/types";
 import { patched, reused } from "../../src/editor/documentChanges";
 import { foreseen } from "../../src/editor/foreseen";
 import { createEditorStore } from "../../src/editor/store";
+import { stubFetch } from "../requests";
 import { type Draft, draftOf, ruleOf } from "../../src/editor/rules/draft";
 import { shownRule } from "../../src/editor/rules/shownRule";
 import { Timeline } from "../../src/editor/timeline";
@@ -262,11 +263,11 @@ class Server {
   problems: object = { version: 0, problems: [] };
 
   constructor(private readonly begin: ScenarioState) {
-    vi.stubGlobal("fetch", (url: string, init?: RequestInit) => {
-      const body = typeof init?.body === "string" ? (JSON.parse(init.body) as { version: number }) : null;
+    stubFetch(({ path: url, body: sent }) => {
+      const body = (sent ?? null) as { version: number } | null;
       this.asked.push({ url, body });
-      if (url.endsWith("/problems")) return Promise.resolve(Response.json(this.problems));
-      if (!body) return Promise.resolve(Response.json(this.begin));
+      if (url.endsWith("/problems")) return Response.json(this.problems);
+      if (!body) return Response.json(this.begin);
       return new Promise<Response>((resolve) => this.waiting.push(resolve));
     });
   }

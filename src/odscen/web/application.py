@@ -20,7 +20,7 @@ from odscen.base.version import __version__
 from odscen.carla.server.client import Address
 from odscen.maps.child_process import keep_ready
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.web.error_answers import RESPONSES, add_error_handlers, error_response
+from odscen.web.error_answers import ERROR_RESPONSES, add_error_handlers, error_response
 from odscen.web.exchange import exchange_routes
 from odscen.web.large.large_documents import LARGE
 from odscen.web.messages import Health
@@ -118,7 +118,7 @@ def create_app(
         redoc_url=None,
         openapi_url="/api/openapi.json",
         lifespan=lifespan,
-        responses=RESPONSES,
+        responses=ERROR_RESPONSES,
     )
     app.state.services = shared
     add_error_handlers(app)
@@ -167,9 +167,15 @@ class _Api(FastAPI):
     """The interface; its schema also has what goes over WebSockets, and scenarios as files."""
 
     def openapi(self) -> dict[str, Any]:
-        """Schema of all messages, made once."""
+        """Schema of all messages, made once; the answer to what fails stands in it once, too."""
         if self.openapi_schema is None:
-            schemas = super().openapi()["components"]["schemas"]
+            schema = super().openapi()
+            for methods in schema["paths"].values():
+                for operation in methods.values():
+                    error = operation["responses"]["default"]
+                    operation["responses"]["default"] = {"$ref": "#/components/responses/Error"}
+            schema["components"]["responses"] = {"Error": error}
+            schemas = schema["components"]["schemas"]
             schemas |= _components("LiveMessage", LiveMessage, mode="serialization")
             schemas |= _components("Scenario", Scenario, mode="validation", suffix="-File")
         return super().openapi()

@@ -39,20 +39,23 @@ _NAMES = {
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 _FAULT = "the server has a fault of its own: {}; what it printed belongs into a report of it"
 
-RESPONSES: dict[int | str, dict[str, Any]] = {
-    status: {"model": ErrorAnswer, "description": words}
-    for status, words in {
-        400: "The request cannot be read.",
-        401: "The token is missing.",
-        403: "The request comes from a foreign page, or for another host.",
-        404: "There is no such thing.",
-        408: "The rest of the request did not come in time.",
-        409: "It is taken, in use, damaged, or has changed meanwhile.",
-        413: "Too large.",
-        422: "What was sent cannot be used; the message says why.",
-        503: "The workspace cannot be read or written now, or memory is short.",
-        507: "The disk is full.",
-    }.items()
+_STATUSES = {
+    400: "The request cannot be read.",
+    401: "The token is missing.",
+    403: "The request comes from a foreign page, or for another host.",
+    404: "There is no such thing.",
+    408: "The rest of the request did not come in time.",
+    409: "It is taken, in use, damaged, or has changed meanwhile.",
+    413: "Too large.",
+    422: "What was sent cannot be used; the message says why.",
+    503: "The workspace cannot be read or written now, or memory is short.",
+    507: "The disk is full.",
+}
+ERROR_RESPONSES: dict[int | str, dict[str, Any]] = {
+    "default": {
+        "model": ErrorAnswer,
+        "description": " ".join(f"{status}: {words}" for status, words in _STATUSES.items()),
+    }
 }
 """What every route may answer besides what it is asked for."""
 
