@@ -8232,11 +8232,8 @@ export interface components {
             state: "running" | "done" | "stopped" | "failed";
             /** Parameters */
             parameters: string[];
-            /**
-             * Method
-             * @enum {string}
-             */
-            method: "grid" | "latin" | "sobol" | "random";
+            /** Method */
+            method: string;
             /** Cases */
             cases: number;
             /** Ended */
@@ -8278,9 +8275,8 @@ export interface components {
             /**
              * Method
              * @default grid
-             * @enum {string}
              */
-            method?: "grid" | "latin" | "sobol" | "random";
+            method?: string;
             /** Samples */
             samples?: number | null;
             /**
