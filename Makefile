@@ -18,7 +18,7 @@ demo: $(READY)
 	$(BIN)/odscen demo --workspace demo
 
 # Set-up plus the tests, the suite of scenarios on the shipped maps among them. Of the slow tests
-# each commit runs a part, another the next; `make test SLOW=all` runs all.
+# it runs a part, the same at each commit; `make test SLOW=all` runs all.
 SLOW := part
 test: test-page $(READY) $(QC) $(PAGE) chromium allocator
 	ODSCEN_SLOW=$(SLOW) $(BIN)/python -m pytest -n 2 --dist loadfile

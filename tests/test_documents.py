@@ -13,6 +13,7 @@ from PIL import Image
 import odscen
 from odscen.app import generators
 from odscen.scenario.story import own_kinds
+from odscen.simulators import assets
 from odscen.sumo.worker.behaviour import behaviour_doors
 from tools.docs_site import switched_pictures
 
@@ -105,6 +106,7 @@ def test_modules_that_a_document_names_are_there(path: Path) -> None:
         own_kinds.ACTION_GROUP,
         generators.GROUP,
         behaviour_doors.GROUP,
+        assets.GROUP,
     }  # entry points
     assert sorted(module for module in named if not exists(module)) == []
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.base.errors import MissingDependencyError
+from odscen.drawing.legend import RenderOptions
 from odscen.drawing.map_shapes import map_drawing
 from odscen.drawing.map_sheet import (
     length_text,
@@ -17,7 +18,6 @@ from odscen.drawing.map_sheet import (
     svg_to_png,
 )
 from odscen.drawing.palette import RELATION_COLORS
-from odscen.drawing.sheet_options import RenderOptions
 from odscen.drawing.svg_layers import PlaceMarks
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.opendrive.lanes import RoadTable

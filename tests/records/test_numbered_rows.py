@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from odscen.records.numbered_rows import (
+from odscen.records.row_text import (
     among,
     by_vehicle_and_time,
     numbers,

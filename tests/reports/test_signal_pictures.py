@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import pytest
 from lxml import etree
 
-from odscen.drawing.junction_ground import PictureFrame, junction_ground
 from odscen.drawing.map_shapes import map_drawing
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
@@ -18,6 +17,8 @@ from odscen.records.light_programs import stage_spans
 from odscen.reports.signal_charts import phase_spans, plan_chart, plan_scale
 from odscen.reports.signal_pictures import (
     JunctionPictures,
+    PictureFrame,
+    junction_ground,
 )
 from odscen.reports.signal_sheet import detector_rows, signal_sheet, split_rows
 from odscen.sumo.realize.lights.light_realization import realized_lights

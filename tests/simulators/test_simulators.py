@@ -42,7 +42,7 @@ def test_one_list_has_those_that_ship_and_those_of_packages(steady: str) -> None
     assert simulator_names() == ["sumo", "carla-mirror", "carla-native", steady]
     offered = {one.name: one for one in installed_simulators()}
     assert not any(one.error for one in offered.values())
-    assert offered[steady].summary == "Everybody at a constant speed, through each other."
+    assert offered[steady].summary == "All at a constant speed, through each other."
     assert [option.name for option in offered[steady].options] == ["speed"]
     assert [option.name for option in offered["carla-native"].options] == ["address", "physics"]
 

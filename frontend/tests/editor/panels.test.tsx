@@ -390,6 +390,7 @@ function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunSt
 
 test("a run is played by the simulator that is chosen, and what that leaves out is said before", async () => {
   const { user, onRun } = toRun(scenario([actor("a")]));
+  await screen.findByRole("textbox", { name: "Simulator" });
   await choose(user, "Simulator", "steady");
   expect(await screen.findByText("Steady traffic does not follow rule r")).toBeTruthy();
   expect(screen.queryByLabelText("Vehicles driven by")).toBeNull();

@@ -6,28 +6,492 @@ written in other pieces is no difference. Roads are paired by id, else by where 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import defaultdict
+from dataclasses import dataclass, fields
+from math import hypot
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from odscen.changes.furniture_differences import furniture_differences
+from odscen.base.shown import shown_id
 from odscen.changes.lane_differences import RoadPair, lane_differences
-from odscen.changes.line_differences import road_differences
-from odscen.changes.link_differences import (
-    PairedRoads,
-    controller_differences,
-    junction_differences,
-    lane_link_differences,
-)
-from odscen.changes.map_change import ChangePlace, MapChange, metres, of_road
-from odscen.changes.paired_lanes import paired_stretches
-from odscen.opendrive.lanes import RoadTable
+from odscen.changes.map_change import ChangePlace, MapChange, metres, of_lane, of_road
+from odscen.changes.paired_lanes import SAME, merged, paired_stretches
+from odscen.opendrive.lanes import RoadTable, is_forward
+from odscen.opendrive.topology import lane_successors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 
-    from odscen.base.ids import RoadId
-    from odscen.opendrive.road_model import OpenDrive, Road
+    from odscen.base.arrays import FloatArray
+    from odscen.base.ids import LaneKey, RoadId
+    from odscen.changes.map_change import ChangedThing, ChangeKind
+    from odscen.opendrive.road_model import Controller, Junction, OpenDrive, Road, RoadLink
+
+
+class _LinkEnd(NamedTuple):
+    """A lane where it meets another, named as in the map before: road, id, s of the meeting."""
+
+    road: RoadId
+    lane: int
+    s: float
+
+
+_Link = tuple[_LinkEnd, _LinkEnd]
+
+
+@dataclass(frozen=True, slots=True)
+class PairedRoads:
+    """Roads that both maps have, by their ids in each."""
+
+    by_before: Mapping[str, RoadPair]
+    by_after: Mapping[str, RoadPair]
+
+
+def lane_link_differences(
+    before: OpenDrive, after: OpenDrive, roads: PairedRoads
+) -> Iterator[MapChange]:
+    """Links from lane to lane that only one map has, where both have both lanes.
+
+    What a lane that came or went takes with it is not told: the lane is.
+    """
+    old = set(_links(before, roads.by_before, 0))
+    new = set(_links(after, roads.by_after, 1))
+    kinds: tuple[tuple[ChangeKind, set[_Link]], ...] = (
+        ("removed", old - new),
+        ("added", new - old),
+    )
+    for kind, links in kinds:
+        for here, there in sorted(links):
+            within = here.road == there.road
+            what: ChangedThing = "lane link" if within else "connection"
+            junction = None if within else _junction(roads, here.road, there.road)
+            through = f" (junction {shown_id(junction)})" if junction else ""
+            subject = f"from {of_lane(here.road, here.lane)} to {of_lane(there.road, there.lane)}"
+            place = ChangePlace(here.road, here.s, here.s, here.lane)
+            yield MapChange(kind, what, f"{what} {subject}{through}", place=place)
+
+
+def _junction(roads: PairedRoads, *names: str) -> str | None:
+    found = [roads.by_before[name].before.junction for name in names]
+    return next((str(one) for one in found if one), None)
+
+
+def _links(odr: OpenDrive, pairs: Mapping[str, RoadPair], side: int) -> Iterator[_Link]:
+    """Links of a map between lanes that both maps have, named as before."""
+    for key, followers in lane_successors(odr).items():
+        for follower in followers:
+            if key.road == follower.road and key.section != follower.section:
+                link = _within(pairs, key, follower, side)
+            else:
+                link = _between(odr, pairs, (key, follower), side)
+            if link is not None:
+                yield link
+
+
+def _within(
+    pairs: Mapping[str, RoadPair], key: LaneKey, follower: LaneKey, side: int
+) -> _Link | None:
+    """Link over the border of two sections that both maps have there."""
+    pair = pairs.get(key.road)
+    if pair is None:
+        return None
+    later = max(key, follower, key=lambda one: one.section)
+    at = [
+        number
+        for number, stretch in enumerate(pair.stretches)
+        if stretch.sections[side] == later.section
+    ]
+    if not at or at[0] == 0:
+        return None
+    low, high = pair.stretches[at[0] - 1], pair.stretches[at[0]]
+    if low.sections[1 - side] == high.sections[1 - side]:
+        return None  # the other map has one section here: its lanes go on
+    ends = []
+    for one in (key, follower):
+        number = at[0] if one.section == later.section else at[0] - 1
+        ends.append(_named(pair, number, one.lane, side, high.s0))
+    return (ends[0], ends[1]) if ends[0] and ends[1] else None
+
+
+def _between(
+    odr: OpenDrive, pairs: Mapping[str, RoadPair], link: tuple[LaneKey, LaneKey], side: int
+) -> _Link | None:
+    ends = []
+    for key, leaves in zip(link, (True, False), strict=True):
+        pair = pairs.get(key.road)
+        if pair is None:
+            return None
+        road = odr.roads[key.road]
+        lane = road.sections[key.section].lanes[key.lane]
+        forward = is_forward(road, lane)
+        number = len(pair.stretches) - 1 if forward == leaves else 0
+        at = pair.before.length if forward == leaves else 0.0
+        ends.append(_named(pair, number, key.lane, side, at))
+    return (ends[0], ends[1]) if ends[0] and ends[1] else None
+
+
+def _named(pair: RoadPair, number: int, lane: int, side: int, s: float) -> _LinkEnd | None:
+    """Lane of one map by its name in the map before; none if only one map has it."""
+    for both in pair.stretches[number].pairs:
+        one = both[side]
+        if one is not None and one.id == lane:
+            return None if both[0] is None or both[1] is None else _end(pair, both[0].id, s)
+    return None
+
+
+def _end(pair: RoadPair, lane: int, s: float) -> _LinkEnd:
+    at = pair.before.length if abs(s - pair.before.length) <= SAME else s
+    return _LinkEnd(pair.before.id, lane, round(at, 3))
+
+
+# ------------------------------------------------------------------------- junctions, controllers
+def junction_differences(
+    before: OpenDrive, after: OpenDrive, roads: PairedRoads
+) -> Iterator[MapChange]:
+    """Junctions that came, went or have other priorities, controllers, types or roads."""
+    names = {str(pair.after.id): str(pair.before.id) for pair in roads.by_before.values()}
+    old, new = before.junctions, after.junctions
+    for one in _only(old, new):
+        yield MapChange("removed", "junction", f"junction {shown_id(one)}")
+    for one in _only(new, old):
+        yield MapChange("added", "junction", f"junction {shown_id(one)}")
+    for key, junction in old.items():
+        if key in new:
+            yield from _junction_values(junction, new[key], names)
+    for pair in roads.by_before.values():
+        old_one, new_one = (str(road.junction or "none") for road in (pair.before, pair.after))
+        if old_one != new_one:
+            subject = f"junction of {of_road(pair.before.id)}"
+            place = ChangePlace(pair.before.id, 0.0, pair.before.length)
+            yield MapChange("changed", "junction", subject, old_one, new_one, place)
+
+
+def _only(these: Iterable[str], others: Container[str]) -> list[str]:
+    return [str(key) for key in these if key not in others]
+
+
+def _junction_values(old: Junction, new: Junction, names: Mapping[str, str]) -> Iterator[MapChange]:
+    name = f"junction {shown_id(old.id)}"
+    ways = {f"road {one.high} over road {one.low}" for one in old.priorities}
+    others = {
+        f"road {names.get(one.high, one.high)} over road {names.get(one.low, one.low)}"
+        for one in new.priorities
+    }
+    for said in sorted(ways - others):
+        yield MapChange("removed", "priority", f"priority of {said} at {name}")
+    for said in sorted(others - ways):
+        yield MapChange("added", "priority", f"priority of {said} at {name}")
+    for what, before, after in (
+        ("type", old.type, new.type),
+        ("name", old.name, new.name),
+        ("controllers", _list(old.controllers), _list(new.controllers)),
+        ("main road", old.main_road, new.main_road),
+    ):
+        if before != after:
+            said_both = before or "none", after or "none"
+            yield MapChange("changed", "junction", f"{what} of {name}", *said_both)
+
+
+def _list(items: Iterable[str]) -> str:
+    return ", ".join(sorted(items))
+
+
+def controller_differences(
+    before: Mapping[str, Controller], after: Mapping[str, Controller]
+) -> Iterator[MapChange]:
+    """Controllers that came, went, or control other signals."""
+    for key in _only(before, after):
+        yield MapChange("removed", "controller", f"controller {shown_id(key)}")
+    for key in _only(after, before):
+        yield MapChange("added", "controller", f"controller {shown_id(key)}")
+    for key, old in before.items():
+        new = after.get(key)
+        if new is None:
+            continue
+        said = _controlled(old.controls), _controlled(new.controls)
+        if said[0] != said[1]:
+            subject = f"signals of controller {shown_id(key)}"
+            yield MapChange("changed", "controller", subject, *said)
+
+
+def _controlled(controls: Sequence[tuple[str, str]]) -> str:
+    return _list(signal for signal, _ in controls) or "none"
+
+
+_STEP = 2.0
+_LINE = 0.01
+_ANGLE = 1e-5
+
+
+def road_differences(pair: RoadPair, roads: Mapping[str, str]) -> Iterator[MapChange]:
+    """Differences of a road beside its lanes.
+
+    Parameters
+    ----------
+    pair
+        The road in both maps.
+    roads
+        Id before by id after, of each road that is in both maps.
+    """
+    old, new = pair.before, pair.after
+    yield from _values(old, new)
+    if old == new:
+        return
+    yield from _line(pair)
+    yield from _types(old, new)
+    for end in ("predecessor", "successor"):
+        yield from _link(old, new, end, roads)
+
+
+def _values(old: Road, new: Road) -> Iterator[MapChange]:
+    place = ChangePlace(old.id, 0.0, old.length)
+    for name, before, after in (
+        ("id", old.id, new.id),
+        ("name", old.name, new.name),
+        ("rule", old.rule, new.rule),
+    ):
+        if before != after:
+            subject = f"{name} of {of_road(old.id)}"
+            said = before or "none", after or "none"
+            yield MapChange("changed", "road", subject, *said, place=place)
+    if abs(old.length - new.length) > SAME:
+        said = f"{metres(old.length)} m", f"{metres(new.length)} m"
+        place = ChangePlace(old.id, old.length, old.length)
+        yield MapChange("changed", "geometry", f"length of {of_road(old.id)}", *said, place=place)
+
+
+def _line(pair: RoadPair) -> Iterator[MapChange]:
+    """Reference line, height, roll and lane offset, each with its greatest difference."""
+    end = min(pair.before.length, pair.after.length)
+    s = np.linspace(0.0, end, max(2, int(end / _STEP) + 1))
+    old, new = (
+        _evaluated(table, road, s)
+        for table, road in zip(pair.tables, (pair.before, pair.after), strict=True)
+    )
+    moved = np.hypot(old["x"] - new["x"], old["y"] - new["y"])
+    if moved.max() > _LINE:
+        yield MapChange(
+            "moved",
+            "geometry",
+            f"line of {of_road(pair.before.id)}",
+            None,
+            f"by up to {metres(float(moved.max()))} m",
+            place=_where(pair, s, moved, _LINE),
+        )
+    things: tuple[tuple[ChangedThing, str, float], ...] = (
+        ("elevation", "m", SAME),
+        ("superelevation", "rad", _ANGLE),
+        ("lane offset", "m", SAME),
+    )
+    for what, unit, same in things:
+        apart = np.abs(old[what] - new[what])
+        at = int(np.argmax(apart))
+        if apart[at] > same:
+            subject = f"{what} of {of_road(pair.before.id)} at s {metres(float(s[at]))} m"
+            before, after = (f"{metres(float(one[what][at]))} {unit}" for one in (old, new))
+            place = _where(pair, s, apart, same)
+            yield MapChange("changed", what, subject, before, after, place)
+
+
+def _evaluated(table: RoadTable, road: Road, s: FloatArray) -> dict[str, FloatArray]:
+    row = np.full(s.size, table.road_index[road.id])
+    line = table.reference(row, s)
+    return {
+        "x": line.x,
+        "y": line.y,
+        "elevation": line.z,
+        "superelevation": line.roll,
+        "lane offset": table.lane_offset(row, s),
+    }
+
+
+def _where(pair: RoadPair, s: FloatArray, apart: FloatArray, same: float) -> ChangePlace:
+    at = np.flatnonzero(apart > same)
+    return ChangePlace(pair.before.id, float(s[at[0]]), float(s[at[-1]]))
+
+
+def _types(old: Road, new: Road) -> Iterator[MapChange]:
+    if old.types == new.types:
+        return
+    end = min(old.length, new.length)
+    starts = merged((one.s for road in (old, new) for one in road.types), end=end)
+    before = None
+    for s0, s1 in zip(starts, [*starts[1:], end], strict=True):
+        said = _type_at(old, 0.5 * (s0 + s1)), _type_at(new, 0.5 * (s0 + s1))
+        if said[0] != said[1] and said != before:
+            subject = f"type of {of_road(old.id)}"
+            place = ChangePlace(old.id, s0, s1)
+            yield MapChange("changed", "road type", subject, *said, place=place)
+        before = said
+
+
+def _type_at(road: Road, s: float) -> str:
+    holding = [one.type for one in road.types if one.s <= s]
+    return holding[-1] if holding else "none"
+
+
+def _link(old: Road, new: Road, end: str, roads: Mapping[str, str]) -> Iterator[MapChange]:
+    before: RoadLink | None = getattr(old, end)
+    after: RoadLink | None = getattr(new, end)
+    said = _link_words(before, None), _link_words(after, roads)
+    if said[0] != said[1]:
+        at = 0.0 if end == "predecessor" else old.length
+        subject = f"{end} of {of_road(old.id)}"
+        yield MapChange("changed", "road link", subject, *said, place=ChangePlace(old.id, at, at))
+
+
+def _link_words(link: RoadLink | None, roads: Mapping[str, str] | None) -> str:
+    if link is None:
+        return "none"
+    number: Any = link.element_id
+    if roads is not None and link.element_type == "road":
+        number = roads.get(number, number)
+    end = f", its {link.contact_point}" if link.contact_point else ""
+    return f"{link.element_type} {number}{end}"
+
+
+_MOVED = 0.01
+_NEAR = 0.5
+_PLACE = ("id", "s", "t")
+_MS_UNITS = ("m/s", "km/h", "mph")
+
+
+def furniture_differences(old: Road, new: Road) -> Iterator[MapChange]:
+    """Differences of signals, references of signals, and objects of a road."""
+    yield from _things(old, new, old.signals, new.signals, _signal_name)
+    yield from _things(old, new, old.signal_references, new.signal_references, _reference_name)
+    yield from _things(old, new, old.objects, new.objects, _object_name)
+
+
+def _signal_name(one: Any) -> tuple[ChangedThing, str]:
+    return "signal", f"signal {shown_id(one.id)} (type {shown_id(one.type)})"
+
+
+def _reference_name(one: Any) -> tuple[ChangedThing, str]:
+    return "signal reference", f"reference to signal {shown_id(one.id)}"
+
+
+def _object_name(one: Any) -> tuple[ChangedThing, str]:
+    if one.type == "crosswalk":
+        return "crosswalk", f"crosswalk {shown_id(one.id)}"
+    return "object", f"object {shown_id(one.id)} ({one.type or 'no type'})"
+
+
+def _things(
+    old: Road,
+    new: Road,
+    before: Sequence[Any],
+    after: Sequence[Any],
+    name: Callable[[Any], tuple[ChangedThing, str]],
+) -> Iterator[MapChange]:
+    if before == after:
+        return
+    pairs, gone, came = _paired(before, after)
+    for one in gone:
+        what, subject = name(one)
+        yield MapChange("removed", what, f"{subject} of {of_road(old.id)}", place=_place(old, one))
+    for one in came:
+        what, subject = name(one)
+        yield MapChange("added", what, f"{subject} of {of_road(new.id)}", place=_place(new, one))
+    for first, second in pairs:
+        yield from _differences(old, first, second, name)
+
+
+def _place(road: Road, one: Any) -> ChangePlace:
+    return ChangePlace(road.id, one.s, one.s, None, one.t)
+
+
+def _paired(
+    before: Sequence[Any], after: Sequence[Any]
+) -> tuple[list[tuple[Any, Any]], list[Any], list[Any]]:
+    """Pair by id, the nearest first where an id is not unique; then by type and place."""
+    pairs: list[tuple[Any, Any]] = []
+    gone = _take_pairs(before, list(after), pairs, key=lambda one: one.id, within=float("inf"))
+    taken = {id(second) for _, second in pairs}
+    rest = [one for one in after if id(one) not in taken]
+    gone = _take_pairs(gone, rest, pairs, key=_kind, within=_NEAR)
+    taken = {id(second) for _, second in pairs}
+    return pairs, gone, [one for one in after if id(one) not in taken]
+
+
+def _kind(one: Any) -> tuple[str, str]:
+    return getattr(one, "type", one.id), getattr(one, "subtype", "")
+
+
+def _take_pairs(
+    before: Sequence[Any],
+    after: Sequence[Any],
+    pairs: list[tuple[Any, Any]],
+    *,
+    key: Callable[[Any], Any],
+    within: float,
+) -> list[Any]:
+    """Add pairs of the same key, nearest first; what found no partner is returned."""
+    free: dict[Any, list[Any]] = defaultdict(list)
+    for one in after:
+        free[key(one)].append(one)
+    alone = []
+    for one in before:
+        near = min(free[key(one)], key=lambda other: _apart(one, other), default=None)
+        if near is None or _apart(one, near) > within:
+            alone.append(one)
+            continue
+        free[key(one)] = [other for other in free[key(one)] if other is not near]
+        pairs.append((one, near))
+    return alone
+
+
+def _apart(one: Any, other: Any) -> float:
+    return hypot(one.s - other.s, one.t - other.t)
+
+
+def _differences(
+    road: Road, old: Any, new: Any, name: Callable[[Any], tuple[ChangedThing, str]]
+) -> Iterator[MapChange]:
+    what, subject = name(old)
+    of = f"{subject} of {of_road(road.id)}"
+    place = _place(road, old)
+    if _apart(old, new) > _MOVED:
+        before, after = (f"s {metres(one.s)} m, t {metres(one.t)} m" for one in (old, new))
+        yield MapChange("moved", what, of, before, after, place)
+    if old.id != new.id:
+        yield MapChange("changed", what, f"id of {of}", old.id, new.id, place=place)
+    for field in _fields(old):
+        before, after = getattr(old, field), getattr(new, field)
+        if field not in _PLACE and not _equal(before, after):
+            label = field.replace("_", " ")
+            values = _said(old, field), _said(new, field)
+            if values[0] == values[1]:
+                values = "as it was", "another"
+            yield MapChange("changed", what, f"{label} of {of}", *values, place=place)
+
+
+def _fields(one: Any) -> Sequence[str]:
+    names: Sequence[str] = getattr(one, "_fields", ())
+    return names or [field.name for field in fields(one)]
+
+
+def _equal(before: Any, after: Any) -> bool:
+    if isinstance(before, float) and isinstance(after, float):
+        return abs(before - after) <= SAME
+    return bool(before == after)
+
+
+def _said(one: Any, field: str) -> str:
+    value = getattr(one, field)
+    if field == "value" and value is not None and one.unit in _MS_UNITS:
+        return f"{metres(round(value * 3.6, 2))} km/h"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return metres(value)
+    if field == "validities":
+        return ", ".join(f"lanes {one.from_lane} to {one.to_lane}" for one in value) or "all lanes"
+    if isinstance(value, tuple):
+        return f"{len(value)}"
+    return str(value) if value not in (None, "") else "none"
+
 
 _SAME_PLACE = 0.1
 

@@ -72,7 +72,7 @@ def update(
     from odscen.base.text_files import write_text
     from odscen.carla.server.carla_server import Server
     from odscen.carla.server.client import Address
-    from odscen.carla.server.server_models import SOURCE, fetch_models
+    from odscen.carla.server.server_models import SOURCE, ServerModels
     from odscen.maps.store import Workspace
     from odscen.simulators.assets import BLUEPRINTS_FILE, blueprint_row
 
@@ -80,7 +80,7 @@ def update(
     old = store.assets()
     address = Address.parse(carla, timeout=timeout)
     with Server(address) as server:
-        models = fetch_models(server, old)
+        models = ServerModels(server, old).models()
     rows = [json.dumps(blueprint_row(model)) for model in models]
     sources = json.dumps({SOURCE: "measured on a CARLA server, one of each model"})
     text = f'{{"sources": {sources},\n"blueprints": [\n' + ",\n".join(rows) + "\n]}\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from odscen.base.markup import Markup, element, join, number
@@ -21,9 +22,32 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.drawing.map_drawing import MapDrawing
-    from odscen.drawing.sheet_options import RenderOptions
     from odscen.drawing.svg_layers import PlaceMarks
     from odscen.lanegraph.graphs import MapGraph
+
+
+@dataclass(frozen=True, slots=True)
+class RenderOptions:
+    """What the sheet shows.
+
+    Attributes
+    ----------
+    symbols, speed_limits
+        Lights and signs; speed-limit signs on top.
+    graph
+        Lane graph and pedestrian graph, if one is given.
+    segments
+        Segments of the graph, in alternating colours, if one is given.
+    margins
+        Name, figures, legend, scale; without them only the map is drawn.
+    """
+
+    symbols: bool = True
+    speed_limits: bool = False
+    graph: bool = True
+    segments: bool = False
+    margins: bool = True
+
 
 INK = "#22282e"
 _ROW = 24.0

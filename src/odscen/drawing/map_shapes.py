@@ -6,22 +6,177 @@ is neither gap nor overlap. Roads that pass over others are drawn a level up.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from odscen.base.arrays import Bounds, FloatArray, IntArray, offsets, ranges
-from odscen.drawing.furniture import add_furniture
-from odscen.drawing.junction_gaps import small_gaps
+from odscen.drawing.furniture import add_furniture, rings_of
 from odscen.drawing.lane_borders import evaluate_borders, inner_rows, thinned
 from odscen.drawing.map_drawing import BRIDGE, Area, Lines, MapDrawing, Mark
-from odscen.drawing.road_marks import road_marks
 from odscen.opendrive.road_model import DRIVABLE_TYPES
 
 if TYPE_CHECKING:
-    from odscen.drawing.lane_borders import Borders
+    from numpy.typing import NDArray
+
+    from odscen.base.arrays import BoolArray
+    from odscen.drawing.lane_borders import Borders, Sections
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.road_model import OpenDrive
+    from odscen.opendrive.road_model import OpenDrive, RoadMark
+
+
+_DASHES = {"broken": (3.0, 6.0), "botts dots": (0.2, 1.0)}
+_DASH_FAST = (6.0, 12.0)
+"""Broken lines outside towns, as on rural roads and motorways (painted, gap; metres)."""
+
+_UNPAINTED = frozenset({"none", "grass", ""})
+
+
+class _Stroke(NamedTuple):
+    """One painted line: a stretch of a border, shifted sideways, in a style."""
+
+    row: int
+    section: int
+    s_from: float
+    s_to: float
+    shift: float
+    style: tuple[str, float, tuple[float, float] | None]
+
+
+def road_marks(borders: Borders, levels: IntArray, tolerance: float) -> tuple[Mark, ...]:
+    """All painted markings, grouped by style; ``levels`` per section, ``tolerance`` in metres."""
+    strokes = _strokes(borders.sections)
+    if not strokes:
+        return ()
+    stations = borders.stations
+    section = np.array([stroke.section for stroke in strokes])
+    row = np.array([stroke.row for stroke in strokes])
+    # One ascending key over all sections finds both ends of all strokes in two calls.
+    base = offsets(np.ceil(borders.sections.s1 - borders.sections.s0).astype(np.int64) + 2)[:-1]
+    low_s = borders.sections.s0
+    key = base[stations.section] + stations.s - low_s[stations.section]
+    ends = np.array([(stroke.s_from, stroke.s_to) for stroke in strokes])
+    first = np.searchsorted(key, base[section] + ends[:, 0] - low_s[section] - 1e-5)
+    last = np.searchsorted(key, base[section] + ends[:, 1] - low_s[section] + 1e-5)
+    sizes = last - first
+    place = ranges(first, sizes)
+    on_line = place + np.repeat(borders.lines.start[row] - stations.start[section], sizes)
+    shift = np.repeat(np.array([stroke.shift for stroke in strokes]), sizes)[:, None]
+    normal = np.stack([stations.left_x[place], stations.left_y[place]], axis=1)
+    exact = Lines(borders.lines.xy[on_line] + shift * normal, offsets(sizes))
+    level = levels[section]
+    kept = np.flatnonzero(sizes >= 2)
+    thin = thinned(exact.take(kept), tolerance)
+    groups: dict[tuple[int, str, float, tuple[float, float]], list[int]] = {}
+    for line, stroke in enumerate(kept.tolist()):
+        color, width, dash = strokes[stroke].style
+        style = (int(level[stroke]), color, width, dash or (0.0, 0.0))
+        groups.setdefault(style, []).append(line)
+    return tuple(
+        Mark(at, color, width, dash if dash[0] else None, thin.take(np.array(groups[style])))
+        for style in sorted(groups)
+        for at, color, width, dash in [style]
+    )
+
+
+def _strokes(sections: Sections) -> list[_Stroke]:
+    lanes = int(sections.rows[-1])
+    strokes = []
+    for index, model in enumerate(sections.models):
+        row = int(sections.rows[index])
+        ids = sorted(lane for lane in model.lanes if lane != 0)
+        rows = {lane: row + k for k, lane in enumerate(ids)}
+        rows[0] = lanes + index
+        fast = bool(sections.fast[index])
+        for lane, item in model.lanes.items():
+            marks = item.road_marks
+            for k, mark in enumerate(marks):
+                s_from = max(mark.s, model.s)
+                s_to = marks[k + 1].s if k + 1 < len(marks) else model.s_end
+                if s_to - s_from < 0.05 or mark.type in _UNPAINTED:
+                    continue
+                strokes += [
+                    _Stroke(rows[lane], index, s_from, min(s_to, model.s_end), shift, style)
+                    for shift, style in _mark_styles(mark, lane, fast=fast)
+                ]
+    return strokes
+
+
+def _mark_styles(
+    mark: RoadMark, lane: int, *, fast: bool
+) -> list[tuple[float, tuple[str, float, tuple[float, float] | None]]]:
+    """Sideways shift and style of the one or two lines of a marking.
+
+    Double lines are named from the inside to the outside, at the centre from left to right
+    (section 11.9).
+    """
+    width = mark.width if 0.02 <= mark.width <= 1.0 else (0.25 if mark.weight == "bold" else 0.12)
+    width = round(width, 2)
+    color = "white" if mark.color in {"standard", ""} else mark.color
+    if mark.type == "curb":
+        color = "curb"
+    parts = mark.type.split() if mark.type != "botts dots" else ["botts dots"]
+    broken = _DASH_FAST if fast else _DASHES["broken"]
+    dashes = [broken if part == "broken" else _DASHES.get(part) for part in parts]
+    if len(parts) == 1:
+        return [(0.0, (color, width, dashes[0]))]
+    # Given widths of double lines may span both; a painted line is seldom over 15 cm.
+    thin = min(width, 0.15)
+    sign = 1.0 if lane > 0 else -1.0
+    return [(-sign * thin, (color, thin, dashes[0])), (sign * thin, (color, thin, dashes[1]))]
+
+
+SMALL = 15.0
+"""Square metres up to which a gap is no island."""
+
+_POLYGON = 3
+"""shapely's number of the geometry type."""
+
+
+def small_gaps(rings: Lines, junction: IntArray, road: BoolArray) -> Lines:
+    """Rings of the small gaps of all junctions.
+
+    Parameters
+    ----------
+    rings
+        Outlines of lanes.
+    junction
+        Shape ``(K,)``: number of the junction that each ring lies in, or -1.
+    road
+        Shape ``(K,)``: whether it is carriageway. Bits of other lanes, as of bicycle lanes, that
+        the carriageway and its gaps enclose are gaps as well.
+    """
+    import shapely
+
+    rows = np.flatnonzero(junction >= 0)
+    found: list[Any] = []
+    for number in np.unique(junction[rows]).tolist():
+        members = rows[junction[rows] == number]
+        part = rings.take(members)
+        index = np.repeat(np.arange(part.total), np.diff(part.start))
+        try:
+            outlines = shapely.linearrings(part.xy, indices=index)
+            lanes = shapely.make_valid(shapely.polygons(outlines))
+            gaps = _small_holes(lanes)
+            if not road[members].all():
+                gaps += _small_holes(np.concatenate([lanes[road[members]], np.array(gaps)]))
+        except (shapely.errors.GEOSException, ValueError):
+            continue  # a folded lane: the drawing does without the gaps beside it
+        found += gaps
+    return rings_of([shapely.get_coordinates(gap) for gap in found])
+
+
+def _small_holes(polygons: NDArray[Any]) -> list[Any]:
+    """Holes below :data:`SMALL` of the union of polygons, as polygons."""
+    import shapely
+
+    pieces = shapely.get_parts(shapely.union_all(polygons, grid_size=0.01))
+    holes = [
+        shapely.polygons(shapely.get_interior_ring(piece, k))
+        for piece in pieces[shapely.get_type_id(pieces) == _POLYGON]
+        for k in range(shapely.get_num_interior_rings(piece))
+    ]
+    return [hole for hole in holes if shapely.area(hole) < SMALL]
 
 
 TOLERANCE = 0.03

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import MissingDependencyError
 from odscen.base.markup import Markup, element, join, number
-from odscen.drawing.legend import INK, legend, legend_entries, place_entries
+from odscen.drawing.legend import INK, RenderOptions, legend, legend_entries, place_entries
 from odscen.drawing.palette import FONT
-from odscen.drawing.sheet_options import RenderOptions
 from odscen.drawing.svg_layers import (
     LayerOptions,
     graph_layers,

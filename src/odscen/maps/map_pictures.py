@@ -8,8 +8,8 @@ import numpy as np
 
 from odscen.base.errors import InputError
 from odscen.convert.verify.fidelity_result import NEAR
+from odscen.drawing.legend import RenderOptions
 from odscen.drawing.map_sheet import render_drawing, svg_to_png
-from odscen.drawing.sheet_options import RenderOptions
 from odscen.drawing.svg_layers import PlaceMarks
 
 if TYPE_CHECKING:

@@ -7,19 +7,45 @@ its folder alone. Poses are body centres in the OpenDRIVE frame; metres, radians
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
 from odscen.base.stored_files import stored_document, typed_rows
-from odscen.records.planned_stations import PlannedStation
-from odscen.records.row_text import (
-    VERSION,
-    field_defaults,
-    json_with_rows,
-    without_defaults,
-)
+from odscen.records.row_text import VERSION, field_defaults, json_with_rows, without_defaults
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
+
+
+StationKind = Literal["detector", "section", "cordon"]
+StationLine = tuple[tuple[str, float], ...]
+"""SUMO lanes and metres along them."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStation:
+    """A station of the scenario's study.
+
+    Attributes
+    ----------
+    first, second
+        Lines: of a detector where it lies, and none; of a section its begin and end; of a cordon
+        its entries and exits.
+    """
+
+    id: str
+    kind: StationKind
+    first: StationLine
+    second: StationLine = ()
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Inverse of ``dataclasses.asdict``, after JSON too."""
+        lines = (
+            tuple((str(lane), float(pos)) for lane, pos in data[name])
+            for name in ("first", "second")
+        )
+        return cls(str(data["id"]), data["kind"], *lines)
+
 
 _Row = TypeVar("_Row")
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.records.numbered_rows import by_vehicle_and_time, numbers
+from odscen.records.row_text import by_vehicle_and_time, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -12,8 +12,8 @@ from odscen.figures.measures.figure import Basis, SummaryPart
 from odscen.figures.measures.registry import names_of, run_figure
 from odscen.figures.measures.summary import ActorOutcome, actors_from_json
 from odscen.figures.measures.traffic_files import places_from_json, read_stations, read_tables
-from odscen.records.body_centres import body_centres
 from odscen.records.outcomes import RunStatus
+from odscen.records.replay import body_centres
 from odscen.records.run_events import Event, events_from_json
 from odscen.records.run_plan import Plan
 from odscen.runs import layout

@@ -26,9 +26,8 @@ from odscen.figures.measures.figure import RunData
 from odscen.figures.measures.signal_use import signal_use, write_signal_use
 from odscen.figures.measures.traffic_files import figures_json, write_stations, write_tables
 from odscen.records.light_programs import programs_from_json
-from odscen.records.planned_stations import PlannedStation
 from odscen.records.row_text import VERSION
-from odscen.records.run_plan import PLAN_FORMAT, Plan
+from odscen.records.run_plan import PLAN_FORMAT, Plan, PlannedStation
 from odscen.runs import layout
 from odscen.runs.net_facts import read_net_facts
 from odscen.runs.recorded import (

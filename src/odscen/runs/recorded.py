@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.figures.measures.conflicts import conflicts_of_slices
-from odscen.records.numbered_rows import with_numbered_names
+from odscen.records.row_text import with_numbered_names
 from odscen.runs.layout import (
     CALLS_FILE,
     CONFLICTS_FILE,
@@ -66,7 +66,7 @@ def scan_trajectories(run: Path) -> pl.LazyFrame | None:
     """Trajectories to compute with; ``None`` if none were recorded, or no road user was there.
 
     Names of those that are kept are numbered, see
-    :mod:`odscen.records.numbered_rows`, and without what figures are not made of.
+    :mod:`odscen.records.row_text`, and without what figures are not made of.
     """
     import polars as pl
 

@@ -106,7 +106,7 @@ class Simulator(ABC, Generic[Prepared]):
     makes all records of plain positions; figures and report follow from those.
 
     >>> class Teleporter(Simulator[RoutedRun]):
-    ...     '''Everybody is at the goal one second after departing.'''
+    ...     '''All are at their goals one second after departing.'''
     ...
     ...     label = "Teleporter"
     ...

@@ -102,7 +102,7 @@ class PositionRecord:
                 return
 
     def add(self, time: float, positions: Iterable[Position]) -> None:
-        """Take in where everybody is at a time, s; times rise.
+        """Take in where all road users are at a time, s; times rise.
 
         Raises
         ------

@@ -19,7 +19,7 @@ from odscen.figures.by_place.lane_groups import lane_groups
 from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.figures.by_place.queue_metres import queue_backs, queue_sums
 from odscen.records.light_programs import LightProgram, ShownGroup
-from odscen.records.numbered_rows import with_numbered_names
+from odscen.records.row_text import with_numbered_names
 
 LEFT, THROUGH = "r1>j1>r3", "r1>j1>r2"
 # The road (100 m) widens into a bay for the left turn (l, 40 m) beside the lane through (t, 40 m).

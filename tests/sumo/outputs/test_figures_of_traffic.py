@@ -34,7 +34,7 @@ from odscen.figures.by_place.traffic import TrafficFigures, over_run, traffic_fi
 from odscen.figures.by_place.traffic_sums import intervals
 from odscen.figures.measures.figure import RunData
 from odscen.figures.measures.registry import figure_values
-from odscen.records.planned_stations import PlannedStation, StationKind
+from odscen.records.run_plan import PlannedStation, StationKind
 from odscen.runs import layout
 from odscen.runs.net_facts import read_net_facts
 from odscen.sumo.outputs.lane_measures import lane_table

@@ -5,35 +5,51 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.categories import Body, Category
-from odscen.simulators.assets import Assets, Blueprint
+from odscen.simulators.assets import AssetSource, Blueprint
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.carla.server.carla_server import Server
+    from odscen.simulators.assets import Assets
 
 SOURCE = "server"
 """``dimensions_source`` of boxes that were measured on the server."""
 
 
-def fetch_models(server: Server, known: Assets) -> list[Blueprint]:
-    """Every vehicle and pedestrian of a server, by id, with the box that the server gives it.
+class ServerModels(AssetSource):
+    """The models of a CARLA server.
 
-    One of each is made aloft and taken away again. Where the server does not say what a model is
-    (two cars of 0.9.16, and pedestrians), the catalogue's word holds, else the number of wheels.
-    Models that the server refuses to make are left out.
+    Weather presets belong to the Python package carla, not to a server: there are none.
 
-    Raises
-    ------
-    CarlaError
-        If the server does not answer.
+    Parameters
+    ----------
+    known
+        The catalogue until now, for what the server does not say.
     """
-    described = server.describe(("vehicle.", "walker.pedestrian."))
-    shapes = server.shapes(tuple(described))
-    return [
-        _model(name, described[name], known.blueprints.get(name), shapes[name].extent)
-        for name in sorted(shapes)
-    ]
+
+    def __init__(self, server: Server, known: Assets) -> None:
+        self._server, self._known = server, known
+
+    def models(self) -> list[Blueprint]:
+        """Every vehicle and pedestrian of the server, by id, with the box that it gives it.
+
+        One of each is made aloft and taken away again. Where the server does not say what a model
+        is (two cars of 0.9.16, and pedestrians), the catalogue's word holds, else the number of
+        wheels. Models that the server refuses to make are left out.
+
+        Raises
+        ------
+        CarlaError
+            If the server does not answer.
+        """
+        described = self._server.describe(("vehicle.", "walker.pedestrian."))
+        shapes = self._server.shapes(tuple(described))
+        known = self._known.blueprints
+        return [
+            _model(name, described[name], known.get(name), shapes[name].extent)
+            for name in sorted(shapes)
+        ]
 
 
 def _model(

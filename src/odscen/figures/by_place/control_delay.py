@@ -25,7 +25,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from odscen.records.numbered_rows import (
+from odscen.records.row_text import (
     among,
     by_vehicle_and_time,
     changes,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.stored_files import tables
 from odscen.figures.measures.figure import Basis, Better, Display, ReportSection, RunFigure
-from odscen.records.numbered_rows import among
+from odscen.records.row_text import among
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

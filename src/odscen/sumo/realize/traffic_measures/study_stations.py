@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.records.planned_stations import PlannedStation
+from odscen.records.run_plan import PlannedStation
 from odscen.scenario.document.study_document import Cordon, Detector
 from odscen.scenario.placing.region import place_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.records.planned_stations import StationKind
+    from odscen.records.run_plan import StationKind
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.study_document import TravelTimeSection
     from odscen.sumo.realize.sumo_map import SumoMap
