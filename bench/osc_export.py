@@ -2,7 +2,7 @@
 
 ``python -m bench osc_export``. The seven templates on every shipped map that has room for them, and
 50 sampled scenarios, are exported in versions 1.0 to 1.3 and held against ASAM's schemas and
-checks; short runs of some as what happened (``--as-run``). ``make build/qc/checkers`` installs
+checks; short runs of some as what recorded (``--as-run``). ``make build/qc/checkers`` installs
 schemas and checks.
 """
 
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
-from odscen.app.export import export, export_run
+from odscen.app.exchange.exports import export, export_run
 from odscen.app.running.runs import run
 from odscen.app.scenarios import generate
 from odscen.app.template_scenarios import write_template
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[1]
 QC = ROOT / "build" / "qc"
 SECONDS = 30.0
-"""Of runs that are exported as what happened."""
+"""Of runs that are exported as what recorded."""
 
 
 def main() -> None:

@@ -19,8 +19,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from odscen.app.exchange.imports import import_file
 from odscen.app.running.runs import run
-from odscen.app.scenario_imports import import_scenario
 from odscen.base.errors import NoMapError, OdscenError
 from odscen.base.xml_reading import read_xml
 from odscen.maps.store import Workspace
@@ -100,7 +100,7 @@ def _one(file: Path, maps: Path, folder: Path, ego: EgoDriver) -> None:
     """Import and run one file in this process, and print what became of it."""
     workspace = Workspace.open(folder / "workspace")
     try:
-        found = import_scenario(workspace, file, maps=maps if maps.is_dir() else None, ego=ego)
+        found = import_file(workspace, file, maps=maps if maps.is_dir() else None, ego=ego)
     except NoMapError as error:
         counts = {one: len(error.lists[one]) for one in VERDICTS}
         print(json.dumps({"run": "no map", "report": counts}))

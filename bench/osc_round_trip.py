@@ -14,15 +14,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bench.osc_import import SHARED, is_scenario
-from odscen.app.export import export
-from odscen.app.scenario_imports import import_scenario
+from odscen.app.exchange.exports import export
+from odscen.app.exchange.imports import import_file
 from odscen.base.errors import OdscenError
 from odscen.changes.acting_differences import acting_differences
 from odscen.lanegraph.query import is_walk_node_id, node_index
 from odscen.maps.store import Workspace
 
 if TYPE_CHECKING:
-    from odscen.app.scenario_imports import ImportedScenario
+    from odscen.app.exchange.imports import ImportedFile
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.scenario_document import Scenario
 
@@ -55,20 +55,18 @@ def main() -> None:
     )
 
 
-def _wholly_taken(workspace: Workspace, file: Path, maps: Path) -> ImportedScenario | None:
+def _wholly_taken(workspace: Workspace, file: Path, maps: Path) -> ImportedFile | None:
     try:
-        read = import_scenario(workspace, file, maps=maps if maps.is_dir() else None)
+        read = import_file(workspace, file, maps=maps if maps.is_dir() else None)
     except OdscenError:
         return None
     return None if read.lists["refused"] else read
 
 
-def _differences(
-    workspace: Workspace, read: ImportedScenario, out: Path, version: str
-) -> list[str]:
+def _differences(workspace: Workspace, read: ImportedFile, out: Path, version: str) -> list[str]:
     files = export(workspace, read.scenario, out, to="openscenario", options={"version": version})
     (file,) = (one for one in files if one.suffix == ".xosc")
-    after = import_scenario(workspace, file).scenario
+    after = import_file(workspace, file).scenario
     graph = workspace.map(read.scenario.map.name).graph()
     found = acting_differences(read.scenario, after, placed=placed(graph, read.scenario))
     return [one.words for one in found if one.place[0] not in _NAMES]

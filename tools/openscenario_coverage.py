@@ -138,9 +138,8 @@ def covered() -> list[Covered]:
         versions[element].update(said)
     parents["OpenSCENARIO"] = set()
     versions["OpenSCENARIO"] = {"1.0", "1.1", "1.2", "1.3"}
-    app = ROOT / "src" / "odscen" / "app" / "scenario_imports.py"
-    read = named_in(SOURCES / "openscenario_import", app) | PASSED
-    written = named_in(SOURCES / "openscenario", SOURCES / "openscenario_export.py")
+    read = named_in(SOURCES / "openscenario_import") | PASSED
+    written = named_in(SOURCES / "openscenario", SOURCES / "openscenario_format.py")
     verdicts = _verdicts(parents, read)
     sections = _sections(parents)
     rows = [

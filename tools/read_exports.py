@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from odscen.app.export import export, export_run
+from odscen.app.exchange.exports import export, export_run
 from odscen.app.running.batches import run_many
 from odscen.app.scenarios import generate, read_scenario
 from odscen.maps.store import Workspace

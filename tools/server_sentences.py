@@ -29,6 +29,8 @@ SHOWN = (
     "carla/served/",
     "carla/server/",
     "convert/",
+    "formats/__init__",
+    "formats/base",
     "experiments/journal",
     "experiments/plan",
     "experiments/search",

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from odscen.app.demand.demands import add_background, fit_counts, import_demand, whole_day
     from odscen.app.demand.transit_feeds import import_transit
     from odscen.app.editing import Editing
-    from odscen.app.export import export
+    from odscen.app.exchange.exports import export
+    from odscen.app.exchange.imports import ImportedFile, import_file
     from odscen.app.learner_arrays import scenario_arrays, scenario_from_arrays
     from odscen.app.running.batches import run_many
     from odscen.app.running.reports import renew_report
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from odscen.experiments.studies import study_results as experiment_results
     from odscen.experiments.suite import read_suite
     from odscen.figures.judging.expectations import parse_expectation
+    from odscen.formats.base import Format
     from odscen.learning.hetero_data import read_arrays
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.shipped import shipped_maps
@@ -84,7 +86,10 @@ _HOMES = {
     "read_scenario": "odscen.app.scenarios",
     "write_scenario": "odscen.app.scenarios",
     "check": "odscen.app.scenarios:check_scenario",
-    "export": "odscen.app.export",
+    "export": "odscen.app.exchange.exports",
+    "import_file": "odscen.app.exchange.imports",
+    "ImportedFile": "odscen.app.exchange.imports",
+    "Format": "odscen.formats.base",
     "Editing": "odscen.app.editing",
     "SceneTemplate": "odscen.scenario.templates.scene_template",
     "templates": "odscen.app.template_scenarios",
@@ -149,7 +154,9 @@ __all__ = [
     "Editing",
     "ExperimentPlan",
     "ExperimentResults",
+    "Format",
     "GenerationSettings",
+    "ImportedFile",
     "InputError",
     "LimitError",
     "MapEntry",
@@ -181,6 +188,7 @@ __all__ = [
     "fit_counts",
     "generate",
     "import_demand",
+    "import_file",
     "import_signals",
     "import_transit",
     "parse_expectation",

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pytest
 
+from odscen.app.exchange.imports import import_file
 from odscen.app.running.runs import run
-from odscen.app.scenario_imports import import_scenario
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
 
@@ -61,7 +61,7 @@ def story(folder: Path, name: str, *, until: float = 45.0) -> dict[str, Motion]:
 @cache
 def _run(folder: Path, name: str, until: float) -> dict[str, Motion]:
     workspace = Workspace.open(folder / "workspace")
-    found = import_scenario(workspace, FOLDER / f"{name}.xosc")
+    found = import_file(workspace, FOLDER / f"{name}.xosc")
     assert [one for one in found.problems if one.severity == "error"] == []
     until = min(until, found.scenario.simulation.duration)
     settings = RunSettings(until=until)

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from odscen.app.scenario_imports import import_scenario
+from odscen.app.exchange.imports import import_file
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError
 from odscen.experiments.sweeps import sweep
@@ -24,7 +24,7 @@ from odscen.scenario.sweeps.sweep_plan import Range, Table, plan_from_data
 from tests.app.test_scenario_imports import FILE, SPEED, given
 
 if TYPE_CHECKING:
-    from odscen.app.scenario_imports import ImportedScenario
+    from odscen.app.exchange.imports import ImportedFile
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
 
 ALKS = Path(__file__).parents[2].parent / "shared" / "osc" / "alks"
@@ -72,7 +72,7 @@ def between(low: float, high: float, step: float) -> str:
     return f'<DistributionRange stepWidth="{step}">{limits}</DistributionRange>'
 
 
-def plan_of(found: ImportedScenario) -> SweepPlan:
+def plan_of(found: ImportedFile) -> SweepPlan:
     assert found.plan is not None
     return found.plan
 
@@ -80,7 +80,7 @@ def plan_of(found: ImportedScenario) -> SweepPlan:
 def test_parameters_stay_with_bounds_and_formulas_and_the_rest_says_where_it_is_fixed(
     workspace: Workspace, tmp_path: Path
 ) -> None:
-    found = import_scenario(workspace, given(tmp_path, TEXT))
+    found = import_file(workspace, given(tmp_path, TEXT))
     parameters = found.scenario.parameters
     assert list(parameters) == ["kph", "half", "ahead"]
     assert (parameters["kph"].value, parameters["kph"].min, parameters["kph"].max) == (36, 0, 90)
@@ -115,7 +115,7 @@ def test_ranges_sets_and_tables_make_a_grid_beside_the_scenario(
         + f"<{many}><ValueSetDistribution>{rows}</ValueSetDistribution></{many}>"
     )
     file = varied(tmp_path, f"<Deterministic>{inside}</Deterministic>")
-    found = import_scenario(workspace, file, out=tmp_path / "all.scenario.json")
+    found = import_file(workspace, file, out=tmp_path / "all.scenario.json")
     assert plan_of(found).axes == (
         Range("kph", 20, 60, 5),
         Table(("ahead",), ((0.0,), (10.0,), (20.0,))),
@@ -146,8 +146,8 @@ def test_draws_keep_to_their_distributions_and_their_seed(
         for name, inside in draws.items()
     )
     text = f'<Stochastic numberOfTestRuns="2000" randomSeed="7">{parts}</Stochastic>'
-    plan = plan_of(import_scenario(workspace, varied(tmp_path, text)))
-    again = plan_of(import_scenario(workspace, varied(tmp_path, text)))
+    plan = plan_of(import_file(workspace, varied(tmp_path, text)))
+    again = plan_of(import_file(workspace, varied(tmp_path, text)))
     assert plan == again
     kph, half, ahead = np.array([list(case.values()) for case in plan.cases()]).T
     assert len(kph) == 2000
@@ -155,7 +155,7 @@ def test_draws_keep_to_their_distributions_and_their_seed(
     assert np.mean(half > 7.9) == pytest.approx(0.75, abs=0.04)
     assert set(ahead) <= set(range(30, 51))
     other = varied(tmp_path, text.replace('Seed="7"', 'Seed="8"'))
-    assert plan_of(import_scenario(workspace, other)) != plan
+    assert plan_of(import_file(workspace, other)) != plan
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_broken_distributions_say_what_is_wrong(
     workspace: Workspace, tmp_path: Path, inside: str, words: str
 ) -> None:
     with pytest.raises(InputError, match=words):
-        import_scenario(workspace, varied(tmp_path, inside), out=tmp_path / "none.scenario.json")
+        import_file(workspace, varied(tmp_path, inside), out=tmp_path / "none.scenario.json")
     assert not (tmp_path / "none.scenario.json").exists()
 
 
@@ -181,7 +181,7 @@ def test_broken_distributions_say_what_is_wrong(
 @pytest.mark.slow
 def test_every_logical_scenario_of_alks_is_imported(workspace: Workspace, tmp_path: Path) -> None:
     files = sorted(ALKS.glob("*.xosc"))
-    found = [import_scenario(workspace, file, out=tmp_path / "s.json") for file in files]
+    found = [import_file(workspace, file, out=tmp_path / "s.json") for file in files]
     cases = {f.stem: 0 if one.plan is None else len(one.plan.cases())
              for f, one in zip(files, found, strict=True)}  # fmt: skip
     assert len(cases) == 15
@@ -195,7 +195,7 @@ def test_cases_of_the_alks_cut_in_differ_as_their_parameters_say(
     workspace: Workspace, tmp_path: Path
 ) -> None:
     out = tmp_path / "cut-in.scenario.json"
-    found = import_scenario(
+    found = import_file(
         workspace, ALKS / "alks_scenario_4_4_1_cut_in_no_collision_variation.xosc", out=out
     )
     ego, slower, gap = (
@@ -225,7 +225,7 @@ def test_what_a_sweep_places_appears_where_its_formulas_say(
     workspace: Workspace, tmp_path: Path
 ) -> None:
     inside = f"<Deterministic>{of('ahead', between(20, 60, 20))}</Deterministic>"
-    found = import_scenario(workspace, varied(tmp_path, inside))
+    found = import_file(workspace, varied(tmp_path, inside))
     (rule,) = (one for one in found.scenario.rules if one.id == "init-Other")
     appears = rule.then[0].appear
     assert appears is not None
@@ -272,6 +272,6 @@ def test_entries_of_catalogs_know_their_parameters_and_those_of_the_file(
     places = '<CatalogLocations><ManeuverCatalog><Directory path="own"/></ManeuverCatalog>'
     text = re.sub(r"<Maneuver name.*</Maneuver>", reference, FILE, flags=re.DOTALL)
     text = text.replace("<RoadNetwork>", f"{places}</CatalogLocations><RoadNetwork>")
-    found = import_scenario(workspace, given(tmp_path, text))
+    found = import_file(workspace, given(tmp_path, text))
     rules = {rule["id"]: rule["then"] for rule in json.loads(dumps(found.scenario))["rules"]}
     assert rules["later"][0]["speed"] == {"to": "$kph / 4", "rate": "abs($kph)"}

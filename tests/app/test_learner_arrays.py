@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import odscen
-from odscen.app.export import export
-from odscen.app.scenario_imports import import_scenario
+from odscen.app.exchange.exports import export
+from odscen.app.exchange.imports import import_file
 from odscen.app.template_scenarios import template_scenario
 from odscen.base.errors import InputError, NotFoundError
 from odscen.maps.store import Workspace
@@ -58,7 +58,7 @@ def test_what_openscenario_files_become_comes_back_byte_for_byte(
 ) -> None:
     files = export(workspace, sampled, tmp_path, to="openscenario")
     (xosc,) = (one for one in files if one.suffix == ".xosc")
-    scenario = import_scenario(workspace, xosc).scenario
+    scenario = import_file(workspace, xosc).scenario
     assert len(scenario.actors) > 10
     arrays = odscen.scenario_arrays(workspace, scenario)
     assert dumps(odscen.scenario_from_arrays(arrays)) == dumps(scenario)

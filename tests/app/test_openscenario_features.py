@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from odscen.app.exchange.imports import ImportedFile, import_file
 from odscen.app.running.runs import run
-from odscen.app.scenario_imports import ImportedScenario, import_scenario
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
@@ -58,22 +58,22 @@ def scene(*events: str, **changed: str) -> str:
     return text
 
 
-def read(workspace: Workspace, folder: Path, text: str, **others: str) -> ImportedScenario:
+def read(workspace: Workspace, folder: Path, text: str, **others: str) -> ImportedFile:
     (folder / "road.xodr").write_text(ROAD)
     for name, content in others.items():
         (folder / f"{name}.xosc").write_text(content)
     (folder / "scene.xosc").write_text(text)
-    found = import_scenario(workspace, folder / "scene.xosc")
+    found = import_file(workspace, folder / "scene.xosc")
     assert [one for one in found.problems if one.severity == "error"] == []
     return found
 
 
-def rule(found: ImportedScenario, name: str) -> dict[str, Any]:
+def rule(found: ImportedFile, name: str) -> dict[str, Any]:
     (one,) = (one for one in found.scenario.rules if one.id == name)
     return one.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
 
 
-def reasons(found: ImportedScenario, verdict: str) -> set[str]:
+def reasons(found: ImportedFile, verdict: str) -> set[str]:
     return {row.reason for row in found.lists[verdict]}
 
 
@@ -360,7 +360,7 @@ def test_each_kind_of_place_is_on_the_map(tmp_path: Path, name: str) -> None:
     road = ROAD.replace("</right>", f'<lane id="-3" type="shoulder">{width}</lane></right>')
     (tmp_path / "road.xodr").write_text(road)
     (tmp_path / "scene.xosc").write_text(scene(event("near", private(SPEED), there)))
-    found = import_scenario(Workspace.open(tmp_path / "w"), tmp_path / "scene.xosc")
+    found = import_file(Workspace.open(tmp_path / "w"), tmp_path / "scene.xosc")
     assert rule(found, "near")["when"]["reaches"]["place"] == pytest.approx(
         (at[0] + 1.4, at[1]), abs=1.01
     )

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from lxml import etree
 
-from odscen.app.export import export
-from odscen.app.scenario_imports import import_scenario
+from odscen.app.exchange.exports import export
+from odscen.app.exchange.imports import import_file
 from odscen.app.scenarios import generate, read_scenario
 from odscen.app.template_scenarios import template_scenario
 from odscen.changes.acting_differences import acting_differences
@@ -44,7 +44,7 @@ def there_and_back(
     files = export(workspace(), scenario, folder, to="openscenario", options={"version": version})
     (file,) = (one for one in files if one.suffix == ".xosc")
     (notes,) = (one for one in files if one.name.endswith(".export.json"))
-    return import_scenario(workspace(), file).scenario, json.loads(notes.read_text())
+    return import_file(workspace(), file).scenario, json.loads(notes.read_text())
 
 
 def unlisted(before: Scenario, after: Scenario, notes: dict[str, Any]) -> list[str]:
@@ -132,7 +132,7 @@ def test_weather_and_time_come_back_unless_the_file_is_changed(
     sight = re.search(r'visualRange="([0-9.]+)"', text)
     assert sight is not None
     file.write_text(text.replace(sight[0], 'visualRange="500"'))
-    changed = import_scenario(workspace(), file).scenario.environment
+    changed = import_file(workspace(), file).scenario.environment
     assert changed.preset == "ClearNoon"
     # 10 km (50 m / 10 km)^d = 500 m
     assert changed.parameters["fog_density"] == pytest.approx(56.542, abs=0.01)
@@ -197,7 +197,7 @@ def test_what_is_changed_in_the_file_holds_and_not_the_property(tmp_path: Path) 
     place.set("x", f"{float(place.get('x', '')) + 10.0}")
     speed.set("value", "12.5")
     tree.write(file)
-    after = import_scenario(workspace(), file).scenario
+    after = import_file(workspace(), file).scenario
     changed = {one.place: one.after for one in acting_differences(before, after)}
     assert changed.keys() == {("actors", "ego", "spawn"), ("actors", "ego", "initial_speed")}
     assert changed["actors", "ego", "initial_speed"] == "12.5"
@@ -218,7 +218,7 @@ def test_files_of_others_that_were_wholly_taken_say_the_same_when_they_are_writt
     tried = 0
     for file in files[::5]:
         try:
-            read = import_scenario(workspace(), file, maps=SHARED / "maps" / "carla-2020")
+            read = import_file(workspace(), file, maps=SHARED / "maps" / "carla-2020")
         except Exception:
             continue
         if read.lists["refused"] or any(one.severity == "error" for one in read.problems):

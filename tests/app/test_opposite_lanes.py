@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from odscen.app.exchange.imports import import_file
 from odscen.app.running.runs import run
-from odscen.app.scenario_imports import import_scenario
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
@@ -49,7 +49,7 @@ def overtaking(target: str, condition: str) -> str:
 
 
 def play(workspace: Workspace, file: Path, out: Path) -> tuple[Any, dict[str, pl.DataFrame]]:
-    found = import_scenario(workspace, file)
+    found = import_file(workspace, file)
     assert [one for one in found.problems if one.severity == "error"] == []
     settings = RunSettings(until=12.0)
     done = run(workspace, found.scenario, settings=settings, name="run", out=out)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from odscen.app.export import export
+from odscen.app.exchange.exports import export
+from odscen.app.exchange.imports import import_file
 from odscen.app.running.runs import run
-from odscen.app.scenario_imports import import_scenario
 from odscen.changes.acting_differences import acting_differences
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
@@ -128,7 +128,7 @@ def test_it_comes_back_from_a_file_but_for_scenario_runner(
         files = export(workspace, before, tmp_path / version, to="openscenario",
                        options={"version": version})  # fmt: skip
         (file,) = (one for one in files if one.suffix == ".xosc")
-        words = [one.place for one in acting_differences(before, import_scenario(
+        words = [one.place for one in acting_differences(before, import_file(
             workspace, file).scenario) if one.place[0] == "rules"]  # fmt: skip
         assert words == ([] if version == "1.2" else [("rules", "swerve")])
 

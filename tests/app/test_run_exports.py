@@ -17,10 +17,11 @@ import polars as pl
 import pytest
 from lxml import etree
 
-from odscen.app.export import EXPORTERS, export, export_run, export_runs
+from odscen.app.exchange.exports import export, export_run, export_runs
 from odscen.app.running.batches import run_many
 from odscen.base.errors import InputError
-from odscen.formats.exporter import WhatHappened
+from odscen.formats import list_formats
+from odscen.formats.base import RecordedRun
 from odscen.formats.recordings.tfrecord import read_tfrecord
 from odscen.formats.recordings.track_grid import ExportWindow, instants, tracks_of
 from odscen.learning.hetero_data import read_arrays
@@ -339,23 +340,23 @@ def test_a_scenario_that_has_not_run_is_refused(
 ) -> None:
     with pytest.raises(InputError, match="folder"):
         export(workspace, sampled, tmp_path, to=to)
-    assert EXPORTERS[to].files is None
+    assert "scenario" not in list_formats()[to].of
 
 
 # ---------------------------------------------------------------------------- the clock
-def _thinned(run: Run, every: int) -> WhatHappened:
-    from odscen.app.export import _happened
+def _thinned(run: Run, every: int) -> RecordedRun:
+    from odscen.app.exchange.exports import _read_recorded
 
-    happened = _happened(run.folder)
+    recorded = _read_recorded(run.folder)
     ticks = (pl.col("time") * 10).round().cast(pl.Int64)
-    rows = happened.rows.filter(ticks % every == 0)
-    return replace(happened, rows=rows, step=every / 10)
+    rows = recorded.rows.filter(ticks % every == 0)
+    return replace(recorded, rows=rows, step=every / 10)
 
 
 def test_half_a_second_between_records_is_bridged_and_said(
     workspace: Workspace, run: Run, sampled: Path
 ) -> None:
-    from odscen.app.export import _source
+    from odscen.app.exchange.exports import _source
     from odscen.app.scenarios import read_scenario
 
     source = _source(workspace, read_scenario(sampled), "run", {})
@@ -375,16 +376,16 @@ def test_half_a_second_between_records_is_bridged_and_said(
 def test_a_gap_in_what_was_recorded_is_not_bridged(
     workspace: Workspace, run: Run, sampled: Path
 ) -> None:
-    from odscen.app.export import _source
+    from odscen.app.exchange.exports import _source
     from odscen.app.scenarios import read_scenario
 
     source = _source(workspace, read_scenario(sampled), "run", {})
-    happened = _thinned(run, 5)
-    name = happened.rows["id"][0]
+    recorded = _thinned(run, 5)
+    name = recorded.rows["id"][0]
     gone = (pl.col("id") == name) & pl.col("time").is_between(1.9, 3.1)
-    happened = replace(happened, rows=happened.rows.filter(~gone))
-    times = instants(happened, ExportWindow())
-    tracks = tracks_of(source, happened, times)
+    recorded = replace(recorded, rows=recorded.rows.filter(~gone))
+    times = instants(recorded, ExportWindow())
+    tracks = tracks_of(source, recorded, times)
     valid = tracks.valid[tracks.ids.index(name)]
     there = {round(time, 1) for time in times[valid].tolist()}
     assert {1.5, 3.5} <= there

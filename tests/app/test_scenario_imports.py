@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from odscen.app.scenario_imports import import_scenario
+from odscen.app.exchange.imports import import_file
 from odscen.base.errors import InputError, NoMapError
 from odscen.maps.store import Workspace
 
@@ -83,7 +83,7 @@ def given(folder: Path, text: str) -> Path:
 
 def test_a_cut_in_becomes_rules_with_its_numbers(workspace: Workspace, tmp_path: Path) -> None:
     file = given(tmp_path, FILE.replace("ACTION", SPEED))
-    found = import_scenario(workspace, file)
+    found = import_file(workspace, file)
     scenario, rules = found.scenario, {rule.id: rule for rule in found.scenario.rules}
     ego, other = scenario.actors
     assert (ego.spawn, ego.initial_speed, ego.ego) == ("0.0.-1.25", 10.0, True)
@@ -105,7 +105,7 @@ def test_a_cut_in_becomes_rules_with_its_numbers(workspace: Workspace, tmp_path:
 
 
 def test_each_element_is_in_one_list_with_its_line(workspace: Workspace, tmp_path: Path) -> None:
-    found = import_scenario(workspace, given(tmp_path, FILE.replace("ACTION", SPEED)))
+    found = import_file(workspace, given(tmp_path, FILE.replace("ACTION", SPEED)))
     rows = [row.xpath for rows in found.lists.values() for row in rows]
     assert (
         len(rows)
@@ -120,7 +120,7 @@ def test_what_has_no_counterpart_is_refused_and_the_rest_stays(
     workspace: Workspace, tmp_path: Path
 ) -> None:
     action = '<TrailerAction><ConnectTrailerAction trailerRef="Ego"/></TrailerAction>'
-    found = import_scenario(workspace, given(tmp_path, FILE.replace("ACTION", action)))
+    found = import_file(workspace, given(tmp_path, FILE.replace("ACTION", action)))
     assert "odscen has no ConnectTrailerAction" in {r.reason for r in found.lists["refused"]}
     assert {rule.id for rule in found.scenario.rules} == {"init-Ego", "init-Other", "cut-in"}
 
@@ -133,7 +133,7 @@ def test_files_in_the_frame_of_carla_are_turned_over(
     text = re.sub(r'(<FileHeader [^>]*description=")[^"]*', rf"\g<1>{title}", text)
     place = f'<WorldPosition x="90" y="{y}" h="0"/>'
     text = re.sub(r"<LanePosition .*?/>", place, text, count=1, flags=re.DOTALL)
-    ego, _ = import_scenario(workspace, given(tmp_path, text)).scenario.actors
+    ego, _ = import_file(workspace, given(tmp_path, text)).scenario.actors
     assert ego.spawn.startswith("0.0.-1.")
 
 
@@ -148,7 +148,7 @@ def test_an_action_without_its_value_costs_its_event_and_no_more(
     workspace: Workspace, tmp_path: Path, old: str, new: str, why: str
 ) -> None:
     action = SPEED.replace(old, new)
-    found = import_scenario(workspace, given(tmp_path, FILE.replace("ACTION", action)))
+    found = import_file(workspace, given(tmp_path, FILE.replace("ACTION", action)))
     (refused,) = found.lists["refused"]
     assert why in refused.reason
     assert {rule.id for rule in found.scenario.rules} == {"init-Ego", "init-Other", "cut-in"}
@@ -168,7 +168,7 @@ def test_broken_files_say_what_is_wrong(
 ) -> None:
     text = FILE.replace("ACTION", SPEED).replace(old, new)
     with pytest.raises(InputError, match=words):
-        import_scenario(workspace, given(tmp_path, text))
+        import_file(workspace, given(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_without_its_map_a_file_has_a_report_and_with_a_given_one_it_is_read(
     file = given(tmp_path, text)
     out = tmp_path / "out.scenario.json"
     with pytest.raises(NoMapError, match=f"{words}.*; give one with --map") as missing:
-        import_scenario(workspace, file, out=out)
+        import_file(workspace, file, out=out)
     lists = missing.value.lists
     refused = {row.xpath.rpartition("/")[2] for row in lists["refused"]}
     assert {"RoadNetwork", "LanePosition", "RelativeLanePosition"} <= refused
@@ -193,18 +193,18 @@ def test_without_its_map_a_file_has_a_report_and_with_a_given_one_it_is_read(
     taken = {row.xpath.rpartition("/")[2] for row in lists["taken"]}
     assert {"AbsoluteTargetSpeed", "TimeHeadwayCondition", "LaneChangeAction"} <= taken
     assert not out.exists()
-    found = import_scenario(workspace, file, out=out, on_map=str(tmp_path / "road.xodr"))
+    found = import_file(workspace, file, out=out, on_map=str(tmp_path / "road.xodr"))
     assert (found.lists["refused"], [one.spawn for one in found.scenario.actors]) == (
         [],
         ["0.0.-1.25", "0.0.-2.44"],
     )
-    same = import_scenario(workspace, file, on_map=found.scenario.map.name)
+    same = import_file(workspace, file, on_map=found.scenario.map.name)
     assert same.scenario == found.scenario
 
 
 def test_names_are_not_computed(workspace: Workspace, tmp_path: Path) -> None:
     text = FILE.replace("ACTION", SPEED).replace('name="c"', 'name="c ${_ + $kph}"')
-    found = import_scenario(workspace, given(tmp_path, text))
+    found = import_file(workspace, given(tmp_path, text))
     assert found.lists["refused"] == []
 
 
@@ -216,7 +216,7 @@ def test_a_pedestrian_is_on_wheels_where_there_is_nothing_to_walk_on(
     file = given(tmp_path, text)
     road = file.with_name("road.xodr")
     road.write_text(ROAD.replace("</planView>", '</planView><type s="0" type="motorway"/>'))
-    found = import_scenario(workspace, file)
+    found = import_file(workspace, file)
     _, other = found.scenario.actors
     assert (str(other.category), other.spawn) == ("motorcycle", "0.0.-2.44")
     assert (
@@ -235,7 +235,7 @@ def test_a_lane_beside_another_counts_from_where_both_start(
         '<RelativeTargetLane entityRef="Other" value="1"/>',
         f'<RelativeTargetLane entityRef="Ego" value="{value}"/>',
     )
-    found = import_scenario(workspace, given(tmp_path, text))
+    found = import_file(workspace, given(tmp_path, text))
     changes = [rule.then[0].lane for rule in found.scenario.rules if rule.id == "cut-in"]
     assert [one.by for one in changes if one is not None] == ([] if by is None else [by])
 
@@ -252,7 +252,7 @@ def test_what_starts_with_an_act_starts_by_its_trigger(
         f'storyboardElementType="{element}" storyboardElementRef="{name}" state="startTransition"',
     )
     text = text.replace('<SimulationTimeCondition value="0"', '<SimulationTimeCondition value="4"')
-    found = import_scenario(workspace, given(tmp_path, text))
+    found = import_file(workspace, given(tmp_path, text))
     assert found.lists["refused"] == []
     rules = {rule.id: rule.when for rule in found.scenario.rules}
     held = rules["later"].time
@@ -264,7 +264,7 @@ def test_what_starts_with_an_act_starts_by_its_trigger(
 def test_what_appears_does_the_rest_when_it_is_there(workspace: Workspace, tmp_path: Path) -> None:
     text = FILE.replace("ACTION", SPEED)
     text = text.replace('<Vehicle name="v" vehicleCategory="van"/>', '<Pedestrian name="p"/>')
-    found = import_scenario(workspace, given(tmp_path, text))
+    found = import_file(workspace, given(tmp_path, text))
     (rule,) = (one for one in found.scenario.rules if one.id == "init-Other")
     appears, stops = rule.then
     assert appears.appear is not None

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from odscen.app.export import export
+from odscen.app.exchange.exports import export
+from odscen.app.exchange.imports import import_file
 from odscen.app.running.runs import run
-from odscen.app.scenario_imports import import_scenario
 from odscen.maps.store import Workspace
 from tests.app.test_openscenario_features import entity_condition, read, rule, scene, when
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.app.scenario_imports import ImportedScenario
+    from odscen.app.exchange.imports import ImportedFile
 
 TIME = (
     '<ByValueCondition><SimulationTimeCondition value="{}" rule="greaterThan"/></ByValueCondition>'
@@ -44,7 +44,7 @@ def stopping(*groups: str) -> str:
     return re.sub("(?s)<StopTrigger>.*</StopTrigger>", stop, scene())
 
 
-def ends(found: ImportedScenario) -> list[dict[str, Any]]:
+def ends(found: ImportedFile) -> list[dict[str, Any]]:
     made = [one for one in found.scenario.rules if one.then[0].end is not None]
     return [rule(found, one.id)["when"] for one in made]
 
@@ -103,6 +103,6 @@ def test_the_end_of_a_run_comes_back_from_an_export(workspace: Workspace, tmp_pa
             options={"version": version},
         )  # fmt: skip
         (file,) = (path for path in files if path.suffix == ".xosc")
-        again = import_scenario(workspace, file)
+        again = import_file(workspace, file)
         assert again.scenario.simulation.duration == 20.0
         assert ends(again) == whens == [DRIVEN, whens[1]]

@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from odscen.base.ids import JunctionId, LaneKey, RoadId, SumoEdgeId, SumoLaneId
-from odscen.convert.lane_table.mapping_intervals import MappingInterval
-from odscen.convert.lane_table.table import LaneTable, SumoEdge, SumoLane, SumoLight, SumoLink
+from odscen.convert.lane_table.table import (
+    LaneTable,
+    MappingInterval,
+    SumoEdge,
+    SumoLane,
+    SumoLight,
+    SumoLink,
+)
 from odscen.convert.model.net import Phase
 
 DRIVE = LaneKey(RoadId("1"), 0, -1)

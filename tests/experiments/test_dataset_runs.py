@@ -14,7 +14,7 @@ from odscen.base.errors import ConflictError, InputError, ScenarioError
 from odscen.experiments.datasets import DatasetPlan, make_dataset, read_dataset_plan
 from odscen.experiments.work import LocalExecutor, Outcome
 from odscen.formats.recordings.tfrecord import tfrecord
-from odscen.formats.scenarionet_export import pickled
+from odscen.formats.scenarionet_format import pickled
 from odscen.scenario.document.validation import validated
 from tests.experiments.study_case import place
 from tests.sumo.story_case import entry

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 import pytest
 
-from odscen.app.export import export
+from odscen.app.exchange.exports import export
 from odscen.app.running.runs import run
 from odscen.base.errors import ConflictError, InputError
 from odscen.experiments.sweeps import SweepSettings, read_sweep, sweep

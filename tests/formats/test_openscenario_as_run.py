@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from lxml import etree
 
-from odscen.app.export import export, export_run
+from odscen.app.exchange.exports import export, export_run
 from odscen.base.errors import InputError
 from odscen.formats.openscenario import xosc_as_run
 from odscen.formats.openscenario.dialect import VERSIONS

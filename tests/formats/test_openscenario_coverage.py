@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from odscen.app.export import export
-from odscen.app.scenario_imports import import_scenario
+from odscen.app.exchange.exports import export
+from odscen.app.exchange.imports import import_file
 from odscen.figures.measures.figure_docs import between_markers
 from odscen.maps.store import Workspace
 from tests.app.test_scenario_imports import FILE, SPEED, given
@@ -106,7 +106,7 @@ def test_what_the_table_refuses_is_what_the_reader_does_not_know(tmp_path: Path)
     assert len(kinds) > 40
     events = "".join(event(number, *made) for number, made in enumerate(kinds.values()))
     text = FILE.replace("ACTION", SPEED).replace("</Maneuver>", f"{events}</Maneuver>")
-    lists = import_scenario(Workspace.open(tmp_path / "w"), given(tmp_path, text)).lists
+    lists = import_file(Workspace.open(tmp_path / "w"), given(tmp_path, text)).lists
     unknown = {
         re.sub(r"\[\d+\]$", "", row.xpath.rpartition("/")[2])
         for row in lists["refused"]
@@ -136,7 +136,7 @@ ALKS = sorted((ROOT.parent / "shared" / "osc" / "alks" / "concrete_scenarios").g
 def test_what_the_table_does_not_call_read_is_not_read_in_the_alks_files(tmp_path: Path) -> None:
     workspace, read = Workspace.open(tmp_path / "w"), set()
     for file in ALKS:
-        lists = import_scenario(workspace, file).lists
+        lists = import_file(workspace, file).lists
         for row in (*lists["taken"], *lists["approximated"]):
             read.add(re.sub(r"\[\d+\]$", "", row.xpath.rpartition("/")[2]))
     assert len(read) > 50

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from lxml import etree
 
-from odscen.app.export import export
+from odscen.app.exchange.exports import export
 from odscen.base.errors import InputError
 from odscen.formats.openscenario.dialect import VERSIONS
 from odscen.lanegraph.query import node_index

@@ -10,7 +10,7 @@ import pytest
 from lxml import etree
 
 from bench.osc_export import QC, checked, schema
-from odscen.app.export import export
+from odscen.app.exchange.exports import export
 from odscen.app.template_scenarios import template_scenario
 from odscen.formats.openscenario.dialect import VERSIONS
 from odscen.formats.openscenario.xosc_signals import from_the_start

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from lxml import etree
 
-from odscen.app.export import export, export_run
+from odscen.app.exchange.exports import export, export_run
 from odscen.app.template_scenarios import template_scenario
 from odscen.formats.openscenario.xosc_actions import UNSAID_GOAL
 from tests.formats.test_openscenario_as_run import scenario as scenario_that_ran

@@ -12,12 +12,16 @@ export type ImportRow = Schemas["ImportRow"];
 export type ExportNotes = Schemas["ExportInfo"];
 export type ExportNote = Schemas["ExportNote"];
 
+/** A foreign format that scenarios or runs are read from or written to. */
+export type Format = Schemas["FormatInfo"];
+
 export const exchange = {
-  /** Takes a scenario of OpenSCENARIO, with its map and catalogs; gives its name, null if cancelled. */
-  bring: async (files: readonly File[], onStep: (job: Job) => void): Promise<string | null> => {
+  formats: () => call("get", "/api/formats"),
+  /** Takes a scenario of a format, with its map and catalogs; gives its name, null if cancelled. */
+  bring: async (of: string, files: readonly File[], onStep: (job: Job) => void): Promise<string | null> => {
     const body = new FormData();
     for (const file of files) body.append("files", file);
-    const { job } = await call("post", "/api/imports/openscenario", { body });
+    const { job } = await call("post", "/api/imports/{of}", { path: { of }, body });
     const done = await followJob(job, onStep);
     return done?.result ?? null;
   },

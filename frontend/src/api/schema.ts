@@ -1732,7 +1732,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/imports/openscenario": {
+    "/api/formats": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Formats
+         * @description All foreign formats, those of installed packages included.
+         */
+        get: operations["formats_api_formats_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/imports/{of}": {
         parameters: {
             query?: never;
             header?: never;
@@ -1742,10 +1762,10 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Import Openscenario
-         * @description Make a scenario of an OpenSCENARIO file, in the background; the result is its name.
+         * Import Files
+         * @description Make a scenario of a file of a foreign format, in the background; the result is its name.
          */
-        post: operations["import_openscenario_api_imports_openscenario_post"];
+        post: operations["import_files_api_imports__of__post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -2323,19 +2343,21 @@ export interface components {
             /** Converter */
             converter?: ("odscen" | "netconvert") | null;
         };
-        /** Body_import_openscenario_api_imports_openscenario_post */
-        Body_import_openscenario_api_imports_openscenario_post: {
+        /** Body_import_files_api_imports__of__post */
+        Body_import_files_api_imports__of__post: {
             /**
              * Files
-             * @description A scenario (.xosc), and if need be its map (.xodr) and catalogs.
+             * @description A scenario, and if need be its map (.xodr) and catalogs.
              */
             files: string[];
+            /** Ego */
+            ego?: ("story" | "sumo") | null;
             /**
-             * Ego
-             * @default story
-             * @enum {string}
+             * Option
+             * @description NAME=VALUE
+             * @default []
              */
-            ego?: "story" | "sumo";
+            option?: string[];
         };
         /** Body_import_programs_api_scenarios__name__signal_times_import_post */
         Body_import_programs_api_scenarios__name__signal_times_import_post: {
@@ -3811,6 +3833,42 @@ export interface components {
             initial_speed: number | null;
             /** Profile */
             profile: string | null;
+        };
+        /**
+         * FormatInfo
+         * @description A foreign format: what its files are of, whether it is read and written, and how.
+         */
+        FormatInfo: {
+            /** Id */
+            id: string;
+            /** Title */
+            title: string;
+            /** Description */
+            description: string;
+            /** Of */
+            of: ("scenario" | "run" | "map")[];
+            /** Suffixes */
+            suffixes: string[];
+            /** Reads */
+            reads: boolean;
+            /** Writes */
+            writes: boolean;
+            /** Options */
+            options: components["schemas"]["FormatOptionInfo"][];
+        };
+        /**
+         * FormatOptionInfo
+         * @description Something that a format lets one choose; ``values`` are all there are, if they are listed.
+         */
+        FormatOptionInfo: {
+            /** Name */
+            name: string;
+            /** Label */
+            label: string;
+            /** Values */
+            values: string[];
+            /** Default */
+            default: string;
         };
         /**
          * GapKeeping
@@ -22165,16 +22223,128 @@ export interface operations {
             };
         };
     };
-    import_openscenario_api_imports_openscenario_post: {
+    formats_api_formats_get: {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FormatInfo"][];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    import_files_api_imports__of__post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                of: string;
+            };
+            cookie?: never;
+        };
         requestBody: {
             content: {
-                "multipart/form-data": components["schemas"]["Body_import_openscenario_api_imports_openscenario_post"];
+                "multipart/form-data": components["schemas"]["Body_import_files_api_imports__of__post"];
             };
         };
         responses: {
@@ -22508,6 +22678,8 @@ export interface operations {
             query: {
                 to: string;
                 version?: string | null;
+                /** @description NAME=VALUE */
+                option?: string[];
             };
             header?: never;
             path: {
@@ -22623,6 +22795,8 @@ export interface operations {
             query: {
                 to: string;
                 version?: string | null;
+                /** @description NAME=VALUE */
+                option?: string[];
             };
             header?: never;
             path: {
@@ -22738,6 +22912,8 @@ export interface operations {
             query: {
                 to: string;
                 version?: string | null;
+                /** @description NAME=VALUE */
+                option?: string[];
             };
             header?: never;
             path: {

@@ -6,6 +6,7 @@ import { type DragEvent, useState } from "react";
 import { api } from "../api/client";
 import { removal } from "../api/removal";
 import type { MapInfo } from "../api/types";
+import { formatOf } from "../exchange/formats";
 import { isXosc, useImport } from "../exchange/useImport";
 import { forgetMaps } from "../map/loaded";
 import { IconSearch, IconTrash } from "../ui/icons";
@@ -58,7 +59,11 @@ export function CatalogueView() {
     setOver(false);
     const files = [...event.dataTransfer.files];
     if (files.some(isXosc)) importing.begin(files);
-    else if (files.length > 0) tell(t`Maps (.xodr) go onto “Add a map of your own”, below the maps.`);
+    else if (files.length > 0)
+      formatOf(files).then((of) => {
+        if (of !== null) importing.begin(files, of);
+        else tell(t`Maps (.xodr) go onto “Add a map of your own”, below the maps.`);
+      }, tellError);
   };
   const all = maps.value ?? [];
   const found = arranged(all, search, order, wishes);

@@ -56,7 +56,7 @@ export function Scenarios({
           <Button component="a" variant="default" size="sm" href={hashOf({ view: "studies" })}>
             <Trans>Studies</Trans>
           </Button>
-          <FileButton multiple accept={XOSC_FILES} onChange={importing.begin}>
+          <FileButton multiple accept={XOSC_FILES} onChange={(files) => importing.begin(files)}>
             {(props) => (
               <Button variant="default" size="sm" disabled={importing.state?.refusal === null} {...props}>
                 <Trans>Import OpenSCENARIO</Trans>

@@ -3,12 +3,12 @@ import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
 import { api } from "../api/client";
+import { exchange, type Format } from "../api/exchange";
 import { ExportDialog } from "../exchange/ExportDialog";
-import { type Format, FORMATS } from "../exchange/formats";
+import { takesScenarios } from "../exchange/formats";
 import { IconDown } from "../ui/icons";
+import { useLoaded } from "../ui/useLoaded";
 import { copyLink, savePicture, saveVector } from "../ui/share";
-
-const DIALOGS: Format[] = ["openscenario", "sumo"];
 
 /** The formats that the scenario can be taken away in, in the head of the page. */
 export function ExportMenu({
@@ -23,6 +23,7 @@ export function ExportMenu({
   onVector: () => string | null;
 }) {
   const [format, setFormat] = useState<Format | null>(null);
+  const { value } = useLoaded(exchange.formats);
   return (
     <>
       <Menu position="bottom-end" withinPortal={false} withInitialFocusPlaceholder={false}>
@@ -32,17 +33,14 @@ export function ExportMenu({
           </Button>
         </Menu.Target>
         <Menu.Dropdown>
-          {DIALOGS.map((one) => (
-            <Menu.Item key={one} onClick={() => setFormat(one)}>
-              {FORMATS()[one].title} …
+          {(value ?? []).filter(takesScenarios).map((one) => (
+            <Menu.Item key={one.id} onClick={() => setFormat(one)}>
+              {one.title} …
             </Menu.Item>
           ))}
           <Menu.Divider />
           <Menu.Item component="a" href={api.downloadUrl(name, "json")} download>
             <Trans>Document (JSON)</Trans>
-          </Menu.Item>
-          <Menu.Item component="a" href={api.downloadUrl(name, "graphml")} download>
-            <Trans>Graph (GraphML)</Trans>
           </Menu.Item>
           <Menu.Divider />
           <Menu.Item onClick={copyLink}>

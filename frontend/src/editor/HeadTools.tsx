@@ -72,7 +72,7 @@ export const HeadTools = memo(function HeadTools({
     }
     tell(t`Importing ${chosen.name} …`);
     exchange
-      .bring([chosen], () => undefined)
+      .bring("openscenario", [chosen], () => undefined)
       .then((made) => made !== null && go({ view: "imported", scenario: made }), tellError);
   };
   /** Whether there is a report is asked for when it could be chosen. */

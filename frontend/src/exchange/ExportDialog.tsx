@@ -8,11 +8,11 @@ import { Alert, Button, Group, Loader, Modal, Select, Text, Title } from "@manti
 import { useCallback, useState } from "react";
 
 import { ApiError } from "../api/client";
-import { exchange, type ExportNote, type ExportNotes } from "../api/exchange";
+import { exchange, type ExportNote, type ExportNotes, type Format } from "../api/exchange";
 import { IconDown } from "../ui/icons";
 import { useLoaded } from "../ui/useLoaded";
 import { sentence } from "../ui/words";
-import { type Format, FORMATS, VERSIONS } from "./formats";
+import { VERSIONS, wordsOf } from "./formats";
 import { served } from "../language/served";
 
 /** Notes that are shown at once. */
@@ -28,11 +28,13 @@ export function ExportDialog({
   format: Format;
   onClose: () => void;
 }) {
-  const [version, setVersion] = useState<string | null>(format === "openscenario" ? "1.2" : null);
+  const [version, setVersion] = useState<string | null>(
+    format.options.find((option) => option.name === "version")?.default ?? null,
+  );
   return (
-    <Modal opened onClose={onClose} size="lg" title={t`Export to ${FORMATS()[format].title}`}>
+    <Modal opened onClose={onClose} size="lg" title={t`Export to ${format.title}`}>
       <Text size="sm" mb="sm">
-        {FORMATS()[format].words}
+        {wordsOf(format)}
       </Text>
       {version !== null && (
         <Select
@@ -45,12 +47,12 @@ export function ExportDialog({
           mb="md"
         />
       )}
-      <Body key={version} name={name} format={format} version={version} />
+      <Body key={version} name={name} format={format.id} version={version} />
     </Modal>
   );
 }
 
-function Body({ name, format, version }: { name: string; format: Format; version: string | null }) {
+function Body({ name, format, version }: { name: string; format: string; version: string | null }) {
   const [problems, setProblems] = useState<readonly string[]>([]);
   const load = useCallback(
     () =>
@@ -99,7 +101,7 @@ function Notes({
   format,
 }: {
   notes: ExportNotes;
-  format: Format;
+  format: string;
 }) {
   if (format !== "openscenario") return null;
   if (approximated.length + leftOut.length === 0)

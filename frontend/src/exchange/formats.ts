@@ -1,24 +1,32 @@
 import { t } from "@lingui/core/macro";
 
+import { exchange, type Format } from "../api/exchange";
 import { localized } from "../language/localized";
+import { served } from "../language/served";
+import { sentence } from "../ui/words";
 
-/** Formats that a scenario can be exported to, besides its document. */
-export type Format = "openscenario" | "sumo" | "graphml";
-
-export const FORMATS = localized((): Record<Format, { title: string; words: string }> => ({
-  openscenario: {
-    title: "OpenSCENARIO",
-    words: t`Road users and rules for esmini, ScenarioRunner and others, with the map beside them. SUMO's traffic does not travel.`,
-  },
-  sumo: {
-    title: "SUMO",
-    words: t`Network, routes and configuration, which run with plain sumo -c.`,
-  },
-  graphml: {
-    title: "GraphML",
-    words: t`The lane graph with the scenario on it, for networkx and other graph tools.`,
-  },
+/** What formats are that the page has words of its own for. */
+const WORDS = localized((): Record<string, string> => ({
+  openscenario: t`Road users and rules for esmini, ScenarioRunner and others, with the map beside them. SUMO's traffic does not travel.`,
+  sumo: t`Network, routes and configuration, which run with plain sumo -c.`,
+  graphml: t`The lane graph with the scenario on it, for networkx and other graph tools.`,
 }));
+
+/** What a format is, in a sentence. */
+export const wordsOf = ({ id, description }: Format): string => WORDS()[id] ?? sentence(served(description));
+
+/** Whether a scenario can be exported to it. */
+export const takesScenarios = ({ writes, of }: Format): boolean => writes && of.includes("scenario");
+
+/** Format that one of the files is read as, by the longest ending that one has. */
+export async function formatOf(files: readonly File[]): Promise<string | null> {
+  let best: { id: string; length: number } | null = null;
+  for (const { id, reads, suffixes } of await exchange.formats())
+    for (const end of reads ? suffixes : [])
+      if (files.some(({ name }) => name.toLowerCase().endsWith(end)))
+        if (best === null || end.length > best.length) best = { id, length: end.length };
+  return best?.id ?? null;
+}
 
 export const VERSIONS = localized(() => [
   { value: "1.0", label: t`1.0, as ScenarioRunner reads it` },

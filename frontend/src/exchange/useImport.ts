@@ -18,23 +18,23 @@ export interface ImportState {
 
 export interface Import {
   state: ImportState | null;
-  begin: (files: readonly File[]) => void;
+  begin: (files: readonly File[], of?: string) => void;
   cancel: () => void;
   close: () => void;
 }
 
 export const isXosc = ({ name }: File): boolean => /\.xosc$/i.test(name);
 
-/** Imports files of OpenSCENARIO, and then shows the report. */
+/** Imports files, of OpenSCENARIO if nothing else is said, and then shows the report. */
 export function useImport(): Import {
   const [state, setState] = useState<ImportState | null>(null);
   const busy = useRef(false);
-  const begin = (files: readonly File[]): void => {
+  const begin = (files: readonly File[], of = "openscenario"): void => {
     if (busy.current || files.length === 0) return;
     busy.current = true;
     setState({ files, step: t`Sending the files`, job: null, refusal: null });
     exchange
-      .bring(files, ({ id, step }) =>
+      .bring(of, files, ({ id, step }) =>
         setState({ files, step: sentence(served(step)), job: id, refusal: null }),
       )
       .then(

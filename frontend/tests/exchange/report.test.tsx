@@ -2,7 +2,7 @@
 import { screen, within } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
-import type { ImportReport, ImportRow } from "../../src/api/exchange";
+import type { Format, ImportReport, ImportRow } from "../../src/api/exchange";
 import { ExportDialog } from "../../src/exchange/ExportDialog";
 import { ImportWork } from "../../src/exchange/ImportWork";
 import { elementWord, grouped, pinsOf, plainReason } from "../../src/exchange/report";
@@ -20,6 +20,16 @@ const row = (xpath: string, line: number, reason = "", at: [number, number] | nu
   x: at?.[0] ?? null,
   y: at?.[1] ?? null,
 });
+const OPENSCENARIO: Format = {
+  id: "openscenario",
+  title: "OpenSCENARIO",
+  description: "",
+  of: ["scenario", "run"],
+  suffixes: [".xosc"],
+  reads: true,
+  writes: true,
+  options: [{ name: "version", label: "Version", values: ["1.0", "1.2"], default: "1.2" }],
+};
 const NO_PART = "odscen has no part for it";
 const REPORT: ImportReport = {
   scenario: "cut_in-1",
@@ -143,7 +153,7 @@ test("an export says what its version cannot before it is downloaded", async () 
       ],
     },
   });
-  show(<ExportDialog name="a" format="openscenario" onClose={() => undefined} />);
+  show(<ExportDialog name="a" format={OPENSCENARIO} onClose={() => undefined} />);
   expect(await screen.findByText("Cannot be said, and is left out: 2")).toBeTruthy();
   expect(screen.getByText("flows, seed")).toBeTruthy();
   expect(asked[0]?.path).toBe("/api/scenarios/a/export/notes?to=openscenario&version=1.2");
@@ -153,7 +163,13 @@ test("an export says what its version cannot before it is downloaded", async () 
 
 test("a scenario that cannot be exported says why, and offers no download", async () => {
   server({});
-  show(<ExportDialog name="a" format="sumo" onClose={() => undefined} />);
+  show(
+    <ExportDialog
+      name="a"
+      format={{ ...OPENSCENARIO, id: "sumo", title: "SUMO", options: [] }}
+      onClose={() => undefined}
+    />,
+  );
   expect(await screen.findByText("It cannot be exported as it is")).toBeTruthy();
   expect(screen.queryByRole("link", { name: "Download (ZIP)" })).toBeNull();
 });

@@ -1,4 +1,4 @@
-"""``odscen generate``, ``check``, ``replay`` and ``export``: scenarios before they run."""
+"""``odscen generate``, ``check`` and ``replay``: scenarios before they run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from odscen.app.export import EXPORTERS
 from odscen.base.errors import InputError, in_file
 from odscen.cli.console import (
     JsonOption,
@@ -30,12 +29,6 @@ _MOST_REMARKS = 10
 ScenarioArgument = Annotated[
     Path, typer.Argument(help="Scenario, as JSON, GraphML or arrays.", metavar="SCENARIO")
 ]
-
-
-def _format(text: str) -> str:
-    if text not in EXPORTERS:
-        raise typer.BadParameter(f"{text!r} is not one of {', '.join(EXPORTERS)}")
-    return text
 
 
 def generate(
@@ -231,66 +224,6 @@ def replay(
     log(f"{path}: rule {rule.id}")
     if as_json:
         print_json({"file": str(path), "rule": rule.id})
-
-
-def export(
-    scenario: Annotated[
-        Path,
-        typer.Argument(
-            help="Scenario, as JSON, GraphML or arrays; for formats of runs and with --as-run the "
-            "folder of a run, or of several.",
-            metavar="SCENARIO",
-        ),
-    ],
-    to: Annotated[
-        str,
-        typer.Option(
-            parser=_format,
-            metavar="|".join(EXPORTERS),
-            help="; ".join(f"{one.name}: {one.label}" for one in EXPORTERS.values()) + ".",
-        ),
-    ],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.", metavar="DIR")],
-    version: Annotated[
-        str | None,
-        typer.Option(help="Of OpenSCENARIO: 1.0 to 1.3. (default: 1.2)", metavar="VERSION"),
-    ] = None,
-    as_run: Annotated[
-        bool,
-        typer.Option(
-            "--as-run",
-            help="Write what happened in a run: each road user as a trajectory, and what "
-            "lights showed. (openscenario; the formats of runs need no word)",
-        ),
-    ] = False,
-    begin: Annotated[
-        str | None,
-        typer.Option(help="Of a run: from this second on.", metavar="SECONDS"),
-    ] = None,
-    end: Annotated[
-        str | None,
-        typer.Option(help="Of a run: up to this second.", metavar="SECONDS"),
-    ] = None,
-    workspace: WorkspaceOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Write a scenario, or a run, in another format.
-
-    What a format cannot say is listed in a file NAME.export.json beside it.
-    """
-    from odscen.app.export import export as as_scenario
-    from odscen.app.export import export_runs
-    from odscen.maps.store import Workspace
-
-    given = {"version": version, "begin": begin, "end": end}
-    options = {name: value for name, value in given.items() if value is not None}
-    of_runs = EXPORTERS[to].runs is not None and scenario.is_dir()
-    write = export_runs if as_run or of_runs else as_scenario
-    files = write(Workspace.open(workspace), scenario, out, to=to, options=options)
-    for file in files:
-        log(f"Wrote {file}")
-    if as_json:
-        print_json({"files": [str(file) for file in files]})
 
 
 def variant(

@@ -29,7 +29,7 @@ from odscen.experiments.studies import begin_study_of, carry_out_study
 from odscen.experiments.table import STUDY, columns_of, read_limit, study_figures
 from odscen.experiments.work import versions
 from odscen.figures.measures.usability import UsabilityLevel
-from odscen.formats.scenarionet_export import pickled
+from odscen.formats.scenarionet_format import pickled
 from odscen.records.outcomes import RunStatus
 from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.validation import validated

@@ -305,7 +305,7 @@ class _StoppableReporter(Reporter):
 def _exported(
     formats: tuple[str, ...], workspace: Workspace, result: Run
 ) -> dict[str, dict[str, bytes]]:
-    from odscen.app.export import export_run
+    from odscen.app.exchange.exports import export_run
 
     found = {}
     for one in formats:

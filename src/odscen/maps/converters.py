@@ -56,8 +56,7 @@ def _own(source: MapInput) -> SumoNetwork:
 
 
 def _netconvert(source: MapInput) -> SumoNetwork:
-    from odscen.convert.imported.import_findings import unread_signs
-    from odscen.convert.imported.imported_network import imported_network
+    from odscen.convert.imported.imported_network import imported_network, unread_signs
     from odscen.maps.netconvert import convert_map
 
     net_xml, entries = convert_map(source.xodr, lefthand=source.odr.rule == "LHT")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from odscen.app.export import export
+from odscen.app.exchange.exports import export
 from odscen.app.networks import bring_in
 from odscen.app.running.runs import run
 from odscen.app.scenarios import read_scenario, write_scenario

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from odscen.convert.building.swept_paths import MOST_SWEPT, bent_aside, swept_width
+from odscen.convert.building.junctions import MOST_SWEPT, bent_aside, swept_width
 from odscen.convert.model.right_of_way import Movement
 from tests.convert.turns import turn_left
 

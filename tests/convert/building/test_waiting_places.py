@@ -14,7 +14,7 @@ import shapely
 import sumo
 
 from odscen.base.arrays import FloatArray
-from odscen.convert.building.waiting_places import inner_junctions
+from odscen.convert.building.junctions import inner_junctions
 from odscen.convert.model.net import NetLane, Request
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
 from tests.convert.maps import Converted, converted, each_map, named

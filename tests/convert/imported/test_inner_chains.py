@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from odscen.convert.imported.inner_chains import (
+from odscen.convert.imported.geometric_table import (
     InnerChain,
     InnerLane,
     LanePoint,
@@ -12,7 +12,7 @@ from odscen.convert.imported.inner_chains import (
     chains_of,
     shortest_path,
 )
-from odscen.convert.imported.lane_samples import LaneSamples
+from odscen.convert.imported.lane_matching import LaneSamples
 from odscen.convert.imported.net_import import read_network
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse

@@ -6,8 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.base.ids import LaneKey, RoadId
-from odscen.convert.imported.lane_matching import REACH, intervals_of, match
-from odscen.convert.imported.lane_samples import LaneSamples, sample_shapes
+from odscen.convert.imported.lane_matching import (
+    REACH,
+    LaneSamples,
+    intervals_of,
+    match,
+    sample_shapes,
+)
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from tests.opendrive.snippets import document, lane, road, section

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.base.ids import LaneKey, RoadId
-from odscen.convert.imported import lane_samples
-from odscen.convert.imported.lane_samples import LaneSamples, SampledLines, sample_shapes
+from odscen.convert.imported import lane_matching as lane_samples
+from odscen.convert.imported.lane_matching import LaneSamples, SampledLines, sample_shapes
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from tests.opendrive.snippets import document, road

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.convert.lane_table.mapping_intervals import (
+from odscen.convert.lane_table.table import (
     SIMPLE_DEVIATION,
     SIMPLE_S,
     MappingInterval,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from odscen.base.errors import GraphFormatError
 from odscen.base.ids import LaneKey, RoadId, SumoEdgeId, SumoLaneId
-from odscen.convert.lane_table.lookup import SNAP
+from odscen.convert.lane_table.table import SNAP
 from odscen.convert.lane_table.table_json import table_from_json, table_to_json
 from tests.convert.tables import AGAINST, DRIVE, INSIDE, WALK, table
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from odscen.convert.model.major_road import major_edges, stands_out
+from odscen.convert.building.junction_ruling import major_edges, stands_out
 from odscen.convert.model.right_of_way import Movement, Sign
 from tests.convert.maps import converted, named
 

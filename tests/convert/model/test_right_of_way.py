@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from odscen.convert.building.junction_ruling import sight_before, sight_without_sign
 from odscen.convert.model.right_of_way import (
     Movement,
     Rules,
@@ -21,7 +22,6 @@ from odscen.convert.model.right_of_way import (
     requests,
     wrapped,
 )
-from odscen.convert.model.sight import sight_before, sight_without_sign
 
 RIGHT = Rules()
 LEFT = Rules(lefthand=True)

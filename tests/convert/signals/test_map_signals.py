@@ -7,7 +7,7 @@ import re
 import pytest
 
 from odscen.convert.model.conversion_report import ElementOutcome
-from odscen.convert.signals.signal_facing import (
+from odscen.convert.signals.map_signals import (
     AWAY_FROM_HOME,
     AWAY_THROUGHOUT,
     FAR_SIDE,

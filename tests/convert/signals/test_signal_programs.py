@@ -18,8 +18,8 @@ from odscen.convert.signals.signal_programs import (
     plan_stages,
     program,
 )
+from odscen.convert.verify.fidelity import unsafe_pairs
 from odscen.convert.verify.net_reader import read_net
-from odscen.convert.verify.signal_safety import unsafe_pairs
 from odscen.opendrive.objects import signal_kind
 from tests.convert.maps import converted, each_map, named
 

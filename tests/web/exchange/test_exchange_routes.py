@@ -14,12 +14,13 @@ import pytest
 from lxml import etree
 from starlette.testclient import TestClient
 
-from odscen.app.scenario_imports import import_scenario
-from odscen.formats.openscenario_import.import_report import VERDICTS
+from odscen.app.exchange.imports import import_file
+from odscen.formats.base import VERDICTS
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import loads
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
+from tests import own_format
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
 from tests.web.conftest import CROSSING, finished, job
 
@@ -296,7 +297,7 @@ def test_an_export_that_cannot_be_is_refused(client: TestClient, sampled: str) -
 def test_the_command_line_reads_the_same(known: TestClient, tmp_path: Path) -> None:
     (tmp_path / "a.xosc").write_text(CUT_IN, encoding="utf-8")
     (tmp_path / "road.xodr").write_text(ROAD, encoding="utf-8")
-    here = import_scenario(Workspace.open(tmp_path / "w"), tmp_path / "a.xosc")
+    here = import_file(Workspace.open(tmp_path / "w"), tmp_path / "a.xosc")
     there = report_of(known, ("a.xosc", CUT_IN))
     text = known.get(f"/api/scenarios/{there['scenario']}/download").text
     assert loads(text) == here.scenario
@@ -329,3 +330,20 @@ def test_a_finished_run_is_downloaded_as_it_happened(client: TestClient, sampled
     assert root.find(".//TimeReference/Timing") is not None
     assert client.get("/api/runs/none/export", params=wish).status_code == 404
     assert client.get(f"/api/runs/{run}/export", params={"to": "graphml"}).status_code == 422
+
+
+def test_a_format_of_a_package_is_listed_and_downloaded(
+    client: TestClient, sampled: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own_format.install(tmp_path, monkeypatch)
+    try:
+        listed = {one["id"]: one for one in client.get("/api/formats").json()}
+        assert {"openscenario", "sumo", "graphml", "arrays", "waymo"} <= listed.keys()
+        own = listed["actors"]
+        assert (own["title"], own["reads"], own["writes"]) == (
+            "Table of road users (CSV)", True, True,
+        )  # fmt: skip
+        (name,) = opened(client, sampled, to="actors")
+        assert name == f"{sampled}.actors.csv"
+    finally:
+        own_format.forget()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import ScenarioError, in_file
 from odscen.base.given_files import read_given
-from odscen.formats.trajectory_table import read_trajectories_table, trajectory_rows
+from odscen.formats.trajectories_format import read_trajectories_table, trajectory_rows
 from odscen.runs.finished_run import Run
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.validation import validated
@@ -37,7 +37,7 @@ def attach_trajectory(
     Parameters
     ----------
     source
-        CSV or Parquet, see :mod:`odscen.formats.trajectory_table`, or the folder of a run.
+        CSV or Parquet, see :mod:`odscen.formats.trajectories_format`, or the folder of a run.
     of
         Who was recorded; not needed if there is one only.
     begin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -9,9 +10,12 @@ import numpy as np
 import shapely
 
 from odscen.base.ids import SumoEdgeId
-from odscen.convert.building.junction_ruling import junction_kind, ruled, signposts
-from odscen.convert.building.swept_paths import swept_width
-from odscen.convert.building.waiting_places import inner_junctions, waiting_places
+from odscen.convert.building.junction_ruling import (
+    junction_kind,
+    ruled,
+    sight_without_sign,
+    signposts,
+)
 from odscen.convert.model.lane_alignment import divided_shape, drawn_length
 from odscen.convert.model.net import (
     INTERNAL,
@@ -23,8 +27,7 @@ from odscen.convert.model.net import (
     TrafficLight,
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
-from odscen.convert.model.right_of_way import Sign
-from odscen.convert.model.sight import sight_without_sign
+from odscen.convert.model.right_of_way import MOST_WIDTH, OPPOSING, Sign, wrapped
 from odscen.convert.signals.light_links import direction, light_links, nearer_edge
 from odscen.convert.signals.shared_green import LightLinks, light_stages, link_conflicts
 from odscen.convert.signals.signal_programs import program
@@ -36,8 +39,202 @@ if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
     from odscen.base.ids import SumoLaneId
     from odscen.convert.building.junction_ruling import Ruling
-    from odscen.convert.model.right_of_way import Conflicts, Movement
-    from odscen.convert.model.walk_net import PlacedCrossing
+    from odscen.convert.model.net import Request
+    from odscen.convert.model.right_of_way import Conflicts, Movement, Walkway
+    from odscen.convert.pedestrian.pedestrian_network import PlacedCrossing
+
+
+BUS_LENGTH = 12.0
+"""Metres of the longest body that turns are made for."""
+
+MOST_SWEPT = 4.0
+"""Metres that are added to the width of an internal lane, at most."""
+
+LEAST_BENT = 0.25
+"""Metres that a path which goes straight on bends aside, from which on that is allowed for."""
+
+_STRAIGHT = math.radians(30.0)
+"""Turns of less than that go straight on."""
+
+_STEP = 0.5
+"""Metres between the places at which a body is looked at."""
+
+
+def swept_width(movement: Movement, length: float) -> float:
+    """Metres by which an internal lane is wider for a bus: SUMO keeps others off a lane's width.
+
+    Half of what a lane is wider lies on the side of the flank: hence twice the sagitta.
+
+    Parameters
+    ----------
+    length
+        Metres of the path.
+    """
+    radius = length / max(abs(movement.turn), 1e-3)
+    aside = max(BUS_LENGTH**2 / (8.0 * radius), bent_aside(movement))
+    return min(2.0 * aside, MOST_SWEPT)
+
+
+def bent_aside(movement: Movement) -> float:
+    """Metres to which a bus that goes straight on over a bent path, as of an S, leaves it.
+
+    0 for turns, for straight paths and for those that bend aside by less than ``LEAST_BENT``.
+    """
+    if abs(movement.turn) >= _STRAIGHT:
+        return 0.0
+    path = _with_ends(movement.shape[:, :2])
+    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))
+    places = np.arange(0.0, along[-1], _STEP)
+    xy = np.column_stack([np.interp(places, along, path[:, k]) for k in (0, 1)])
+    body = round(BUS_LENGTH / _STEP)
+    deepest = max(_sagitta(xy[n : n + body + 1]) for n in range(len(xy) - body))
+    return deepest if deepest >= LEAST_BENT else 0.0
+
+
+def _with_ends(path: FloatArray) -> FloatArray:
+    """Path ``(K, 2)`` with the length of a bus straight on before and behind it."""
+    first, last = path[0] - path[1], path[-1] - path[-2]
+    before = path[0] + first / np.hypot(*first) * BUS_LENGTH
+    behind = path[-1] + last / np.hypot(*last) * BUS_LENGTH
+    return np.vstack([before, path, behind])
+
+
+def _sagitta(arc: FloatArray) -> float:
+    """Metres to which an arc ``(K, 2)`` leaves its chord."""
+    chord = arc[-1] - arc[0]
+    offset = arc - arc[0]
+    return float(np.abs(chord[0] * offset[:, 1] - chord[1] * offset[:, 0]).max() / np.hypot(*chord))
+
+
+LEAST_ROOM = 4.0
+"""Metres between the stop line and the waiting place, at least."""
+
+WIDEST = 3.0
+"""Metres from the path of others at which one waits, at most; less between narrow lanes."""
+
+BEFORE = 0.5
+"""Metres that are left free before the other path."""
+
+_TURN = math.radians(30.0)
+
+
+def waiting_places(
+    movements: Sequence[Movement],
+    walkways: Sequence[Walkway],
+    rights: Sequence[Request],
+    waiting: Sequence[bool],
+    *,
+    side: float,
+    lit: bool,
+) -> dict[int, float]:
+    """Metres along the path to the waiting place, of each movement that has one.
+
+    Parameters
+    ----------
+    rights
+        Of the movements, then of the crossings over ``walkways``.
+    waiting
+        Whether those of a movement wait inside at all.
+    side
+        1 where traffic keeps right, -1 where it keeps left.
+    lit
+        Whether lights hold back those who cross near the stop line.
+    """
+    lines = [shapely.LineString(movement.shape[:, :2]) for movement in movements]
+    areas = [
+        shapely.LineString(w.axis[:, :2]).buffer(w.width / 2.0 + 1.0, cap_style="flat")
+        for w in walkways
+    ]
+    found: dict[int, float] = {}
+    for number, movement in enumerate(movements):
+        if not waiting[number] or side * movement.turn < _TURN:
+            continue
+        before = rights[number].yields_to
+        towards = {
+            _comes_towards(movement, movements[n]) or movements[n].source[0] == movement.source[0]
+            for n in before
+            if n < len(movements)
+        }
+        # Without lights nobody holds back traffic from the sides for those who stand inside.
+        if not (towards == {True} or (lit and True in towards)):
+            continue
+        line = lines[number]
+        places = [
+            lines[n].buffer(_clear(movement, movements[n]))
+            if n < len(movements)
+            else areas[n - len(movements)]
+            for n in sorted(before)
+        ]
+        ways = [_reached(line, place) for place in places]
+        if lit:
+            crossings = [n >= len(movements) for n in sorted(before)]
+            ways = [
+                way
+                for way, walked in zip(ways, crossings, strict=True)
+                if not (walked and way < LEAST_ROOM)
+            ]
+        place = min(ways, default=0.0) - BEFORE
+        if place >= LEAST_ROOM and line.length - place >= 1.0:
+            found[number] = round(place, 2)
+    return found
+
+
+def _clear(one: Movement, other: Movement) -> float:
+    """Metres between paths at which even a lorry that waits is not in the way of a bus."""
+    apart = max(MOST_WIDTH, min(WIDEST, 0.9 * min(one.width, other.width)))
+    return apart + bent_aside(other)
+
+
+def _comes_towards(one: Movement, other: Movement) -> bool:
+    return abs(wrapped(other.heading_in - one.heading_in)) > OPPOSING
+
+
+def _reached(line: shapely.LineString, place: shapely.Geometry) -> float:
+    """Metres along a line to where it first is in a place."""
+    shared = line.intersection(place)
+    if shared.is_empty:
+        return float(line.length)
+    return float(min(line.project(shapely.Point(xy)) for xy in shapely.get_coordinates(shared)))
+
+
+def inner_junctions(
+    name: str,
+    movements: Sequence[Movement],
+    rights: Sequence[Request],
+    beyond: Mapping[int, NetLane],
+) -> tuple[NetJunction, ...]:
+    """SUMO's internal junctions of a junction.
+
+    SUMO sees vehicles on the internal lane of another path only if the two centre lines cross, or
+    lead to one lane. Of paths that only come near each other, as of two opposing turns, the lane
+    that leads out is therefore one to give way to as well, like the lanes that lead in.
+
+    Parameters
+    ----------
+    beyond
+        Lane after the waiting place, by movement.
+    """
+    lines = [shapely.LineString(movement.shape[:, :2]) for movement in movements]
+    result = []
+    for number, lane in beyond.items():
+        right = rights[number]
+        before = [n for n in sorted(right.yields_to) if n < len(movements)]
+        leading_out = [
+            beyond[n].id if n in beyond else lane_id(internal_edge_id(name, n))
+            for n in before
+            if movements[n].target != movements[number].target
+            and not lines[number].intersects(lines[n])
+        ]
+        towards = dict.fromkeys([*(lane_id(*movements[n].source) for n in before), *leading_out])
+        paths = [
+            lane_id(internal_edge_id(name, n)) for n in sorted(right.foes) if n < len(movements)
+        ]
+        x, y, z = (float(value) for value in lane.shape[0])
+        own = lane_id(internal_edge_id(name, number))
+        result.append(
+            NetJunction(lane.id, "internal", (x, y, z), lane.shape, (own, *towards), tuple(paths))
+        )
+    return tuple(result)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,45 +8,214 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.ids import SumoEdgeId
+from odscen.base.ids import Roadside, SumoEdgeId, SumoLaneId
 from odscen.convert.building.findings import findings
 from odscen.convert.building.junctions import Passage, Surroundings, build_junction, outline
 from odscen.convert.building.nodes import find_nodes, plain_ids
-from odscen.convert.building.roundabouts import find_roundabouts
 from odscen.convert.lane_table.sumo_network import SumoNetwork
-from odscen.convert.lane_table.table_build import build_table
+from odscen.convert.lane_table.table import (
+    LaneTable,
+    MappingInterval,
+    SumoEdge,
+    SumoLane,
+    SumoLight,
+    SumoLink,
+    monotone,
+    simplified,
+)
 from odscen.convert.model.access import speed as lane_speed
 from odscen.convert.model.connections import find_connections
 from odscen.convert.model.conversion_report import ConversionReport, parser_entries
-from odscen.convert.model.edge_plan import plan_edges
+from odscen.convert.model.edge_plan import merge_gaps, plan_edges, side_gaps
 from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
 from odscen.convert.model.net_ids import lane_id
 from odscen.convert.model.net_xml import net_xml
-from odscen.convert.model.right_of_way import Movement
-from odscen.convert.model.road_gaps import merge_gaps, side_gaps
+from odscen.convert.model.right_of_way import Movement, wrapped
 from odscen.convert.pedestrian.crosswalks import place_crosswalks
 from odscen.convert.pedestrian.pedestrian_network import build_walks
 from odscen.convert.signals.map_signals import signal_control
 from odscen.opendrive.topology import lane_successors, side_links
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from odscen.base.ids import SumoLaneId
+    from odscen.base.ids import JunctionId, LaneKey
     from odscen.convert.building.junctions import BuiltJunction
     from odscen.convert.building.nodes import Nodes
     from odscen.convert.model.connections import PlannedConnection, PlannedConnections
+    from odscen.convert.model.edge_plan import EdgePlan
     from odscen.convert.model.lane_alignment import LaneAlignment, Line
-    from odscen.convert.model.walk_net import WalkNet
+    from odscen.convert.pedestrian.pedestrian_network import WalkNet
     from odscen.convert.signals.map_signals import SignalControl
     from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive
+
+
+def build_table(
+    net: Net,
+    table: RoadTable,
+    laid: Sequence[tuple[NetLane, Line, LaneAlignment]],
+    walks: WalkNet,
+    xodr: Mapping[str, tuple[JunctionId, ...]],
+) -> LaneTable:
+    """Write down where the lanes of a network lie.
+
+    Parameters
+    ----------
+    laid
+        Lanes for vehicles, with the lines and alignments that they were laid on.
+    xodr
+        OpenDRIVE junctions that a SUMO junction stands for.
+    """
+    everything = [*laid, *((w.edge.lanes[0], w.line, w.alignment) for w in walks.lanes)]
+    keys: dict[LaneKey | Roadside, int] = {}
+    rows = {lane.id: row for row, lane in enumerate(x for e in net.edges for x in e.lanes)}
+    intervals: list[MappingInterval] = []
+    for lane, line, alignment in everything:
+        scale = lane.length / max(line.length, 1e-9)
+        for stretch, arc, s in zip(alignment, line.arc, line.s, strict=True):
+            key: LaneKey | Roadside = table.lane_keys[stretch.row]
+            if stretch.beside:
+                key = Roadside(*key)
+            row = keys.setdefault(key, len(keys))
+            interval = MappingInterval(row, rows[lane.id], arc * scale, s, np.zeros(len(s)))
+            kept = monotone(interval, growing=bool(s[-1] > s[0]))
+            if kept is not None:
+                intervals.append(simplified(kept))
+    lanes = {
+        lane.id: SumoLane(
+            lane.id, edge.id, lane.index, lane.length, lane.speed, lane.width, lane.allowed
+        )
+        for edge in net.edges
+        for lane in edge.lanes
+    }
+    ids = {edge.id: tuple(lane.id for lane in edge.lanes) for edge in net.edges}
+    return LaneTable(
+        lane_keys=tuple(keys),
+        lanes=lanes,
+        edges={
+            edge.id: SumoEdge(
+                edge.id, edge.function, edge.start, edge.end, edge.length, ids[edge.id]
+            )
+            for edge in net.edges
+        },
+        links=tuple(
+            SumoLink(
+                ids[link.source][link.source_lane],
+                ids[link.target][link.target_lane],
+                link.via or SumoLaneId(""),
+                link.light,
+            )
+            for link in net.links
+            if lanes[ids[link.target][link.target_lane]].allowed != frozenset({"pedestrian"})
+        ),
+        walk_links=walks.walk_links,
+        intervals=tuple(intervals),
+        net_offset=net.offset,
+        boundary=net.boundary,
+        lefthand=net.lefthand,
+        counts=net.counts(),
+        elevation=not net.flat,
+        lights=tuple(
+            SumoLight(
+                light.id,
+                xodr.get(light.id, ()),
+                light.phases,
+                light.offset,
+                light.signals,
+                light.links,
+                light.conflicts,
+            )
+            for light in net.lights
+        ),
+    )
+
+
+LONGEST = 600.0
+"""Metres around a roundabout, at most."""
+
+MOST_EDGES = 60
+
+
+def find_roundabouts(
+    edges: Sequence[EdgePlan],
+    connections: Sequence[PlannedConnection],
+    lane_lines: Sequence[Sequence[Line]],
+    connection_lines: Sequence[Line],
+    *,
+    lefthand: bool,
+) -> tuple[tuple[int, ...], ...]:
+    """Positions of the edges of each roundabout, in driving direction.
+
+    Parameters
+    ----------
+    lane_lines, connection_lines
+        The lanes of each edge, and each connection, evaluated.
+    """
+    sides: dict[int, set[bool]] = {}
+    for edge in edges:
+        sides.setdefault(edge.road, set()).add(edge.forward)
+    one_way = [len(sides[edge.road]) == 1 for edge in edges]
+    following: dict[int, dict[int, float]] = {}
+    for connection, line in zip(connections, connection_lines, strict=True):
+        if one_way[connection.source] and one_way[connection.target]:
+            turn = _turned(line)
+            known = following.setdefault(connection.source, {})
+            target = connection.target
+            if target not in known or abs(turn) < abs(known[target]):
+                known[target] = turn
+    wanted = -2.0 * math.pi if lefthand else 2.0 * math.pi
+    roundabouts: list[tuple[int, ...]] = []
+    taken: set[int] = set()
+    for start in sorted(following):
+        if start in taken:
+            continue
+        roundabout = _around(start, following, lane_lines, wanted)
+        if roundabout and not taken & set(roundabout):
+            roundabouts.append(roundabout)
+            taken |= set(roundabout)
+    return tuple(roundabouts)
+
+
+def _around(
+    start: int,
+    following: dict[int, dict[int, float]],
+    lines: Sequence[Sequence[Line]],
+    wanted: float,
+) -> tuple[int, ...]:
+    """The edges round from an edge back to it, inwards at every choice, or nothing."""
+    side = math.copysign(1.0, wanted)
+    roundabout = [start]
+    turned, length = _turned(lines[start][0]), lines[start][0].length
+    while len(roundabout) <= MOST_EDGES and length <= LONGEST:
+        choices = following.get(roundabout[-1], {})
+        if not choices:
+            return ()
+        # The roundabout continues where the connection turns most to the inside.
+        edge = max(choices, key=lambda n: (side * choices[n], -n))
+        turned += choices[edge]
+        if edge == start:
+            return tuple(roundabout) if abs(turned - wanted) < 0.6 else ()
+        if edge in roundabout:
+            return ()
+        roundabout.append(edge)
+        turned += _turned(lines[edge][0])
+        length += lines[edge][0].length
+    return ()
+
+
+def _turned(line: Line) -> float:
+    """Change of heading along a line, summed over its vertices, radians."""
+    steps = line.shape[1:, :2] - line.shape[:-1, :2]
+    headings = [math.atan2(y, x) for x, y in steps.tolist()]
+    return sum(wrapped(b - a) for a, b in pairwise(headings))
 
 
 SIDEWAYS = 5.5

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from odscen.base.ids import JunctionId
     from odscen.convert.model.connections import PlannedConnections
-    from odscen.convert.model.road_gaps import RoadGap
+    from odscen.convert.model.edge_plan import RoadGap
     from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive, Road, RoadLink

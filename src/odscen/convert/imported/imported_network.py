@@ -6,21 +6,155 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError
 from odscen.convert.imported.geometric_table import geometric_table
-from odscen.convert.imported.import_findings import import_findings
 from odscen.convert.imported.net_import import read_network
+from odscen.convert.lane_table.coverage import covered_metres, kept_lanes, lane_lengths
 from odscen.convert.lane_table.sumo_network import SumoNetwork
-from odscen.convert.model.conversion_report import ConversionReport, parser_entries
+from odscen.convert.model.access import is_used
+from odscen.convert.model.conversion_report import (
+    ConversionReport,
+    ElementOutcome,
+    ReportEntry,
+    parser_entries,
+)
 from odscen.convert.model.net import NORMAL
 from odscen.convert.verify.fidelity import verify
+from odscen.convert.verify.fidelity_result import NEAR
+from odscen.opendrive.objects import signal_kind
+from odscen.opendrive.road_model import WALKABLE_TYPES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from odscen.convert.lane_table.table import LaneTable
-    from odscen.convert.model.conversion_report import ReportEntry
+    from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive
+
+
+WORTH_TELLING = 1.0
+"""Metres of a lane without SUMO lane that make an entry."""
+
+AREA = 1.5
+"""Metres of a walk that walking areas, which are no lanes, may take without an entry."""
+
+
+def import_findings(
+    odr: OpenDrive, table: RoadTable, lanes: LaneTable, fidelity: Fidelity
+) -> tuple[tuple[ReportEntry, ...], dict[str, float]]:
+    """Entries and figures of the report."""
+    lengths = lane_lengths(odr, table, lanes)
+    entries = (
+        *kept_lanes(lengths),
+        *_lanes(odr, table, lanes),
+        *_connections(fidelity),
+        *_crossings(lanes, fidelity),
+        *_lights(lanes, fidelity),
+    )
+    figures = {
+        **lengths,
+        "connections": float(fidelity.relations - len(fidelity.missing)),
+        "connections_lost": float(len(fidelity.missing)),
+        "connections_invented": float(len(fidelity.invented)),
+        "crosswalks": float(fidelity.crosswalks),
+        "crosswalks_lost": float(len(fidelity.lost_crosswalks)),
+        "crossings": float(lanes.counts["crossings"]),
+        "traffic_lights": float(lanes.counts["tl_logics"]),
+        "signals": float(sum(len(road.signals) for road in odr.roads.values())),
+    }
+    return entries, figures
+
+
+def unread_signs(odr: OpenDrive) -> Iterator[ReportEntry]:
+    """Yield the signs of right of way of a map, none of which netconvert reads."""
+    for road in odr.roads.values():
+        for signal in road.signals:
+            kind = signal_kind(signal)
+            if kind in ("stop", "yield"):
+                reason = f"{kind} sign: netconvert does not read it, and ranks roads itself"
+                element = f"road {road.id} > signal {signal.id}"
+                yield ReportEntry(ElementOutcome.LOST, element, reason)
+
+
+def _place(road: str, section: int, lane: int) -> str:
+    return f"road {road} > laneSection {section} > lane {lane}"
+
+
+def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
+    """Lanes without a SUMO lane, and lanes that it lies beside."""
+    covered = covered_metres(lanes)
+    worst: dict[object, float] = {}
+    for span in lanes.spans:
+        key = lanes.lane_keys[span.lane]
+        deviation = float(lanes.intervals[span.interval].deviation.max())
+        worst[key] = max(worst.get(key, 0.0), deviation)
+    for row, key in enumerate(table.lane_keys):
+        if not is_used(table.lane_type[row]):
+            continue
+        walk = table.lane_type[row] in WALKABLE_TYPES
+        if walk and odr.roads[key.road].junction is not None:
+            continue  # persons cross junctions on walking areas, which have no lanes
+        length = float(table.lane_s1[row] - table.lane_s0[row])
+        gap = length - covered.get(key, 0.0)
+        if gap > (AREA if walk and gap < length else WORTH_TELLING):
+            reason = f"{gap:.2f} of {length:.2f} m have no SUMO lane"
+            yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
+        elif worst.get(key, 0.0) > NEAR:
+            reason = f"SUMO's lane lies up to {worst[key]:.2f} m beside the lane's centre"
+            yield ReportEntry(ElementOutcome.GUESSED, _place(*key), reason)
+
+
+def _connections(fidelity: Fidelity) -> Iterator[ReportEntry]:
+    kept = fidelity.relations - len(fidelity.missing)
+    if kept:
+        reason = f"{kept} of {fidelity.relations} relations between lanes of roads"
+        yield ReportEntry(ElementOutcome.KEPT, "map", reason)
+    for one in fidelity.missing:
+        reason = f"no connection to lane {one.target} in SUMO"
+        yield ReportEntry(ElementOutcome.LOST, f"lane {one.source}", reason)
+    for one in fidelity.invented:
+        reason = f"SUMO connects it to lane {one.target} ({one.sumo}), the map does not"
+        yield ReportEntry(ElementOutcome.GUESSED, f"lane {one.source}", reason)
+
+
+def _crossings(lanes: LaneTable, fidelity: Fidelity) -> Iterator[ReportEntry]:
+    for lost in fidelity.lost_crosswalks:
+        element = f"road {lost.road} > object {lost.object_id}"
+        reason = f"crosswalk: crossings of the network lie on {100 * lost.share:.0f} % of it"
+        yield ReportEntry(ElementOutcome.LOST, element, reason)
+    kept = fidelity.crosswalks - len(fidelity.lost_crosswalks)
+    if kept:
+        reason = f"{kept} of {fidelity.crosswalks} crosswalks are crossings"
+        yield ReportEntry(ElementOutcome.KEPT, "map", reason)
+    others = lanes.counts["crossings"] - kept
+    if others > 0:
+        reason = f"{others} crossings of the network lie where the map has no crosswalk"
+        yield ReportEntry(ElementOutcome.GUESSED, "map", reason)
+
+
+def _lights(lanes: LaneTable, fidelity: Fidelity) -> Iterator[ReportEntry]:
+    signals = fidelity.signals
+    for junction in signals.lost:
+        reason = "its traffic lights are not in the network"
+        yield ReportEntry(ElementOutcome.LOST, f"junction {junction}", reason)
+    for light in signals.lost_lights:
+        yield ReportEntry(ElementOutcome.LOST, light, "traffic light that controls nothing in SUMO")
+    for junction in signals.invented:
+        reason = "SUMO has traffic lights where the map has none"
+        yield ReportEntry(ElementOutcome.GUESSED, f"SUMO junction {junction}", reason)
+    if lanes.lights:
+        reason = (
+            f"{len(lanes.lights)} traffic lights have the network's programs: OpenDRIVE has none"
+        )
+        yield ReportEntry(ElementOutcome.GUESSED, "map", reason)
+    if fidelity.unsafe_pairs:
+        places = len({pair.tl for pair in fidelity.unsafe_pairs})
+        reason = (
+            f"{len(fidelity.unsafe_pairs)} pairs of movements that meet have green together at "
+            f"{places} traffic lights, and neither gives way"
+        )
+        yield ReportEntry(ElementOutcome.GUESSED, "map", reason)
+
 
 LEAST_COVERED = 0.05
 """Share of the driving lanes of a map that a network must have to be one of this map."""

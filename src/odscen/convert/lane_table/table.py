@@ -1,7 +1,7 @@
 """The table between OpenDRIVE lanes and SUMO lanes: the one way to cross over.
 
 It also keeps what else is needed to know of the network, so that ``net.net.xml`` is not parsed
-again. Made by :mod:`odscen.convert.lane_table.table_build`, stored as JSON by
+again. Made by :mod:`odscen.convert.building.network`, stored as JSON by
 :mod:`odscen.convert.lane_table.table_json`.
 """
 
@@ -12,12 +12,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-
-from odscen.convert.lane_table.lookup import Lookup
-from odscen.convert.lane_table.mapping_intervals import MappingInterval, Span, answering
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,6 +23,222 @@ if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray, Int32Array
     from odscen.base.ids import JunctionId, LaneKey, Roadside, SumoEdgeId, SumoLaneId
     from odscen.convert.model.net import LightLink, LinkConflict, Phase
+
+
+SIMPLE_S = 0.005
+"""Metres: knots that change s by less than this are left out."""
+SIMPLE_DEVIATION = 0.01
+"""Metres: the same for the deviation, which is a figure for reports and limits."""
+
+LEAST_STEP = 1e-3
+"""Metres between knots."""
+
+
+class MappingInterval(NamedTuple):
+    """Knots of a monotone, piecewise linear relation between s and pos.
+
+    Attributes
+    ----------
+    lane
+        Row of the OpenDRIVE lane.
+    sumo
+        Row of the SUMO lane.
+    pos
+        Ascending positions on the SUMO lane, metres, in terms of its length attribute.
+    s
+        Road coordinates, strictly ascending or strictly descending.
+    deviation
+        Distance between the two lane centres at each knot, metres.
+    """
+
+    lane: int
+    sumo: int
+    pos: FloatArray
+    s: FloatArray
+    deviation: FloatArray
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Smallest and largest s."""
+        ends = float(self.s[0]), float(self.s[-1])
+        return min(ends), max(ends)
+
+
+def monotone(interval: MappingInterval, *, growing: bool) -> MappingInterval | None:
+    """Drop knots that run backwards; ``None`` if fewer than two are left."""
+    s = interval.s if growing else -interval.s
+    keep = np.flatnonzero(s >= np.maximum.accumulate(s))
+    steps = (np.diff(s[keep]) > LEAST_STEP) & (np.diff(interval.pos[keep]) > LEAST_STEP)
+    keep = keep[np.concatenate(([True], steps))] if len(keep) else keep
+    if len(keep) < 2:
+        return None
+    return MappingInterval(
+        interval.lane, interval.sumo, interval.pos[keep], interval.s[keep], interval.deviation[keep]
+    )
+
+
+def simplified(interval: MappingInterval) -> MappingInterval:
+    """Leave out knots that a straight line between their neighbours gives anyway."""
+    keep = np.zeros(len(interval.pos), dtype=np.bool_)
+    keep[[0, -1]] = True
+    open_spans = [(0, len(interval.pos) - 1)]
+    while open_spans:
+        low, high = open_spans.pop()
+        if high - low < 2:
+            continue
+        inner = slice(low + 1, high)
+        share = (interval.pos[inner] - interval.pos[low]) / (interval.pos[high] - interval.pos[low])
+        error_s = np.abs(
+            interval.s[low] + share * (interval.s[high] - interval.s[low]) - interval.s[inner]
+        )
+        line = interval.deviation[low] + share * (
+            interval.deviation[high] - interval.deviation[low]
+        )
+        error = np.maximum(
+            error_s / SIMPLE_S, np.abs(line - interval.deviation[inner]) / SIMPLE_DEVIATION
+        )
+        worst = int(np.argmax(error))
+        if error[worst] > 1.0:
+            middle = low + 1 + worst
+            keep[middle] = True
+            open_spans += [(low, middle), (middle, high)]
+    return MappingInterval(
+        interval.lane, interval.sumo, interval.pos[keep], interval.s[keep], interval.deviation[keep]
+    )
+
+
+class Span(NamedTuple):
+    """Where an interval answers which SUMO lane is here: s from ``low`` to ``high`` of its lane."""
+
+    lane: int
+    low: float
+    high: float
+    interval: int
+
+
+def answering(intervals: Sequence[MappingInterval], *, least: float = 0.01) -> list[Span]:
+    """Divide the OpenDRIVE lanes among their mapping intervals; sorted, without overlaps.
+
+    Where several SUMO lanes run over the same stretch (connections that share a connecting lane),
+    the one with the smallest mean deviation answers, of equals the first. Remainders shorter than
+    ``least`` metres are left out.
+    """
+    order = sorted(range(len(intervals)), key=lambda i: (_badness(intervals[i]), i))
+    spans: dict[int, list[Span]] = {}
+    for i in order:
+        low, high = intervals[i].span
+        lane = intervals[i].lane
+        taken = spans.setdefault(lane, [])
+        free = _without(low, high, taken)
+        taken += [Span(lane, a, b, i) for a, b in free if b - a >= least]
+        taken.sort()
+    return sorted(span for taken in spans.values() for span in taken)
+
+
+def _without(low: float, high: float, taken: Sequence[Span]) -> list[tuple[float, float]]:
+    """What sorted, disjoint spans leave free from ``low`` to ``high``."""
+    free: list[tuple[float, float]] = []
+    for span in taken:
+        if span.high <= low or span.low >= high:
+            continue
+        if span.low > low:
+            free.append((low, span.low))
+        low = span.high
+    if high > low:
+        free.append((low, high))
+    return free
+
+
+def _badness(interval: MappingInterval) -> float:
+    return round(float(np.mean(interval.deviation)), 3)
+
+
+SNAP = 0.65
+"""Metres: a place this close beside the end of an interval is taken to be on it."""
+
+_STRIDE = 1e6
+"""Longer than any lane: lane number times this plus s sorts by lane, then s (exact to 1e-5 m)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lookup:
+    """Piecewise linear functions on intervals of many lanes, sorted by lane and place."""
+
+    interval_lane: NDArray[np.int64]
+    low: FloatArray
+    high: FloatArray
+    interval_key: FloatArray
+    function: NDArray[np.int64]
+    first: NDArray[np.int64]
+    knot_key: FloatArray
+    x: FloatArray
+    y: FloatArray
+    deviation: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        knots: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
+        intervals: Sequence[tuple[int, float, float, int]],
+    ) -> Lookup:
+        """Gather functions and the intervals on which they answer.
+
+        Parameters
+        ----------
+        knots
+            Per function x (ascending), y and deviation at its knots.
+        intervals
+            Lane, smallest and largest x, and number of the function; sorted, without overlaps.
+        """
+        table = np.array(intervals, dtype=np.float64).reshape(-1, 4)
+        counts = [len(x) for x, _, _ in knots]
+        first = np.concatenate(([0], np.cumsum(counts, dtype=np.int64))).astype(np.int64)
+        parts = [np.concatenate([knot[i] for knot in knots] or [np.zeros(0)]) for i in range(3)]
+        owner = np.repeat(np.arange(len(counts)), counts)
+        return cls(
+            table[:, 0].astype(np.int64),
+            table[:, 1],
+            table[:, 2],
+            table[:, 0] * _STRIDE + table[:, 1],
+            table[:, 3].astype(np.int64),
+            first,
+            owner * _STRIDE + parts[0],
+            *parts,
+        )
+
+    def find(
+        self, lane: NDArray[np.int64], x: FloatArray
+    ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+        """Find the function that answers (-1: none), the place on it, and how far off that is."""
+        none = np.full(len(x), -1, dtype=np.int64)
+        if not len(self.low):
+            return none, x, np.zeros(len(x))
+        after = np.searchsorted(self.interval_key, lane * _STRIDE + x, side="right")
+        best, gap = none, np.full(len(x), np.inf)
+        for candidate in (after - 1, after):
+            index = np.clip(candidate, 0, len(self.low) - 1)
+            off = np.maximum(np.maximum(self.low[index] - x, x - self.high[index]), 0.0)
+            better = (self.interval_lane[index] == lane) & (off < gap) & (off <= SNAP)
+            best = np.where(better, index, best)
+            gap = np.where(better, off, gap)
+        index = np.maximum(best, 0)
+        on = np.clip(x, self.low[index], self.high[index])
+        return np.where(best < 0, -1, self.function[index]), on, np.where(best < 0, 0.0, gap)
+
+    def value(self, function: NDArray[np.int64], x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Value and deviation at places ``x`` of functions ``function``."""
+        if not len(self.x):
+            return np.zeros(len(x)), np.zeros(len(x))
+        own = np.maximum(function, 0)
+        after = np.searchsorted(self.knot_key, own * _STRIDE + x, side="right")
+        after = np.clip(after, self.first[own] + 1, self.first[own + 1] - 1)
+        before = after - 1
+        share = (x - self.x[before]) / (self.x[after] - self.x[before])
+        share = np.clip(share, 0.0, 1.0)
+        return (
+            self.y[before] + share * (self.y[after] - self.y[before]),
+            self.deviation[before] + share * (self.deviation[after] - self.deviation[before]),
+        )
 
 
 VERSION = 4

@@ -10,10 +10,10 @@ import numpy as np
 from odscen.base.errors import GraphFormatError, InputError
 from odscen.base.ids import JunctionId, LaneKey, RoadId, Roadside, SumoEdgeId, SumoLaneId
 from odscen.base.stored_files import documents, read_json
-from odscen.convert.lane_table.mapping_intervals import MappingInterval
 from odscen.convert.lane_table.table import (
     VERSION,
     LaneTable,
+    MappingInterval,
     SumoEdge,
     SumoLane,
     SumoLight,

@@ -11,7 +11,7 @@ meet, the first of these rules that distinguishes them decides:
    beside makes room for who has not; where both or none have, vehicles go in turn;
 6. one who turns across gives way to oncoming traffic that does not;
 7. the major road, where there is one: junctions with lights, large ones and some others have
-   (:mod:`odscen.convert.model.major_road`);
+   (:mod:`odscen.convert.building.junction_ruling`);
 8. right before left (left before right where traffic keeps left).
 
 At lights, and among those from one road, the sixth rule comes before the fourth.

@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 
 from odscen.convert.model.access import allowed
+from odscen.convert.model.edge_plan import RoadGap
 from odscen.convert.model.lane_alignment import DENSE, spread
-from odscen.convert.model.road_gaps import RoadGap
 from odscen.opendrive.objects import crosswalks
 
 if TYPE_CHECKING:

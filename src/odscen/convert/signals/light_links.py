@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
     from odscen.base.ids import SumoLaneId
     from odscen.convert.model.right_of_way import Movement, Walkway
-    from odscen.convert.model.walk_net import PlacedCrossing
+    from odscen.convert.pedestrian.pedestrian_network import PlacedCrossing
 
 POINTS = 9
 """Points of a link's path, at most."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from lxml import etree
@@ -10,8 +10,6 @@ from lxml import etree
 from odscen.base.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from lxml.etree import _Element
 
 VERSIONS: Final = ("1.0", "1.1", "1.2", "1.3")
@@ -38,18 +36,6 @@ def _written(value: object) -> str:
         text = f"{value:.{_DIGITS}f}".rstrip("0").rstrip(".")
         return "0" if text in ("-0", "") else text
     return str(value)
-
-
-@dataclass(slots=True)
-class ExportNotes:
-    """What could not be written as it is in odscen; each with its place in the document."""
-
-    approximated: list[tuple[str, str]] = field(default_factory=list)
-    left_out: list[tuple[str, str]] = field(default_factory=list)
-
-    def rows(self, these: Iterable[tuple[str, str]]) -> list[dict[str, str]]:
-        """JSON-ready, without repetitions."""
-        return [{"place": place, "reason": reason} for place, reason in dict.fromkeys(these)]
 
 
 @dataclass(frozen=True, slots=True)

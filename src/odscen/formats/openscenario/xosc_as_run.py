@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import polars as pl
     from lxml.etree import _Element
 
-    from odscen.formats.exporter import ExportSource, WhatHappened
+    from odscen.formats.base import ExportSource, RecordedRun
     from odscen.formats.openscenario.dialect import Dialect
     from odscen.formats.openscenario.xosc_triggers import Triggers
     from odscen.records.run_plan import PlannedActor
@@ -43,7 +43,7 @@ class AsRun:
     """
 
     source: ExportSource
-    happened: WhatHappened
+    recorded: RecordedRun
     dialect: Dialect
     triggers: Triggers
     environment: _Element | None
@@ -51,7 +51,7 @@ class AsRun:
 
     def entities(self) -> Iterator[_Element]:
         """``ScenarioObject`` of each road user who was there."""
-        for user in self.happened.users:
+        for user in self.recorded.users:
             if user.id in self.lines:
                 yield entity_of(self._facts(user), self.dialect)
 
@@ -64,7 +64,7 @@ class AsRun:
             self.triggers.notes.left_out.append(("traffic lights", words))
         elif changes := list(self._changes(states)):
             groups.append(maneuver_group("traffic lights", None, changes))
-        until, sky = self.happened.until, self.environment
+        until, sky = self.recorded.until, self.environment
         whole = act("as run", groups, self.triggers, until=until, sky=sky)
         name = self.source.scenario.name
         end = self.triggers.at_time(until, "end of the run")
@@ -107,8 +107,8 @@ class AsRun:
         line = follow_line(self.dialect, f"{name} as run", spots, times, clock="absolute")
         actions = [line] if times[0] <= 0.0 else [add_entity(name, spots[0], self.dialect), line]
         events = [self._event(f"{name} moves", actions, times[0])]
-        gone = times[-1] + self.happened.step
-        if gone < self.happened.until:
+        gone = times[-1] + self.recorded.step
+        if gone < self.recorded.until:
             leaves = delete_entity(name, spots[-1], self.dialect)
             events.append(self._event(f"{name} is gone", [leaves], gone))
         return maneuver_group(name, name, events)
@@ -118,7 +118,7 @@ class AsRun:
 
     def _states(self) -> list[tuple[float, dict[str, str]]]:
         """At each time the signals that change, with what they show from then on."""
-        table = self.happened.states
+        table = self.recorded.states
         if table is None:
             return []
         heads, letters = Heads(self.source.sumo_map.lights), dict[str, str]()
@@ -147,7 +147,7 @@ def _lights(shown: dict[str, str]) -> Iterator[_Element]:
         yield light_action(signal, state.lower())
 
 
-def lines_of(happened: WhatHappened) -> _Lines:
+def lines_of(recorded: RecordedRun) -> _Lines:
     """Lines of reference points by road user; of each standstill the first and the last record.
 
     Raises
@@ -158,7 +158,7 @@ def lines_of(happened: WhatHappened) -> _Lines:
     import polars as pl
 
     pose = pl.struct("x", "y", "hdg")
-    kept = happened.rows.filter(
+    kept = recorded.rows.filter(
         ((pose != pose.shift(1).over("id")) | (pose != pose.shift(-1).over("id"))).fill_null(
             value=True
         )
@@ -169,8 +169,8 @@ def lines_of(happened: WhatHappened) -> _Lines:
         )
     rows = {str(name): part for (name,), part in kept.group_by("id", maintain_order=True)}
     return {
-        user.id: _line(user, rows[user.id], happened.step)
-        for user in happened.users
+        user.id: _line(user, rows[user.id], recorded.step)
+        for user in recorded.users
         if user.id in rows
     }
 

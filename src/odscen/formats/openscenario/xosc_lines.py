@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
-    from odscen.formats.openscenario.dialect import Dialect, ExportNotes
+    from odscen.formats.base import ExportNotes
+    from odscen.formats.openscenario.dialect import Dialect
     from odscen.formats.openscenario.xosc_places import Places
     from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.document.scenario_document import Actor

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.base.categories import Body
-    from odscen.formats.exporter import ExportSource
+    from odscen.formats.base import ExportSource
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.conditions_document import RulePlace
     from odscen.scenario.document.scenario_document import Actor

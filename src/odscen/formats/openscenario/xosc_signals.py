@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.convert.lane_table.table import SumoLight
-    from odscen.formats.exporter import ExportSource
-    from odscen.formats.openscenario.dialect import ExportNotes
+    from odscen.formats.base import ExportNotes, ExportSource
     from odscen.records.light_programs import LightProgram, ProgramPhase, ShownPlan
     from odscen.sumo.realize.sumo_map import SumoMap
 

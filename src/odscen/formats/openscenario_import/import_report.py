@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from odscen.base.errors import InputError
+from odscen.formats.base import VERDICTS, ReportRow
 from odscen.formats.openscenario_import.row_places import RowPlaces
 from odscen.formats.openscenario_import.traced_numbers import TracedNumber
 
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 
     from odscen.formats.openscenario_import.row_places import Spot
 
-VERDICTS: Final = ("taken", "approximated", "ignored", "refused")
 _UNREAD: Final = "odscen has no part for it"
 
 
@@ -26,20 +26,6 @@ class RefusedError(Exception):
         self.element = element
         self.reason = reason
         super().__init__(reason)
-
-
-class ReportRow(NamedTuple):
-    """An element, where it stands in which file, and why it has its verdict.
-
-    ``x`` and ``y`` are metres in the OpenDRIVE frame: the place that it is about, if that is known.
-    """
-
-    file: str
-    xpath: str
-    line: int
-    reason: str
-    x: float | None = None
-    y: float | None = None
 
 
 class ImportReport:

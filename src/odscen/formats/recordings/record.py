@@ -14,7 +14,7 @@ from odscen.formats.recordings.track_grid import ExportWindow, instants, tracks_
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.formats.exporter import ExportSource
+    from odscen.formats.base import ExportSource
 
 WINDOW = ("begin", "end")
 """Options of all formats that are written from a recording: seconds of the simulation."""
@@ -28,10 +28,10 @@ def recording_of(source: ExportSource) -> RunRecording:
     InputError
         If it is no run, an option is no number, or the window has no road users, or too many.
     """
-    happened = source.happened
-    if happened is None or source.roads is None:
+    recorded = source.recorded
+    if recorded is None or source.roads is None:
         raise InputError("this format says what happened in a run: name the folder of one")
-    times = instants(happened, ExportWindow(*(_seconds(source.options, name) for name in WINDOW)))
+    times = instants(recorded, ExportWindow(*(_seconds(source.options, name) for name in WINDOW)))
     elements = map_elements(source.roads, source.sumo_map.graph.lanes)
     return RunRecording(
         name=source.name,
@@ -40,10 +40,10 @@ def recording_of(source: ExportSource) -> RunRecording:
         map_sha256=source.sumo_map.graph.map_sha256,
         seed=source.scenario.seed,
         times=times,
-        recorded_step=round(happened.step, 6),
+        recorded_step=round(recorded.step, 6),
         elements=elements,
-        tracks=tracks_of(source, happened, times),
-        signals=lane_signals(source.sumo_map, elements.lanes, happened.states, times),
+        tracks=tracks_of(source, recorded, times),
+        signals=lane_signals(source.sumo_map, elements.lanes, recorded.states, times),
     )
 
 

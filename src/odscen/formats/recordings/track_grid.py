@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.base.arrays import BoolArray, FloatArray
-    from odscen.formats.exporter import ExportSource, WhatHappened
+    from odscen.formats.base import ExportSource, RecordedRun
     from odscen.records.run_plan import PlannedActor
 
 MOST_STATES = 20_000_000
@@ -35,7 +35,7 @@ class ExportWindow(NamedTuple):
     end: float | None = None
 
 
-def instants(happened: WhatHappened, window: ExportWindow) -> FloatArray:
+def instants(recorded: RecordedRun, window: ExportWindow) -> FloatArray:
     """Seconds of a recording, whole multiples of its step.
 
     Raises
@@ -43,7 +43,7 @@ def instants(happened: WhatHappened, window: ExportWindow) -> FloatArray:
     InputError
         If no road user was there in the window.
     """
-    times = happened.rows["time"]
+    times = recorded.rows["time"]
     if not len(times):
         raise InputError("no road users were in the simulation, so there is nothing to export")
     first, last = float(times.min()), float(times.max())  # type: ignore[arg-type]
@@ -57,7 +57,7 @@ def instants(happened: WhatHappened, window: ExportWindow) -> FloatArray:
     return np.round(np.arange(low, high + 1) * STEP, 6)
 
 
-def tracks_of(source: ExportSource, happened: WhatHappened, times: FloatArray) -> Tracks:
+def tracks_of(source: ExportSource, recorded: RecordedRun, times: FloatArray) -> Tracks:
     """Road users at each instant.
 
     Raises
@@ -67,19 +67,19 @@ def tracks_of(source: ExportSource, happened: WhatHappened, times: FloatArray) -
     """
     import polars as pl
 
-    margin = happened.step + _SAME
-    rows = happened.rows.filter(pl.col("time").is_between(times[0] - margin, times[-1] + margin))
-    lengths = {user.id: user.length for user in happened.users}
+    margin = recorded.step + _SAME
+    rows = recorded.rows.filter(pl.col("time").is_between(times[0] - margin, times[-1] + margin))
+    lengths = {user.id: user.length for user in recorded.users}
     if "z" not in rows.columns:
         rows = rows.with_columns(z=ground_heights(source.sumo_map, rows, lengths))
     own = {str(name): part for (name,), part in rows.group_by("id", maintain_order=True)}
-    users = [user for user in happened.users if user.id in own]
+    users = [user for user in recorded.users if user.id in own]
     if len(users) * len(times) > MOST_STATES:
         raise InputError(
             f"{len(users)} road users at {len(times)} instants are more than {MOST_STATES:,} "
             "states; choose a part of the run with --begin and --end"
         )
-    found = [_on_grid(own[user.id], times, happened.step) for user in users]
+    found = [_on_grid(own[user.id], times, recorded.step) for user in users]
     there = [k for k, one in enumerate(found) if one.valid.any()]
     if not there:
         raise InputError(

@@ -3,24 +3,99 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from fastapi import APIRouter, File, Form, UploadFile
+from fastapi import APIRouter, File, Form, Query, UploadFile
 from starlette.responses import Response
 
-from odscen.app.exchange.sent_scenarios import SentFile, read_sent_scenario
-from odscen.app.exchange.zipped_exports import exported, exported_run
-from odscen.base.errors import NotFoundError
-from odscen.web.exchange.exchange_messages import ExportInfo, ImportInfo
+from odscen.app.exchange.exports import export_to_memory
+from odscen.app.exchange.sent_files import SentFile, read_sent_scenario
+from odscen.base.errors import InputError, NotFoundError
+from odscen.formats import list_formats
+from odscen.formats.base import Subject
 from odscen.web.jobs import JobResult
 from odscen.web.large.large_documents import LargeDocumentRoute
-from odscen.web.messages import JobStarted
+from odscen.web.messages import Answer, JobStarted
 from odscen.web.services import Services, Shared
 from odscen.web.wire.media_types import answers
 
 if TYPE_CHECKING:
-    from odscen.app.exchange.zipped_exports import ExportedFiles
+    from collections.abc import Mapping
+
+    from odscen.app.exchange.exports import ExportedFiles
     from odscen.maps.store import ProgressCallback
+
+
+class ImportRow(Answer):
+    """An element of a file, and why it is in its list.
+
+    ``x`` and ``y`` are metres in the OpenDRIVE frame: the place on the map that it is about, if
+    that is known.
+    """
+
+    file: str
+    xpath: str
+    line: int
+    reason: str
+    x: float | None
+    y: float | None
+
+
+class ImportInfo(Answer):
+    """What became of each element of the file that a scenario was imported from.
+
+    ``added`` says whether its map came with it; ``sweep`` whether there is a plan of a sweep.
+    """
+
+    scenario: str
+    file: str
+    map: str
+    added: bool
+    sweep: bool
+    refused: list[ImportRow]
+    approximated: list[ImportRow]
+    ignored: list[ImportRow]
+    taken: list[ImportRow]
+
+
+class ExportNote(Answer):
+    """A part of a scenario, and what becomes of it."""
+
+    place: str
+    reason: str
+
+
+class ExportInfo(Answer):
+    """Files of an export, and what its format says in part only, or not at all."""
+
+    files: list[str]
+    approximated: list[ExportNote]
+    left_out: list[ExportNote]
+
+
+class FormatOptionInfo(Answer):
+    """Something that a format lets one choose; ``values`` are all there are, if they are listed."""
+
+    name: str
+    label: str
+    values: list[str]
+    default: str
+
+
+class FormatInfo(Answer):
+    """A foreign format: what its files are of, whether it is read and written, and how."""
+
+    id: str
+    title: str
+    description: str
+    of: list[Subject]
+    suffixes: list[str]
+    reads: bool
+    writes: bool
+    options: list[FormatOptionInfo]
+
 
 router = APIRouter(prefix="/api")
 exports = APIRouter(prefix="/api/scenarios", route_class=LargeDocumentRoute)
@@ -29,21 +104,50 @@ _REPORT, _PLAN = "import.json", "import.sweep.json"
 """Files beside the history of a scenario."""
 
 
-@router.post("/imports/openscenario", status_code=202)
-def import_openscenario(
+@router.get("/formats")
+def formats() -> list[FormatInfo]:
+    """All foreign formats, those of installed packages included."""
+    return [
+        FormatInfo(
+            id=one.id,
+            title=one.title,
+            description=one.description or one.label,
+            of=list(one.of),
+            suffixes=list(one.suffixes),
+            reads=one.read is not None,
+            writes=one.write is not None,
+            options=[
+                FormatOptionInfo(
+                    name=option.name,
+                    label=option.label,
+                    values=list(option.values),
+                    default=option.default,
+                )
+                for option in one.options
+            ],
+        )
+        for one in list_formats().values()
+    ]
+
+
+@router.post("/imports/{of}", status_code=202)
+def import_files(
+    of: str,
     shared: Shared,
     files: Annotated[
         list[UploadFile],
-        File(description="A scenario (.xosc), and if need be its map (.xodr) and catalogs."),
+        File(description="A scenario, and if need be its map (.xodr) and catalogs."),
     ],
-    ego: Annotated[Literal["story", "sumo"], Form()] = "story",
+    ego: Annotated[Literal["story", "sumo"] | None, Form()] = None,
+    option: Annotated[Sequence[str], Form(description="NAME=VALUE")] = (),
 ) -> JobStarted:
-    """Make a scenario of an OpenSCENARIO file, in the background; the result is its name."""
+    """Make a scenario of a file of a foreign format, in the background; the result is its name."""
+    options = _given_options(option, ego=ego)
     sent = [SentFile(one.filename or "file", one.file.read()) for one in files]
 
     def work(progress: ProgressCallback) -> JobResult:
         progress("starting", 0.0)
-        read = read_sent_scenario(shared.workspace, sent, ego=ego, progress=progress)
+        read = read_sent_scenario(shared.workspace, sent, of=of, options=options, progress=progress)
         draft = shared.drafts.create(read.scenario, None, stem=read.stem, label="Import")
         about = {"file": read.file, "added": read.added, "lists": json.loads(read.report)}
         shared.drafts.keep(draft.name, _REPORT, json.dumps(about))
@@ -80,37 +184,62 @@ def import_plan(name: str, shared: Shared) -> Response:
     return Response(content, media_type="application/json", headers=headers)
 
 
+Options = Annotated[Sequence[str], Query(alias="option", description="NAME=VALUE")]
+
+
 @router.get("/runs/{run}/export", response_class=Response, responses=answers("application/zip"))
-def export_run(run: str, shared: Shared, to: str, version: str | None = None) -> Response:
+def export_run(
+    run: str, shared: Shared, to: str, version: str | None = None, option: Options = ()
+) -> Response:
     """Download what happened in a finished run in another format, with the map."""
-    options = {} if version is None else {"version": version}
-    made = exported_run(shared.workspace, shared.runs.kept.whole(run), to=to, options=options)
-    file = f"{run}-as-run.{to}{'' if version is None else f'-{version}'}.zip"
-    headers = {"Content-Disposition": f'attachment; filename="{file}"'}
-    return Response(made.zipped(), media_type="application/zip", headers=headers)
+    options = _given_options(option, version=version)
+    folder = shared.runs.kept.whole(run)
+    files = export_to_memory(shared.workspace, folder, to=to, options=options)
+    return _as_download(files, f"{run}-as-run.{to}", options)
 
 
 @exports.get("/{name}/export/notes")
-def export_notes(name: str, shared: Shared, to: str, version: str | None = None) -> ExportInfo:
+def export_notes(
+    name: str, shared: Shared, to: str, version: str | None = None, option: Options = ()
+) -> ExportInfo:
     """What an export would hold, and what its format cannot say; refused if it cannot be made."""
-    made = _exported(shared, name, to, version)
-    said = made.notes() or {"approximated": [], "left_out": []}
-    return ExportInfo(files=list(made.names), **said)
+    files = _export_scenario(shared, name, to, _given_options(option, version=version))
+    notes = files.notes() or {"approximated": [], "left_out": []}
+    return ExportInfo(files=list(files.contents), **notes)
 
 
 @exports.get("/{name}/export", response_class=Response, responses=answers("application/zip"))
-def export_scenario(name: str, shared: Shared, to: str, version: str | None = None) -> Response:
+def export_scenario(
+    name: str, shared: Shared, to: str, version: str | None = None, option: Options = ()
+) -> Response:
     """Download a scenario in another format, as a ZIP with all that it needs."""
-    content = _exported(shared, name, to, version).zipped()
-    file = f"{name}.{to}{'' if version is None else f'-{version}'}.zip"
-    headers = {"Content-Disposition": f'attachment; filename="{file}"'}
-    return Response(content, media_type="application/zip", headers=headers)
+    options = _given_options(option, version=version)
+    return _as_download(_export_scenario(shared, name, to, options), f"{name}.{to}", options)
 
 
-def _exported(shared: Services, name: str, to: str, version: str | None) -> ExportedFiles:
+def _given_options(settings: Sequence[str], **others: str | None) -> dict[str, str]:
+    """Options by name, of ``NAME=VALUE`` and of those that have a parameter of their own."""
+    options = {name: value for name, value in others.items() if value is not None}
+    for setting in settings:
+        name, equals, value = setting.partition("=")
+        if not equals:
+            raise InputError(f"{setting!r} is not NAME=VALUE")
+        options[name] = value
+    return options
+
+
+def _export_scenario(
+    shared: Services, name: str, to: str, options: Mapping[str, str]
+) -> ExportedFiles:
     scenario = shared.drafts.get(name).scenario
-    options = {} if version is None else {"version": version}
-    return exported(shared.workspace, scenario, name=name, to=to, options=options)
+    return export_to_memory(shared.workspace, scenario, name=name, to=to, options=options)
+
+
+def _as_download(files: ExportedFiles, name: str, options: Mapping[str, str]) -> Response:
+    file = "-".join([name, *options.values()])
+    plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", file)
+    headers = {"Content-Disposition": f'attachment; filename="{plain}.zip"'}
+    return Response(files.zipped(), media_type="application/zip", headers=headers)
 
 
 def _kept(shared: Services, name: str, file: str) -> str:

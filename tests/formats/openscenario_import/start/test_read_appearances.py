@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from odscen.app.scenario_imports import import_scenario
+from odscen.app.exchange.imports import import_file
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.maps.store import Workspace
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.app.scenario_imports import ImportedScenario
+    from odscen.app.exchange.imports import ImportedFile
 
 WIDTH = '<width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
 ROAD = f"""<OpenDRIVE><header revMajor="1" revMinor="6"/>
@@ -62,7 +62,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 def read(
     workspace: Workspace, folder: Path, *, other: str = CAR, init: str = "", story: str = ""
-) -> ImportedScenario:
+) -> ImportedFile:
     (folder / "road.xodr").write_text(ROAD)
     file = folder / "scene.xosc"
     file.write_text(
@@ -72,10 +72,10 @@ def read(
         f"<Storyboard><Init><Actions>{EGO}{init}</Actions></Init>{story}</Storyboard>"
         "</OpenSCENARIO>"
     )
-    return import_scenario(workspace, file)
+    return import_file(workspace, file)
 
 
-def reasons(found: ImportedScenario, verdict: str) -> set[str]:
+def reasons(found: ImportedFile, verdict: str) -> set[str]:
     return {row.reason for row in found.lists[verdict]}
 
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import InputError
-from odscen.formats.exporter import Exporter
+from odscen.formats.base import ExportNotes, Format, FormatOption
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from lxml.etree import _Element
 
-    from odscen.formats.exporter import ExportFiles, ExportSource
-    from odscen.formats.openscenario.dialect import Dialect, ExportNotes
+    from odscen.formats.base import (
+        ExportFiles,
+        ExportSource,
+        FileContent,
+        GivenFile,
+        ImportSource,
+        RecordedRun,
+    )
+    from odscen.formats.openscenario.dialect import Dialect
     from odscen.scenario.document.scenario_document import Scenario
 
 _DATE = "2026-01-01T00:00:00"
@@ -24,21 +29,43 @@ LEFT_HANDED = "CARLA:"
 """How ScenarioRunner's descriptions begin of files in CARLA's frame, which ours are not in."""
 
 
-def openscenario_files(source: ExportSource) -> ExportFiles:
+def read_openscenario(source: ImportSource) -> FileContent:
+    """Scenario of a file, with a verdict on each of its elements."""
+    from odscen.formats.openscenario_import.xosc_file import read_xosc_file
+
+    return read_xosc_file(source)
+
+
+def choose_main(files: Sequence[GivenFile]) -> int:
+    """Which of several files is the scenario, or the distribution that varies it."""
+    from odscen.formats.openscenario_import.xosc_file import choose_main_file
+
+    return choose_main_file(files)
+
+
+def write_openscenario(source: ExportSource) -> ExportFiles:
     """A file of OpenSCENARIO, its map, and what could not be said.
 
     Raises
     ------
     InputError
-        If the version cannot be written.
+        If the version cannot be written, or of a run too much or nothing was recorded.
     """
-    from odscen.formats.openscenario.dialect import Dialect, ExportNotes
+    from odscen.formats.openscenario.dialect import Dialect
+
+    dialect = Dialect.of(source.options.get("version", LATEST))
+    if source.recorded is None:
+        return _write_scenario(source, dialect)
+    return _write_run(source, source.recorded, dialect)
+
+
+def _write_scenario(source: ExportSource, dialect: Dialect) -> ExportFiles:
     from odscen.formats.openscenario.xosc_entities import entity
     from odscen.formats.openscenario.xosc_places import Places
     from odscen.formats.openscenario.xosc_signals import traffic_signals
     from odscen.formats.openscenario.xosc_storyboard import Story
 
-    dialect, notes = Dialect.of(source.options.get("version", LATEST)), ExportNotes()
+    notes = ExportNotes()
     scenario, places = source.scenario, Places(source)
     _note_traffic(source, dialect, notes)
     said = scenario.environment.model_dump(exclude_defaults=True) or scenario.demand.clock
@@ -50,27 +77,16 @@ def openscenario_files(source: ExportSource) -> ExportFiles:
     return _files(source, dialect, entities, story.storyboard(), notes, signals)
 
 
-def files_as_run(source: ExportSource) -> ExportFiles:
-    """What happened in a run: a file of OpenSCENARIO, its map, and what could not be said.
-
-    Raises
-    ------
-    InputError
-        If the version cannot be written, or too much or nothing was recorded.
-    """
-    from odscen.formats.openscenario.dialect import Dialect, ExportNotes
+def _write_run(source: ExportSource, recorded: RecordedRun, dialect: Dialect) -> ExportFiles:
     from odscen.formats.openscenario.xosc_as_run import AsRun, lines_of
     from odscen.formats.openscenario.xosc_places import Places
     from odscen.formats.openscenario.xosc_triggers import Triggers
 
-    happened = source.happened
-    if happened is None:
-        raise InputError("what happened is known of runs only")
-    dialect, notes = Dialect.of(source.options.get("version", LATEST)), ExportNotes()
+    notes = ExportNotes()
     triggers = Triggers(Places(source), dialect, notes, {})
-    lines = lines_of(happened)
-    made = AsRun(source, happened, dialect, triggers, _weather(source, dialect), lines)
-    for user in happened.users:
+    lines = lines_of(recorded)
+    made = AsRun(source, recorded, dialect, triggers, _weather(source, dialect), lines)
+    for user in recorded.users:
         if user.id not in lines:
             notes.left_out.append((user.id, "never in the simulation"))
     return _files(source, dialect, list(made.entities()), made.storyboard(), notes)
@@ -114,10 +130,9 @@ def _files(
         storyboard,
     )
     text = etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8")
-    said = {"approximated": notes.rows(notes.approximated), "left_out": notes.rows(notes.left_out)}
     return {
         f"{source.name}.xosc": text.decode(),
-        f"{source.name}.export.json": json.dumps(said, indent=2, ensure_ascii=False) + "\n",
+        **notes.files(source.name),
         map_name: source.map_file,
     }
 
@@ -177,10 +192,21 @@ def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) ->
             notes.approximated.append((f"actors[{index}]", words))
 
 
-EXPORTER = Exporter(
-    name="openscenario",
+FORMAT = Format(
+    id="openscenario",
+    title="OpenSCENARIO",
     label="OpenSCENARIO XML of actors and rules, with --version 1.0 to 1.3",
-    files=openscenario_files,
-    options=("version",),
-    runs=files_as_run,
+    description="Road users and rules for esmini, ScenarioRunner and others, with the map beside "
+    "them. SUMO's traffic does not travel.",
+    of=("scenario", "run"),
+    suffixes=(".xosc", ".xml"),
+    read=read_openscenario,
+    write=write_openscenario,
+    options=(
+        FormatOption(
+            "version", "Of OpenSCENARIO: 1.0 to 1.3.", ("1.0", "1.1", "1.2", "1.3"), LATEST
+        ),
+        FormatOption("ego", "What drives the ego: SUMO, or its story.", ("story", "sumo"), "story"),
+    ),
+    choose_main=choose_main,
 )

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.formats.trajectory_table import read_trajectories_table, trajectory_rows
+from odscen.formats.trajectories_format import read_trajectories_table, trajectory_rows
 
 CSV = b"time,id,x,y\n2.5,a,10,0\n2.0,a,8,0\n3.0,a,10,2\n2.0,b,0,0\n3.0,b,0,0\n"
 

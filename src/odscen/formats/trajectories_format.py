@@ -12,20 +12,51 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError
+from odscen.formats.base import ElementReport, FileContent, Format
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import polars as pl
 
+    from odscen.formats.base import ImportSource
     from odscen.scenario.document.actions_document import TrajectoryRow
 
 MOST_ROWS = 100_000
 _NEEDED = ("time", "x", "y")
+_KNOWN = ("time", "id", "x", "y", "hdg")
 _LISTED = 8
 """Names that a message lists at most."""
 _MOVED = 0.01
 """Metres from which on a direction of motion is taken from two places."""
+
+
+def read_tracks(source: ImportSource) -> FileContent:
+    """Tracks of all road users of a table, in order of time; other columns are left out.
+
+    Raises
+    ------
+    InputError
+        If it is no table, or lacks a column.
+    """
+    import polars as pl
+
+    parquet = source.file.name.lower().endswith(".parquet")
+    table = read_trajectories_table(source.file.read(), parquet=parquet)
+    _refuse_missing_columns(table)
+    report = ElementReport(source.file.name)
+    for column in table.columns:
+        known = column in _KNOWN
+        why = "" if known else "tracks have no such column"
+        report.add("taken" if known else "ignored", f"column {column}", why)
+    numbers = [name for name in _KNOWN if name in table.columns and name != "id"]
+    ids = [pl.col("id").cast(pl.String)] if "id" in table.columns else [pl.lit("1").alias("id")]
+    try:
+        tracks = table.select(*ids, pl.col(numbers).cast(pl.Float64)).sort("time", "id")
+    except pl.exceptions.PolarsError as error:
+        raise InputError(f"{', '.join(numbers)} have to be numbers: {error}") from error
+    columns = [name for name in _KNOWN if name in tracks.columns]
+    return FileContent(tracks=tracks.select(columns), lists=report.lists)
 
 
 def read_trajectories_table(content: bytes, *, parquet: bool) -> pl.DataFrame:
@@ -62,10 +93,8 @@ def trajectory_rows(
     """
     import polars as pl
 
-    missing = [name for name in _NEEDED if name not in table.columns]
-    if missing:
-        raise InputError(f"no column {' and '.join(missing)}; there are {', '.join(table.columns)}")
-    own = _of(table, of)
+    _refuse_missing_columns(table)
+    own = _rows_of(table, of)
     names = [*_NEEDED, *(["hdg"] if "hdg" in own.columns else [])]
     try:
         numbers = own.select(pl.col(names).cast(pl.Float64)).sort("time")
@@ -90,7 +119,13 @@ def trajectory_rows(
     )
 
 
-def _of(table: pl.DataFrame, of: str | None) -> pl.DataFrame:
+def _refuse_missing_columns(table: pl.DataFrame) -> None:
+    missing = [name for name in _NEEDED if name not in table.columns]
+    if missing:
+        raise InputError(f"no column {' and '.join(missing)}; there are {', '.join(table.columns)}")
+
+
+def _rows_of(table: pl.DataFrame, of: str | None) -> pl.DataFrame:
     import polars as pl
 
     if "id" not in table.columns:
@@ -121,3 +156,13 @@ def _headings(rows: Sequence[tuple[float, ...]]) -> list[float]:
         last = last if one is None else one
         headings.append(last)
     return headings
+
+
+FORMAT = Format(
+    id="trajectories",
+    title="Trajectories (CSV, Parquet)",
+    label="a table of trajectories: time, x, y and perhaps id and hdg",
+    of=("run",),
+    suffixes=(".csv", ".parquet"),
+    read=read_tracks,
+)

@@ -10,13 +10,13 @@ import json
 import math
 from typing import TYPE_CHECKING
 
-from odscen.formats.exporter import Exporter
+from odscen.formats.base import WINDOW_OPTIONS, Format
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from odscen.base.arrays import FloatArray
-    from odscen.formats.exporter import ExportFiles, ExportSource
+    from odscen.formats.base import ExportFiles, ExportSource
     from odscen.formats.recordings.run_recording import (
         LaneElement,
         LineElement,
@@ -38,7 +38,7 @@ _STATES = (0, 4, 5, 6)
 """``LANE_STATE_UNKNOWN``, ``STOP``, ``CAUTION`` and ``GO``, by the colour of the light."""
 
 
-def waymo_scenarios(source: ExportSource) -> ExportFiles:
+def write_waymo_scenarios(source: ExportSource) -> ExportFiles:
     """One TFRecord file of scenarios of 9.1 s one after the other, and what is in it.
 
     Raises
@@ -241,10 +241,12 @@ def line_type(line: LineElement) -> int:
     return types.get(line.kind, (0, 0))[yellow]
 
 
-EXPORTER = Exporter(
-    name="waymo",
+FORMAT = Format(
+    id="waymo",
+    title="Waymo Open Motion",
     label="scenarios of 9.1 s of a run as Waymo Open Motion TFRecord",
-    runs=waymo_scenarios,
-    options=("begin", "end"),
+    of=("run",),
+    write=write_waymo_scenarios,
+    options=WINDOW_OPTIONS,
     needs_roads=True,
 )

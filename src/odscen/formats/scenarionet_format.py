@@ -11,10 +11,10 @@ import math
 import pickle
 from typing import TYPE_CHECKING, Any
 
-from odscen.formats.exporter import Exporter
+from odscen.formats.base import WINDOW_OPTIONS, Format
 
 if TYPE_CHECKING:
-    from odscen.formats.exporter import ExportFiles, ExportSource
+    from odscen.formats.base import ExportFiles, ExportSource
     from odscen.formats.recordings.run_recording import (
         LaneElement,
         MapElements,
@@ -40,7 +40,7 @@ _LINES = {
 _ONLY_YELLOW = frozenset({"BROKEN_DOUBLE", "PASSING_DOUBLE"})
 
 
-def scenario_descriptions(source: ExportSource) -> ExportFiles:
+def write_scenario_descriptions(source: ExportSource) -> ExportFiles:
     """A folder that ScenarioNet and MetaDrive take as a data set of one scenario.
 
     Raises
@@ -265,10 +265,12 @@ def _distance(tracks: Tracks, row: int) -> float:
     return float(np.hypot(np.diff(tracks.x[row, at]), np.diff(tracks.y[row, at])).sum())
 
 
-EXPORTER = Exporter(
-    name="scenarionet",
+FORMAT = Format(
+    id="scenarionet",
+    title="ScenarioNet",
     label="a run as a ScenarioDescription of ScenarioNet and MetaDrive",
-    runs=scenario_descriptions,
-    options=("begin", "end"),
+    of=("run",),
+    write=write_scenario_descriptions,
+    options=WINDOW_OPTIONS,
     needs_roads=True,
 )

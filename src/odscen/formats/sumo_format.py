@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.formats.exporter import Exporter
+from odscen.formats.base import Format
 
 if TYPE_CHECKING:
-    from odscen.formats.exporter import ExportFiles, ExportSource
+    from odscen.formats.base import ExportFiles, ExportSource
 
 
-def sumo_files(source: ExportSource) -> ExportFiles:
+def write_sumo_files(source: ExportSource) -> ExportFiles:
     """Files of a run of the scenario as it is, with the network beside them.
 
     Raises
@@ -25,4 +25,11 @@ def sumo_files(source: ExportSource) -> ExportFiles:
     return {**realization.files, NET_FILE: source.net}
 
 
-EXPORTER = Exporter(name="sumo", label="SUMO files that run with plain sumo -c", files=sumo_files)
+FORMAT = Format(
+    id="sumo",
+    title="SUMO",
+    label="SUMO files that run with plain sumo -c",
+    description="Network, routes and configuration, which run with plain sumo -c.",
+    of=("scenario",),
+    write=write_sumo_files,
+)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.formats.exporter import Exporter
+from odscen.formats.base import Format
 
 if TYPE_CHECKING:
-    from odscen.formats.exporter import ExportFiles, ExportSource
+    from odscen.formats.base import ExportFiles, ExportSource
 
 
-def graph_form(source: ExportSource) -> ExportFiles:
+def write_graph_form(source: ExportSource) -> ExportFiles:
     """One ``.graphml`` file with the name of the scenario's.
 
     Raises
@@ -24,6 +24,12 @@ def graph_form(source: ExportSource) -> ExportFiles:
     return {f"{source.name}.graphml": text}
 
 
-EXPORTER = Exporter(
-    name="graphml", label="the graph form as GraphML", files=graph_form, checked=False
+FORMAT = Format(
+    id="graphml",
+    title="GraphML",
+    label="the graph form as GraphML",
+    description="The lane graph with the scenario on it, for networkx and other graph tools.",
+    of=("scenario",),
+    write=write_graph_form,
+    checked=False,
 )

@@ -1,52 +1,31 @@
-"""Scenarios in foreign formats.
-
-A new format is a module in ``odscen/formats`` with an ``EXPORTER``, and its line in
-:data:`EXPORTERS`; the command line and its help read that. Nothing heavy is imported to read it.
-"""
+"""Scenarios and runs in foreign formats: as files in a folder, or in one archive."""
 
 from __future__ import annotations
 
+import io
+import json
 import shutil
+import tempfile
+import zipfile
 from contextlib import nullcontext
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
-from odscen.formats import (
-    arrays_export,
-    commonroad_export,
-    graphml_export,
-    openscenario_export,
-    pyg_export,
-    scenarionet_export,
-    sumo_export,
-    waymo_export,
-)
+from odscen.base.errors import InputError, WorkspaceError, in_file
+from odscen.formats import find_format, list_formats
+from odscen.formats.base import NOTES_SUFFIX
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.formats.exporter import Exporter, ExportFiles, ExportSource, WhatHappened
+    from odscen.formats.base import ExportFiles, ExportSource, Format, RecordedRun
     from odscen.maps.store import Workspace
-    from odscen.opendrive.road_model import OpenDrive
     from odscen.scenario.document.scenario_document import Scenario
 
-EXPORTERS = {
-    one.name: one
-    for one in (
-        sumo_export.EXPORTER,
-        graphml_export.EXPORTER,
-        openscenario_export.EXPORTER,
-        arrays_export.EXPORTER,
-        pyg_export.EXPORTER,
-        scenarionet_export.EXPORTER,
-        waymo_export.EXPORTER,
-        commonroad_export.EXPORTER,
-    )
-}
-"""Every format by its name."""
+_DATE: Final = (2026, 1, 1, 0, 0, 0)
+"""Of every file in an archive: the same scenario gives the same bytes on any day."""
 
 
 def export(
@@ -69,8 +48,8 @@ def export(
     out
         Folder for the files; made if need be.
     to
-        Name of the format, one of :data:`EXPORTERS` that is not of runs only: ``sumo``,
-        ``graphml``, ``openscenario``, ``arrays`` and ``pyg``.
+        Name of a format that scenarios are written in: ``sumo``, ``graphml``, ``openscenario``,
+        ``arrays``, ``pyg``, or one of an installed package.
     options
         What the format lets one choose: of ``openscenario`` the ``version``.
     name
@@ -95,18 +74,18 @@ def export(
     from odscen.app.scenarios import check_scenario, given_scenario, scenario_name
     from odscen.scenario.document.problems import refuse_errors
 
-    exporter = _exporter(to, options)
-    if exporter.files is None:
+    chosen = _choose_format(to, options)
+    if "scenario" not in chosen.of or chosen.write is None:
         raise InputError(
             f"the format {to} says what happened in a run: name the folder of one",
             file=str(scenario) if isinstance(scenario, Path) else None,
         )
     document = given_scenario(scenario)
-    if exporter.checked:
+    if chosen.checked:
         with in_file(str(scenario)) if isinstance(scenario, Path) else nullcontext():
             refuse_errors(check_scenario(workspace, document))
-    source = _source(workspace, document, name or scenario_name(scenario), options)
-    return _write(exporter.files(source), out)
+    source = _make_source(workspace, document, name or scenario_name(scenario), options)
+    return _write_files(chosen.write(source), out)
 
 
 def export_run(
@@ -152,17 +131,24 @@ def export_run(
     from odscen.runs.finished_run import Run
     from odscen.runs.layout import SCENARIO_FILE
 
-    exporter = _exporter(to, options)
-    if exporter.runs is None:
-        able = ", ".join(name for name, one in EXPORTERS.items() if one.runs is not None)
+    chosen = _choose_format(to, options)
+    if "run" not in chosen.of or chosen.write is None:
+        able = ", ".join(
+            name
+            for name, one in list_formats().items()
+            if "run" in one.of and one.write is not None
+        )
         raise InputError(f"the format {to} cannot say what happened in a run; {able} can")
-    happened = _happened(run)
+    recorded = _read_recorded(run)
     seed = Run.open(run).summary["seed"]  # perhaps another one than the scenario's own
     document = read_scenario(run / SCENARIO_FILE).model_copy(update={"seed": seed})
-    source = _source(workspace, document, run.resolve().name, options, happened)
-    if exporter.needs_roads:
-        source = replace(source, roads=_roads(source.map_file))
-    return _write(exporter.runs(source), out)
+    source = _make_source(workspace, document, run.resolve().name, options, recorded)
+    if chosen.needs_roads:
+        from odscen.opendrive.parse import parse
+
+        file = source.map_file
+        source = replace(source, roads=parse(file.read_bytes(), file=file.name))
+    return _write_files(chosen.write(source), out)
 
 
 def export_runs(
@@ -187,23 +173,71 @@ def export_runs(
     return [file for files in written for file in files]
 
 
-def _roads(map_file: Path) -> OpenDrive:
-    from odscen.opendrive.parse import parse
+class ExportedFiles(NamedTuple):
+    """Files of an export.
 
-    return parse(map_file.read_bytes(), file=map_file.name)
+    Attributes
+    ----------
+    contents
+        Bytes of each, by their names and in the order of these.
+    """
+
+    contents: dict[str, bytes]
+
+    def notes(self) -> dict[str, Any] | None:
+        """What is only approximated, and what is left out; ``None`` if the format has no such."""
+        for name, content in self.contents.items():
+            if name.endswith(NOTES_SUFFIX):
+                notes: dict[str, Any] = json.loads(content)
+                return notes
+        return None
+
+    def zipped(self) -> bytes:
+        """All of them as a ZIP archive; the same bytes each time."""
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in self.contents.items():
+                entry = zipfile.ZipInfo(name, _DATE)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = 0o644 << 16
+                archive.writestr(entry, content)
+        return buffer.getvalue()
 
 
-def _exporter(to: str, options: Mapping[str, str] | None) -> Exporter:
-    if to not in EXPORTERS:
-        raise NotFoundError("format", to, list(EXPORTERS))
-    for option in options or {}:
-        if option not in EXPORTERS[to].options:
-            raise InputError(f"the format {to} has no {option}")
-    return EXPORTERS[to]
+def export_to_memory(
+    workspace: Workspace,
+    source: Scenario | Path,
+    *,
+    to: str,
+    name: str | None = None,
+    options: Mapping[str, str] | None = None,
+) -> ExportedFiles:
+    """Write a scenario as :func:`export` does, or the run of a folder as :func:`export_run`.
+
+    Raises
+    ------
+    NotFoundError, InputError, ScenarioError
+        As of these functions.
+    """
+    with tempfile.TemporaryDirectory(prefix="odscen-export-") as scratch:
+        out = Path(scratch)
+        if isinstance(source, Path):
+            files = export_run(workspace, source, out, to=to, options=options)
+        else:
+            files = export(workspace, source, out, to=to, options=options, name=name)
+        return ExportedFiles(
+            {file.relative_to(out).as_posix(): file.read_bytes() for file in files}
+        )
 
 
-def _happened(folder: Path) -> WhatHappened:
-    from odscen.formats.exporter import WhatHappened
+def _choose_format(to: str, options: Mapping[str, str] | None) -> Format:
+    chosen = find_format(to)
+    chosen.refuse_unknown_options(options or {})
+    return chosen
+
+
+def _read_recorded(folder: Path) -> RecordedRun:
+    from odscen.formats.base import RecordedRun
     from odscen.records.run_plan import Plan
     from odscen.runs.finished_run import Run
     from odscen.runs.layout import PLAN_FILE
@@ -220,18 +254,18 @@ def _happened(folder: Path) -> WhatHappened:
     until = float(times[-1] if ended is None else ended)
     if not plan.elevation and "z" in rows.columns:  # SUMO's network is flat, the map is not
         rows = rows.drop("z")
-    return WhatHappened(plan.actors, rows, read_light_states(folder), until, step)
+    return RecordedRun(plan.actors, rows, read_light_states(folder), until, step)
 
 
-def _source(
+def _make_source(
     workspace: Workspace,
     document: Scenario,
     name: str,
     options: Mapping[str, str] | None,
-    happened: WhatHappened | None = None,
+    recorded: RecordedRun | None = None,
 ) -> ExportSource:
     from odscen.app.maps import map_of
-    from odscen.formats.exporter import ExportSource
+    from odscen.formats.base import ExportSource
 
     loaded = map_of(workspace, document)
     return ExportSource(
@@ -242,11 +276,11 @@ def _source(
         net=loaded.entry.checked("net"),
         assets=workspace.assets(),
         options=dict(options or {}),
-        happened=happened,
+        recorded=recorded,
     )
 
 
-def _write(files: ExportFiles, out: Path) -> list[Path]:
+def _write_files(files: ExportFiles, out: Path) -> list[Path]:
     written = []
     try:
         for name, content in sorted(files.items()):

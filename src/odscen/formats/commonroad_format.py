@@ -12,13 +12,13 @@ from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.xml_text import quoteattr
-from odscen.formats.exporter import Exporter
+from odscen.formats.base import WINDOW_OPTIONS, Format
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from odscen.base.arrays import FloatArray
-    from odscen.formats.exporter import ExportFiles, ExportSource
+    from odscen.formats.base import ExportFiles, ExportSource
     from odscen.formats.recordings.run_recording import (
         CrosswalkElement,
         LaneElement,
@@ -60,7 +60,7 @@ class _Presence(NamedTuple):
     last: int
 
 
-def commonroad_files(source: ExportSource) -> ExportFiles:
+def write_commonroad_files(source: ExportSource) -> ExportFiles:
     """One scenario of the whole run, and which obstacle is who.
 
     Raises
@@ -343,10 +343,12 @@ def _planning_problem(recording: RunRecording, number: int) -> str:
     )
 
 
-EXPORTER = Exporter(
-    name="commonroad",
+FORMAT = Format(
+    id="commonroad",
+    title="CommonRoad",
     label="a run as a CommonRoad 2020a scenario",
-    runs=commonroad_files,
-    options=("begin", "end"),
+    of=("run",),
+    write=write_commonroad_files,
+    options=WINDOW_OPTIONS,
     needs_roads=True,
 )

@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from odscen.formats.arrays_export import scenario_array_files
-from odscen.formats.exporter import Exporter
+from odscen.formats.arrays_format import write_scenario_arrays
+from odscen.formats.base import WINDOW_OPTIONS, Format
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     import numpy as np
 
     from odscen.base.arrays import FloatArray
-    from odscen.formats.exporter import ExportFiles, ExportSource
+    from odscen.formats.base import ExportFiles, ExportSource
     from odscen.formats.recordings.run_recording import MapElements, RunRecording
     from odscen.lanegraph.graphs import MapGraph
 
     Arrays = dict[str, np.ndarray[Any, np.dtype[Any]]]
 
-FORMAT = "odscen-arrays"
-VERSION = 1
+ABOUT_FORMAT = "odscen-arrays"
+ABOUT_VERSION = 1
 
 
-def run_arrays(source: ExportSource) -> ExportFiles:
+def write_run_arrays(source: ExportSource) -> ExportFiles:
     """One .npz file: the graphs of the map, its elements, tracks and signal states.
 
     Raises
@@ -54,8 +54,8 @@ def _head(recording: RunRecording) -> Arrays:
     import numpy as np
 
     about = {
-        "format": FORMAT,
-        "version": VERSION,
+        "format": ABOUT_FORMAT,
+        "version": ABOUT_VERSION,
         "run": recording.name,
         "scenario": recording.scenario,
         "map": recording.map_name,
@@ -158,12 +158,19 @@ def _first_nodes(recording: RunRecording, graph: MapGraph) -> np.ndarray[Any, np
     return np.where(walks, np.int64(-1), nearest)
 
 
-EXPORTER = Exporter(
-    name="pyg",
+def write_pyg_arrays(source: ExportSource) -> ExportFiles:
+    """Arrays of a run; of a scenario, those of the format ``arrays``."""
+    return write_scenario_arrays(source) if source.recorded is None else write_run_arrays(source)
+
+
+FORMAT = Format(
+    id="pyg",
+    title="PyTorch Geometric (.npz)",
     label="arrays of a run, or of a scenario, for PyTorch Geometric (.npz)",
-    files=scenario_array_files,
+    description="Arrays that odscen makes a HeteroData of PyTorch Geometric of.",
+    of=("scenario", "run"),
+    write=write_pyg_arrays,
+    options=WINDOW_OPTIONS,
     checked=False,
-    runs=run_arrays,
-    options=("begin", "end"),
     needs_roads=True,
 )

@@ -1,0 +1,294 @@
+"""Files of foreign formats read from the disk, with what they name: catalogs, other files, maps."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from odscen.app.maps import load_map
+from odscen.app.scenarios import check_scenario, write_scenario
+from odscen.base.checksums import digest
+from odscen.base.errors import InputError, NotFoundError, WorkspaceError
+from odscen.base.given_files import MOST, read_given
+from odscen.base.text_files import write_text
+from odscen.formats import find_format, format_of_file
+from odscen.formats.base import ImportMap, ImportSource
+from odscen.maps.folder_names import name_from_file
+from odscen.opendrive.parse import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    import polars as pl
+
+    from odscen.formats.base import FileContent, GivenFile, ReportRow
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import Workspace
+    from odscen.scenario.document.problems import Problem
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.sweeps.sweep_plan import SweepPlan
+
+_FOLDERS_ABOVE: Final = 3
+"""Folders above a file that may have the catalogs it names."""
+
+
+class ImportedFile(NamedTuple):
+    """What has come of a file.
+
+    Attributes
+    ----------
+    scenario
+        The document; ``None`` if the file has tracks.
+    tracks
+        Table of ``time`` (s), ``id``, ``x``, ``y`` (m) and perhaps ``hdg`` (rad) of body centres in
+        the OpenDRIVE frame; ``None`` if the file has a scenario.
+    lists
+        Elements of the file, each with a reason, by what has become of them: ``taken``,
+        ``approximated``, ``ignored`` and ``refused``; empty of formats that are always taken whole.
+    problems
+        What :func:`odscen.check` finds in the scenario.
+    plan
+        What a file varies, as a sweep; ``None`` of others, and if none of its parameters settles a
+        number of the scenario.
+    plan_file
+        Where that has been written.
+    """
+
+    scenario: Scenario | None
+    tracks: pl.DataFrame | None
+    lists: Mapping[str, Sequence[ReportRow]]
+    problems: tuple[Problem, ...]
+    plan: SweepPlan | None = None
+    plan_file: Path | None = None
+
+
+def import_file(
+    workspace: Workspace,
+    path: Path,
+    *,
+    out: Path | None = None,
+    of: str | None = None,
+    maps: Path | None = None,
+    on_map: str | None = None,
+    options: Mapping[str, str] | None = None,
+) -> ImportedFile:
+    """Read a file of a foreign format: a scenario, or tracks of a recording.
+
+    A map that it names is looked for beside it, in the folder ``maps``, and by its name in the
+    workspace; one that is found as a file is added to the workspace. Of a parameter value
+    distribution of OpenSCENARIO it is the scenario that it names, and the plan of the sweep is
+    written beside ``out``, with ``.sweep.json`` in the place of ``.scenario.json``.
+
+    Parameters
+    ----------
+    workspace
+        Has the maps.
+    path
+        The file.
+    out
+        Where the scenario is written; or the tracks, as CSV or Parquet by its ending. Nothing is
+        written if not given.
+    of
+        Name of the format; by the ending of the file if not given.
+    maps
+        Another folder of maps.
+    on_map
+        The map on which it plays, whatever the file names: an OpenDRIVE file, or the name of a map
+        of the workspace.
+    options
+        What the format lets one choose: of ``openscenario`` with ``ego`` what drives the ego,
+        ``story`` or ``sumo``.
+
+    Returns
+    -------
+    ImportedFile
+        The scenario or the tracks, with the report on the file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is not of the format; names element and line.
+    NotFoundError
+        If there is no such format, or the map ``on_map`` is not found.
+    NoMapError
+        If the map of an OpenSCENARIO file is not found, or it names none; has the report of the
+        rest.
+    WorkspaceError
+        If a file cannot be written.
+    """
+    entry = None if on_map is None else _map_of_name_or_file(workspace, on_map)
+
+    def find_map(named: str, file: GivenFile) -> MapEntry:
+        return entry or _map_beside(workspace, Path(file.where), maps, named)
+
+    content = read_content(
+        workspace,
+        of or format_of_file(str(path)).id,
+        DiskFile(path),
+        name=name_from_file(path),
+        find_entry=find_map,
+        options=options,
+        map_given=on_map is not None or maps is not None,
+    )
+    plan_file = None
+    if out is not None and content.tracks is not None:
+        _write_tracks(content.tracks, out)
+    if content.scenario is None:
+        return ImportedFile(None, content.tracks, content.lists, ())
+    if out is not None:
+        write_scenario(content.scenario, out)
+        if content.plan is not None:
+            stem = out.name.removesuffix(".json").removesuffix(".scenario")
+            plan_file = write_text(out.with_name(f"{stem}.sweep.json"), plan_text(content.plan))
+    problems = check_scenario(workspace, content.scenario)
+    return ImportedFile(
+        content.scenario, content.tracks, content.lists, problems, content.plan, plan_file
+    )
+
+
+def read_content(
+    workspace: Workspace,
+    of: str,
+    file: GivenFile,
+    *,
+    name: str,
+    find_entry: Callable[[str, GivenFile], MapEntry],
+    options: Mapping[str, str] | None = None,
+    map_given: bool = False,
+) -> FileContent:
+    """Read a file, from wherever it and what it names lie.
+
+    Parameters
+    ----------
+    of
+        Name of the format.
+    name
+        Of the scenario.
+    find_entry
+        Gives the map that a file names.
+
+    Raises
+    ------
+    InputError
+        If nothing is read of the format, it has no such option, or as of :func:`import_file`.
+    NotFoundError, NoMapError
+        As of :func:`import_file`.
+    """
+    chosen = find_format(of)
+    if chosen.read is None:
+        raise InputError(f"the format {of} is only written", file=file.where)
+    chosen.refuse_unknown_options(options or {})
+
+    def find_map(named: str, asking: GivenFile) -> ImportMap:
+        entry = find_entry(named, asking)
+        sumo_map = load_map(entry).sumo
+        return ImportMap(entry.name, entry.sha256, sumo_map, lambda: parse(entry.read("xodr")))
+
+    return chosen.read(
+        ImportSource(
+            name=name,
+            file=file,
+            find_map=find_map,
+            assets=workspace.assets(),
+            options=dict(options or {}),
+            map_given=map_given,
+        )
+    )
+
+
+def plan_text(plan: SweepPlan) -> str:
+    """The file of a plan."""
+    return json.dumps(plan.to_dict(), indent=2, ensure_ascii=False) + "\n"
+
+
+def bare_map_name(named: str) -> str:
+    """Name of a map as a file names it, without folder and ending."""
+    return _with_slashes(named).rpartition("/")[2].removesuffix(".xodr")
+
+
+def _write_tracks(tracks: pl.DataFrame, out: Path) -> None:
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if out.suffix == ".parquet":
+            tracks.write_parquet(out)
+        else:
+            tracks.write_csv(out)
+    except OSError as error:
+        raise WorkspaceError(f"{out}: {error.strerror or error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class DiskFile:
+    """A file on the disk, and what lies around it."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """Name of the file without its folder."""
+        return self.path.name
+
+    @property
+    def where(self) -> str:
+        """The file with its folder."""
+        return str(self.path)
+
+    def read(self, *, most: int = MOST) -> bytes:
+        """Its content."""
+        return read_given(self.path, most=most)
+
+    def other(self, named: str) -> DiskFile:
+        """A file that it names, relative to its folder."""
+        return DiskFile(self.path.parent / _with_slashes(named))
+
+    def others(self, folders: Sequence[str], suffix: str) -> Iterator[DiskFile]:
+        """All files with an ending in these folders, relative to its own or one above.
+
+        Euro NCAP's collection names those in ``NCAP/SET/`` as if from ``NCAP/``.
+        """
+        above = (self.path.parent, *self.path.absolute().parents[1 : 1 + _FOLDERS_ABOVE])
+        for folder in folders:
+            places = [parent / _with_slashes(folder) for parent in above]
+            there = next((place for place in places if place.is_dir()), places[0])
+            for path in sorted(there.glob(f"*{suffix}")):
+                yield DiskFile(path)
+
+
+def _map_of_name_or_file(workspace: Workspace, given: str) -> MapEntry:
+    if given.lower().endswith(".xodr"):
+        return _known_or_added(workspace, Path(given))
+    return workspace.map(given)
+
+
+def _map_beside(workspace: Workspace, file: Path, maps: Path | None, named: str) -> MapEntry:
+    """The map that a file names: one that is found as a file is added to the workspace.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such file, and no map of that name in the workspace.
+    """
+    bare = bare_map_name(named)
+    if not bare:
+        raise NotFoundError("map", "", workspace.map_names())
+    folders = (file.parent, file.parent.parent / "xodr", *((maps,) if maps else ()))
+    places = [file.parent / _with_slashes(named)]
+    for place in (*places, *(folder / f"{bare}.xodr" for folder in folders)):
+        if place.is_file():
+            return _known_or_added(workspace, place)
+    if bare in workspace.map_names():
+        return workspace.map(bare)
+    raise NotFoundError("map", bare, workspace.map_names())
+
+
+def _known_or_added(workspace: Workspace, file: Path) -> MapEntry:
+    """The map of the workspace that has the content of a file; added if there is none."""
+    sha256 = digest(read_given(file))
+    known = workspace.first_map(lambda entry: entry.sha256 == sha256)
+    return workspace.add_map(file) if known is None else known
+
+
+def _with_slashes(path: str) -> str:
+    return path.replace("\\", "/")
