@@ -25,10 +25,10 @@ const CatalogueView = lazy(async () => ({
 const EditorView = lazy(async () => ({ default: (await import("./editor/EditorView")).EditorView }));
 const ImportView = lazy(async () => ({ default: (await import("./exchange/ImportView")).ImportView }));
 const RunView = lazy(async () => ({ default: (await import("./run/RunView")).RunView }));
-const SweepsView = lazy(async () => ({ default: (await import("./sweeps/SweepsView")).SweepsView }));
-const SweepView = lazy(async () => ({ default: (await import("./sweeps/SweepView")).SweepView }));
-const StudiesView = lazy(async () => ({ default: (await import("./studies/StudiesView")).StudiesView }));
-const StudyView = lazy(async () => ({ default: (await import("./studies/StudyView")).StudyView }));
+const SweepsView = lazy(async () => ({ default: (await import("./experiments/SweepsView")).SweepsView }));
+const SweepView = lazy(async () => ({ default: (await import("./experiments/SweepView")).SweepView }));
+const StudiesView = lazy(async () => ({ default: (await import("./experiments/StudiesView")).StudiesView }));
+const StudyView = lazy(async () => ({ default: (await import("./experiments/StudyView")).StudyView }));
 const RunsView = lazy(async () => ({ default: (await import("./run/RunsView")).RunsView }));
 
 /** One window: catalogue, editor and run. */

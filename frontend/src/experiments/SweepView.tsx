@@ -1,4 +1,4 @@
-import { Alert, Anchor, Button, Group, Loader, Modal, Progress, Text, Title } from "@mantine/core";
+import { Alert, Anchor, Loader, Text, Title } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
 import { useState } from "react";
@@ -7,11 +7,12 @@ import { type SweepInfo, sweeps } from "../api/sweeps";
 import { go, hashOf } from "../ui/address";
 import { tell, tellError } from "../ui/notices";
 import { CaseTable } from "./CaseTable";
+import { ExperimentHead } from "./ExperimentHead";
 import { Parallel } from "./Parallel";
 import { lasting } from "./plan";
 import { Plane } from "./Plane";
 import { useSweep } from "./useSweep";
-import "./sweeps.css";
+import "./experiments.css";
 
 /** One sweep: how far it is, the boundary between safe and not, and its cases. */
 export function SweepView({ scenario, sweep }: { scenario: string; sweep: string }) {
@@ -66,54 +67,26 @@ export function SweepView({ scenario, sweep }: { scenario: string; sweep: string
 
 /** Outcome or progress, and what can be done. */
 function Head({ scenario, info, onChanged }: { scenario: string; info: SweepInfo; onChanged: () => void }) {
-  const [asking, setAsking] = useState(false);
   const { sweep, state, cases, ended, seconds_left: left, safe, unsafe, error } = info;
-  const ask = (call: Promise<unknown>): void => {
-    call.then(onChanged, tellError);
-  };
-  const remove = (): void => {
-    sweeps.remove(sweep).then(() => go({ view: "sweeps", scenario }), tellError);
-  };
   return (
-    <>
-      <Text role="status">
-        <Trans>
-          <Plural value={cases} one="# case" other="# cases" /> of {info.parameters.join(", ")}
-        </Trans>
-        {state === "done" && t`: ${safe ?? 0} safe, ${unsafe ?? 0} not`}
-        {state === "done" &&
-          (safe ?? 0) + (unsafe ?? 0) < cases &&
-          t`, ${cases - (safe ?? 0) - (unsafe ?? 0)} not run`}
-        {state !== "done" && t`: ${ended} have ended`}
-        {state === "running" && left !== null && t`, about ${lasting(left)} left`}
-        {state === "stopped" && t`. It was stopped; what is missing can be run at any time`}.
-      </Text>
-      {state === "running" && (
-        <Progress
-          my="xs"
-          size="lg"
-          animated
-          value={(100 * ended) / cases}
-          aria-label={t`Cases that have ended`}
-        />
-      )}
-      {state === "failed" && (
-        <Alert color="red" title={t`The sweep has failed`} my="xs">
-          {error}
-        </Alert>
-      )}
-      <Group my="sm">
-        {state === "running" && (
-          <Button variant="default" onClick={() => ask(sweeps.stop(sweep))}>
-            <Trans>Stop</Trans>
-          </Button>
-        )}
-        {(state === "stopped" || state === "failed") && (
-          <Button onClick={() => ask(sweeps.resume(sweep, 2))}>
-            <Trans>Resume</Trans>
-          </Button>
-        )}
-        {state === "done" && (
+    <ExperimentHead
+      name={sweep}
+      state={state}
+      share={(100 * ended) / cases}
+      error={error}
+      words={{
+        progress: t`Cases that have ended`,
+        failed: t`The sweep has failed`,
+        remove: t`Delete the sweep`,
+        all: t`All sweeps`,
+      }}
+      actions={{
+        stop: () => sweeps.stop(sweep),
+        resume: () => sweeps.resume(sweep, 2),
+        remove: () => sweeps.remove(sweep),
+      }}
+      links={
+        state === "done" && (
           <>
             <Anchor href={sweeps.fileUrl(sweep, "sweep.html")} target="_blank" rel="noreferrer">
               <Trans>Whole page, to keep</Trans>
@@ -122,32 +95,28 @@ function Head({ scenario, info, onChanged }: { scenario: string; info: SweepInfo
               <Trans>Table as Parquet</Trans>
             </Anchor>
           </>
-        )}
-        {state !== "running" && (
-          <Button variant="subtle" color="gray" onClick={() => setAsking(true)}>
-            <Trans>Delete the sweep</Trans>
-          </Button>
-        )}
-        <Anchor href={hashOf({ view: "sweeps", scenario })}>
-          <Trans>All sweeps</Trans>
-        </Anchor>
-      </Group>
-      <Modal opened={asking} onClose={() => setAsking(false)} title={t`Delete ${sweep}?`}>
-        <Text size="sm" mb="md">
-          <Trans>
-            Its <Plural value={ended} one="# run" other="# runs" /> are deleted for good. Scenarios that were
-            made of its cases stay.
-          </Trans>
-        </Text>
-        <Group justify="flex-end">
-          <Button variant="default" onClick={() => setAsking(false)}>
-            <Trans>Keep it</Trans>
-          </Button>
-          <Button color="red" onClick={remove}>
-            <Trans>Delete</Trans>
-          </Button>
-        </Group>
-      </Modal>
-    </>
+        )
+      }
+      all={hashOf({ view: "sweeps", scenario })}
+      lost={
+        <Trans>
+          Its <Plural value={ended} one="# run" other="# runs" /> are deleted for good. Scenarios that were
+          made of its cases stay.
+        </Trans>
+      }
+      onChanged={onChanged}
+      onRemoved={() => go({ view: "sweeps", scenario })}
+    >
+      <Trans>
+        <Plural value={cases} one="# case" other="# cases" /> of {info.parameters.join(", ")}
+      </Trans>
+      {state === "done" && t`: ${safe ?? 0} safe, ${unsafe ?? 0} not`}
+      {state === "done" &&
+        (safe ?? 0) + (unsafe ?? 0) < cases &&
+        t`, ${cases - (safe ?? 0) - (unsafe ?? 0)} not run`}
+      {state !== "done" && t`: ${ended} have ended`}
+      {state === "running" && left !== null && t`, about ${lasting(left)} left`}
+      {state === "stopped" && t`. It was stopped; what is missing can be run at any time`}.
+    </ExperimentHead>
   );
 }

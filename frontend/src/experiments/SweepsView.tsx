@@ -1,7 +1,7 @@
 import { Alert, Anchor, Button, Loader, Table, Text, Title } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { useCallback, useEffect } from "react";
+import { useCallback } from "react";
 
 import { api } from "../api/client";
 import { type SweepInfo, sweeps } from "../api/sweeps";
@@ -9,8 +9,8 @@ import { hashOf } from "../ui/address";
 import { useLearnedTitle, useTitle } from "../ui/titles";
 import { useLoaded } from "../ui/useLoaded";
 import { PlanForm } from "./PlanForm";
-import { POLL } from "./useSweep";
-import "./sweeps.css";
+import { usePolledList } from "./usePolled";
+import "./experiments.css";
 
 /** The sweeps of one scenario, and a form for another one. */
 export function SweepsView({ scenario }: { scenario: string }) {
@@ -57,13 +57,7 @@ export function SweepsView({ scenario }: { scenario: string }) {
 }
 
 function Earlier({ scenario }: { scenario: string }) {
-  const { value, error, reload } = useLoaded(useCallback(() => sweeps.list(scenario), [scenario]));
-  const live = value?.some(({ state }) => state === "running") ?? false;
-  useEffect(() => {
-    if (!live) return;
-    const timer = setInterval(reload, 2 * POLL);
-    return () => clearInterval(timer);
-  }, [live, reload]);
+  const { value, error } = usePolledList(useCallback(() => sweeps.list(scenario), [scenario]));
   if (error)
     return (
       <Alert color="red" title={t`The sweeps cannot be shown`}>

@@ -1,10 +1,8 @@
-import { useCallback, useEffect, useState } from "react";
+import { useCallback, useState } from "react";
 
 import { type StudyInfo, type StudyResults, studies } from "../api/studies";
 import { useLoaded } from "../ui/useLoaded";
-
-/** How often a running study is asked after, milliseconds. */
-export const POLL = 1000;
+import { usePolled } from "./usePolled";
 
 const NONE = Promise.resolve(null);
 
@@ -16,14 +14,9 @@ export function useStudy(study: string): {
   choose: (figure: string) => void;
   reload: () => void;
 } {
-  const { value: info, error, reload } = useLoaded(useCallback(() => studies.info(study), [study]));
+  const load = useCallback(() => studies.info(study), [study]);
+  const { value: info, error, reload } = usePolled(load, ({ state }) => state === "running");
   const [figure, choose] = useState<string | null>(null);
-  const running = info?.state === "running";
-  useEffect(() => {
-    if (!running) return;
-    const timer = setInterval(reload, POLL);
-    return () => clearInterval(timer);
-  }, [running, reload]);
   const done = info?.completed ?? 0;
   const results = useLoaded(
     useCallback(() => (done > 0 ? studies.results(study, figure) : NONE), [study, figure, done]),

@@ -1,16 +1,13 @@
 import { Alert, Anchor, Loader, Table, Text, Title } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { useEffect } from "react";
 
 import { studies } from "../api/studies";
 import { hashOf } from "../ui/address";
-import { useLoaded } from "../ui/useLoaded";
 import { outcomeWord } from "./groups";
 import { StudyForm } from "./StudyForm";
-import { POLL } from "./useStudy";
-import "../sweeps/sweeps.css";
-import "./studies.css";
+import { usePolledList } from "./usePolled";
+import "./experiments.css";
 
 /** All studies, and a form for another one. */
 export function StudiesView() {
@@ -34,13 +31,7 @@ export function StudiesView() {
 }
 
 function Earlier() {
-  const { value, error, reload } = useLoaded(studies.list);
-  const live = value?.some(({ state }) => state === "running") ?? false;
-  useEffect(() => {
-    if (!live) return;
-    const timer = setInterval(reload, 2 * POLL);
-    return () => clearInterval(timer);
-  }, [live, reload]);
+  const { value, error } = usePolledList(studies.list);
   if (error)
     return (
       <Alert color="red" title={t`The studies cannot be shown`}>

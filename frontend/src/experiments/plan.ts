@@ -126,7 +126,8 @@ function partsOf({ varied, table }: SweepForm): { table: Table; others: [string,
   return { table: found, others };
 }
 
-const LIMIT = /^\s*[A-Za-z_]\w*\s*(>=|<=|>|<)\s*[+-]?\d+(\.\d+)?([eE][+-]?\d+)?\s*$/;
+const LIMIT =
+  /^\s*[A-Za-z_]\w*\s*(>=|<=|==|>|<)\s*[+-]?\d+(\.\d+)?([eE][+-]?\d+)?\s*(%|[A-Za-z][A-Za-z/]*)?\s*$/;
 
 /** What is wrong with a form, or null. */
 export function faultOf(form: SweepForm): string | null {

@@ -12,7 +12,7 @@ import {
   type SweepForm,
   verdictOf,
   wishOf,
-} from "../../src/sweeps/plan";
+} from "../../src/experiments/plan";
 
 const parameter = (value: number, min: number | null = null, max: number | null = null) => ({
   value,

@@ -1,31 +1,17 @@
 import { i18n } from "@lingui/core";
-import {
-  Alert,
-  Anchor,
-  Button,
-  Group,
-  Loader,
-  Modal,
-  Progress,
-  Select,
-  Table,
-  Text,
-  Title,
-} from "@mantine/core";
+import { Alert, Anchor, Button, Loader, Select, Table, Text, Title } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Plural, Trans } from "@lingui/react/macro";
-import { useState } from "react";
-
 import { served } from "../language/served";
 import { type FigureGroup, type StudyInfo, type StudyResults, studies } from "../api/studies";
-import { lasting } from "../sweeps/plan";
+import { lasting } from "./plan";
 import { go, hashOf } from "../ui/address";
 import { tellError } from "../ui/notices";
+import { ExperimentHead } from "./ExperimentHead";
 import { FigurePlot } from "./FigurePlot";
 import { matters, meanWord, outcomeWord, variantWord } from "./groups";
 import { useStudy } from "./useStudy";
-import "../sweeps/sweeps.css";
-import "./studies.css";
+import "./experiments.css";
 
 /** One study: how far it is, why runs failed, and its figures. */
 export function StudyView({ study }: { study: string }) {
@@ -50,85 +36,56 @@ export function StudyView({ study }: { study: string }) {
 
 /** Outcome or progress, and what can be done. */
 function Head({ info, onChanged }: { info: StudyInfo; onChanged: () => void }) {
-  const [asking, setAsking] = useState(false);
   const { study, state, runs, ended, seconds_left: left, error } = info;
-  const ask = (call: Promise<unknown>): void => {
-    call.then(onChanged, tellError);
-  };
-  const remove = (): void => {
-    studies.remove(study).then(() => go({ view: "studies" }), tellError);
-  };
   return (
-    <>
-      <Text role="status">
-        {plural(info.scenarios.length, { one: "# scenario", other: "# scenarios" })} ×{" "}
-        {plural(info.variants.length, { one: "# variant", other: "# variants" })} ×{" "}
-        {plural(info.seeds, { one: "# seed", other: "# seeds" })}: {outcomeWord(info)}
-        {state === "running" && left !== null && t`, about ${lasting(left)} left`}
-        {state === "stopped" && t`. It was stopped; what is missing can be run at any time`}
-        {info.elsewhere && t`. Another process works on it`}.
-      </Text>
-      {state === "running" && (
-        <Progress
-          my="xs"
-          size="lg"
-          animated
-          value={(100 * ended) / runs}
-          aria-label={t`Runs that have ended`}
-        />
-      )}
-      {state === "failed" && (
-        <Alert color="red" title={t`The study has failed`} my="xs">
-          {error}
-        </Alert>
-      )}
-      <Group my="sm">
-        {state === "running" && !info.elsewhere && (
-          <Button variant="default" onClick={() => ask(studies.stop(study))}>
-            <Trans>Stop</Trans>
-          </Button>
-        )}
-        {(state === "stopped" || state === "failed") && (
-          <Button onClick={() => ask(studies.resume(study, 2))}>
-            <Trans>Resume</Trans>
-          </Button>
-        )}
-        {ended > 0 && (
-          <Anchor href={studies.fileUrl(study, "study.html")} target="_blank" rel="noreferrer">
-            <Trans>Whole page, to keep</Trans>
-          </Anchor>
-        )}
-        {state === "done" && (
-          <Anchor href={studies.fileUrl(study, "results.parquet")}>
-            <Trans>Table as Parquet</Trans>
-          </Anchor>
-        )}
-        {state !== "running" && (
-          <Button variant="subtle" color="gray" onClick={() => setAsking(true)}>
-            <Trans>Delete the study</Trans>
-          </Button>
-        )}
-        <Anchor href={hashOf({ view: "studies" })}>
-          <Trans>All studies</Trans>
-        </Anchor>
-      </Group>
-      <Modal opened={asking} onClose={() => setAsking(false)} title={t`Delete ${study}?`}>
-        <Text size="sm" mb="md">
-          <Trans>
-            The figures of its <Plural value={ended} one="# run" other="# runs" /> are deleted for good. The
-            scenarios stay.
-          </Trans>
-        </Text>
-        <Group justify="flex-end">
-          <Button variant="default" onClick={() => setAsking(false)}>
-            <Trans>Keep it</Trans>
-          </Button>
-          <Button color="red" onClick={remove}>
-            <Trans>Delete</Trans>
-          </Button>
-        </Group>
-      </Modal>
-    </>
+    <ExperimentHead
+      name={study}
+      state={state}
+      share={(100 * ended) / runs}
+      error={error}
+      elsewhere={info.elsewhere}
+      words={{
+        progress: t`Runs that have ended`,
+        failed: t`The study has failed`,
+        remove: t`Delete the study`,
+        all: t`All studies`,
+      }}
+      actions={{
+        stop: () => studies.stop(study),
+        resume: () => studies.resume(study, 2),
+        remove: () => studies.remove(study),
+      }}
+      links={
+        <>
+          {ended > 0 && (
+            <Anchor href={studies.fileUrl(study, "study.html")} target="_blank" rel="noreferrer">
+              <Trans>Whole page, to keep</Trans>
+            </Anchor>
+          )}
+          {state === "done" && (
+            <Anchor href={studies.fileUrl(study, "results.parquet")}>
+              <Trans>Table as Parquet</Trans>
+            </Anchor>
+          )}
+        </>
+      }
+      all={hashOf({ view: "studies" })}
+      lost={
+        <Trans>
+          The figures of its <Plural value={ended} one="# run" other="# runs" /> are deleted for good. The
+          scenarios stay.
+        </Trans>
+      }
+      onChanged={onChanged}
+      onRemoved={() => go({ view: "studies" })}
+    >
+      {plural(info.scenarios.length, { one: "# scenario", other: "# scenarios" })} ×{" "}
+      {plural(info.variants.length, { one: "# variant", other: "# variants" })} ×{" "}
+      {plural(info.seeds, { one: "# seed", other: "# seeds" })}: {outcomeWord(info)}
+      {state === "running" && left !== null && t`, about ${lasting(left)} left`}
+      {state === "stopped" && t`. It was stopped; what is missing can be run at any time`}
+      {info.elsewhere && t`. Another process works on it`}.
+    </ExperimentHead>
   );
 }
 

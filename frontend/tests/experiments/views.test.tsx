@@ -11,11 +11,11 @@ import {
 } from "../../src/api/sweeps";
 import type { ScenarioDocument } from "../../src/api/types";
 import { prefer } from "../../src/language/preferences";
-import { CaseTable } from "../../src/sweeps/CaseTable";
-import { costOf, PlanForm } from "../../src/sweeps/PlanForm";
-import { Parallel } from "../../src/sweeps/Parallel";
-import { Plane } from "../../src/sweeps/Plane";
-import { SweepView } from "../../src/sweeps/SweepView";
+import { CaseTable } from "../../src/experiments/CaseTable";
+import { costOf, PlanForm } from "../../src/experiments/PlanForm";
+import { Parallel } from "../../src/experiments/Parallel";
+import { Plane } from "../../src/experiments/Plane";
+import { SweepView } from "../../src/experiments/SweepView";
 import { actor, scenario } from "../example";
 import { rowsOf, server, show } from "../page";
 

@@ -4,7 +4,7 @@ import { useId } from "react";
 
 import { served } from "../language/served";
 import type { FigureGroup, StudyResults } from "../api/studies";
-import { scaleOf } from "../sweeps/plan";
+import { scaleOf } from "./plan";
 import { variantWord } from "./groups";
 
 const W = 760;

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 
 import type { FigureGroup, StudyInfo } from "../../src/api/studies";
-import { matters, meanWord, outcomeWord, rounded } from "../../src/studies/groups";
+import { matters, meanWord, outcomeWord, rounded } from "../../src/experiments/groups";
 
 const GROUP: FigureGroup = {
   scenario: "a",

@@ -1,10 +1,8 @@
-import { useCallback, useEffect } from "react";
+import { useCallback } from "react";
 
 import { type SweepCases, type SweepInfo, sweeps } from "../api/sweeps";
 import { useLoaded } from "../ui/useLoaded";
-
-/** How often a running sweep is asked after, milliseconds. */
-export const POLL = 1000;
+import { usePolled } from "./usePolled";
 
 const NONE = Promise.resolve(null);
 
@@ -15,14 +13,9 @@ export function useSweep(sweep: string): {
   error: string | null;
   reload: () => void;
 } {
-  const { value: info, error, reload } = useLoaded(useCallback(() => sweeps.info(sweep), [sweep]));
-  const running = info?.state === "running";
-  useEffect(() => {
-    if (!running) return;
-    const timer = setInterval(reload, POLL);
-    return () => clearInterval(timer);
-  }, [running, reload]);
-  const known = info !== null && !running;
+  const load = useCallback(() => sweeps.info(sweep), [sweep]);
+  const { value: info, error, reload } = usePolled(load, ({ state }) => state === "running");
+  const known = info !== null && info.state !== "running";
   const table = useLoaded(useCallback(() => (known ? sweeps.cases(sweep) : NONE), [sweep, known]));
   return { info, cases: known ? table.value : null, error: error ?? table.error, reload };
 }
