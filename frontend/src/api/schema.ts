@@ -70,6 +70,13 @@ export interface paths {
          */
         get: operations["report_api_maps__name__report_get"];
     };
+    "/api/map-importers": {
+        /**
+         * List Map Importers
+         * @description Formats that maps can have: OpenDRIVE, and those of installed packages that can be used.
+         */
+        get: operations["list_map_importers_api_map_importers_get"];
+    };
     "/api/maps/shipped": {
         /**
          * Add Shipped Maps
@@ -1012,10 +1019,14 @@ export interface components {
             height: number;
         };
         Body_add_map_api_maps_post: {
-            /** @description An OpenDRIVE map. */
+            /** @description A map of any format of `/map-importers`. */
             file: string;
             name?: string | null;
             converter?: ("odscen" | "netconvert") | null;
+            /** @description If several recognise the file. */
+            importer?: string | null;
+            /** @description Of the importer, a JSON object. */
+            options?: string | null;
         };
         Body_import_files_api_imports__of__post: {
             /** @description A scenario, and if need be its map (.xodr) and catalogs. */
@@ -1301,11 +1312,17 @@ export interface components {
             kind: "constant";
             value: number;
         };
-        /** @description What became of one element, and why. */
+        /**
+         * @description What became of one element, and why.
+         *
+         *     An importer of another format says how sure it is, 0 to 1, and the element's id in its file.
+         */
         ConversionEntry: {
             fate: components["schemas"]["ElementOutcome"];
             element: string;
             reason: string;
+            confidence: number | null;
+            source_id: string | null;
         };
         /** @description What became of all elements on the way to SUMO; figures of ``docs/sumo-network.md``. */
         ConversionInfo: {
@@ -1787,7 +1804,7 @@ export interface components {
          */
         EditRequest: {
             version: number;
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetParkingEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["SetParameterEdit"] | components["schemas"]["RemoveParameterEdit"] | components["schemas"]["SetFormulaEdit"] | components["schemas"]["SetGroupEdit"] | components["schemas"]["RemoveGroupEdit"] | components["schemas"]["AddStageEdit"] | components["schemas"]["RemoveStageEdit"] | components["schemas"]["SetIntergreenEdit"] | components["schemas"]["SetDetectorEdit"] | components["schemas"]["RemoveDetectorEdit"] | components["schemas"]["SetPlanEdit"] | components["schemas"]["RemovePlanEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ExtendRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetCriteriaEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetGreenEdit"] | components["schemas"]["SetOffsetEdit"] | components["schemas"]["SetStageEdit"] | components["schemas"]["SetTurnEdit"] | components["schemas"]["SetStudyEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetParkingEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetGroupEdit"] | components["schemas"]["RemoveGroupEdit"] | components["schemas"]["AddStageEdit"] | components["schemas"]["RemoveStageEdit"] | components["schemas"]["SetIntergreenEdit"] | components["schemas"]["SetDetectorEdit"] | components["schemas"]["RemoveDetectorEdit"] | components["schemas"]["SetPlanEdit"] | components["schemas"]["RemovePlanEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ExtendRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["SetParameterEdit"] | components["schemas"]["RemoveParameterEdit"] | components["schemas"]["SetFormulaEdit"] | components["schemas"]["SetStudyEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetCriteriaEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetGreenEdit"] | components["schemas"]["SetOffsetEdit"] | components["schemas"]["SetStageEdit"] | components["schemas"]["SetTurnEdit"])[];
             label?: string | null;
         };
         /**
@@ -1807,6 +1824,17 @@ export interface components {
         };
         /**
          * @description What happened to an element.
+         *
+         *     Attributes
+         *     ----------
+         *     KEPT
+         *         It is there as it was.
+         *     REPAIRED
+         *         It was wrong, and is read as it must have been meant.
+         *     GUESSED
+         *         Something that the file does not say was completed.
+         *     LOST
+         *         It is not there any more.
          * @enum {string}
          */
         ElementOutcome: "kept" | "repaired" | "guessed" | "lost";
@@ -2163,6 +2191,13 @@ export interface components {
             x: number | null;
             y: number | null;
         };
+        /** @description A format that maps can have, with what can be chosen when one is added. */
+        ImporterInfo: {
+            name: string;
+            label: string;
+            suffixes: string[];
+            options: components["schemas"]["OptionInfo"][];
+        };
         /**
          * @description Vehicles gridlocked, teleported or not inserted at a place.
          *
@@ -2441,6 +2476,7 @@ export interface components {
             name: string;
             sha256: string;
             source: string;
+            importer: string;
             opendrive: components["schemas"]["MapHeader"];
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
@@ -2465,12 +2501,15 @@ export interface components {
         /**
          * @description A map of the catalogue; ``report_counts`` says how many elements had which outcome.
          *
+         *     ``importer`` has read its file ``source``: ``opendrive``, or that of another format.
+         *
          *     An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
          */
         MapInfo: {
             name: string;
             sha256: string;
             source: string;
+            importer: string;
             opendrive: components["schemas"]["MapHeader"];
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
@@ -5390,6 +5429,17 @@ export interface operations {
             200: {
                 content: {
                     "application/json": components["schemas"]["ConversionInfo"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    list_map_importers_api_map_importers_get: {
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["ImporterInfo"][];
                 };
             };
             default: components["responses"]["Error"];
