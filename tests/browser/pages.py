@@ -52,9 +52,18 @@ class Graph:
         return self._at(self.columns, int(rows[len(rows) // 2]))
 
     def starts(
-        self, roi: Iterable[str], number: int, *, walking: bool = False, apart: float = 14.0
+        self,
+        roi: Iterable[str],
+        number: int,
+        *,
+        walking: bool = False,
+        apart: float = 14.0,
+        beside: Iterable[tuple[float, float]] = (),
     ) -> list[tuple[float, float]]:
-        """Places where somebody may start, each ``apart`` metres from the others, far ends last."""
+        """Places where somebody may start, each ``apart`` metres from the others, far ends last.
+
+        Also from those ``beside`` them, whose markers would be hit instead.
+        """
         columns = self.columns["walks"] if walking else self.columns
         usable = np.asarray(columns["walkable" if walking else "spawnable"]) == 1
         if not walking:
@@ -65,9 +74,10 @@ class Graph:
         points = np.column_stack((columns["x"], columns["y"]))
         order = np.argsort(np.linalg.norm(points - middle, axis=1))
         chosen: list[tuple[float, float]] = []
+        beside = tuple(beside)
         for row in order[usable[order]]:
             point = self._at(columns, int(row))
-            if all(np.hypot(point[0] - x, point[1] - y) >= apart for x, y in chosen):
+            if all(np.hypot(point[0] - x, point[1] - y) >= apart for x, y in (*chosen, *beside)):
                 chosen.append(point)
         assert len(chosen) >= number, "too few places to start"
         return chosen[:number]

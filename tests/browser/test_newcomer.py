@@ -63,7 +63,7 @@ def test_a_newcomer_runs_a_scenario_within_twenty_clicks_and_types_nothing(
                 user.ego.click()
     user.kind("Pedestrian").click()
     with user.changing():
-        user.map.click(user.graph.starts(roi, 1, walking=True)[0])
+        user.map.click(user.graph.starts(roi, 1, walking=True, beside=starts)[0])
     expect(user.names).to_have_count(5)
 
     user.step("Run").click()

@@ -51,7 +51,9 @@ def refuse_additions(run: Path) -> None:
     DamagedError
         With each file of its SUMO folder that has no checksum.
     """
-    sums = read_sums(run) or {}
+    sums = read_sums(run)
+    if sums is None:  # the whole list is gone, which :func:`damaged_in` says
+        return
     added = [name for name in _sumo_files(run) if name not in sums]
     if added:
         wrong = [DamagedFile(name, "no such file", file_digest(run / name)) for name in added]
