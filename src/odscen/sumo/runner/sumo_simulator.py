@@ -42,6 +42,8 @@ class SumoSimulator(Simulator[SumoPreparedRun]):
             With every actor and flow whose spawn or goal is not usable.
         SimulationError
             If a run that routes are found by fails.
+        TypeError
+            If the map has no SUMO network.
         """
         if not isinstance(on, RunMap):
             raise TypeError("SUMO runs on maps of the catalogue, which have its network")
