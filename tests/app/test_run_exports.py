@@ -356,10 +356,10 @@ def _thinned(run: Run, every: int) -> RecordedRun:
 def test_half_a_second_between_records_is_bridged_and_said(
     workspace: Workspace, run: Run, sampled: Path
 ) -> None:
-    from odscen.app.exchange.exports import _source
+    from odscen.app.exchange.exports import _make_source
     from odscen.app.scenarios import read_scenario
 
-    source = _source(workspace, read_scenario(sampled), "run", {})
+    source = _make_source(workspace, read_scenario(sampled), "run", {})
     fine, coarse = _thinned(run, 1), _thinned(run, 5)
     times = instants(coarse, ExportWindow())
     exact, bridged = (tracks_of(source, one, times) for one in (fine, coarse))
@@ -376,10 +376,10 @@ def test_half_a_second_between_records_is_bridged_and_said(
 def test_a_gap_in_what_was_recorded_is_not_bridged(
     workspace: Workspace, run: Run, sampled: Path
 ) -> None:
-    from odscen.app.exchange.exports import _source
+    from odscen.app.exchange.exports import _make_source
     from odscen.app.scenarios import read_scenario
 
-    source = _source(workspace, read_scenario(sampled), "run", {})
+    source = _make_source(workspace, read_scenario(sampled), "run", {})
     recorded = _thinned(run, 5)
     name = recorded.rows["id"][0]
     gone = (pl.col("id") == name) & pl.col("time").is_between(1.9, 3.1)

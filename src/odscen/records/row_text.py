@@ -6,8 +6,6 @@ import json
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-
 from odscen.base.stored_files import stored_document
 
 if TYPE_CHECKING:
@@ -43,6 +41,8 @@ def numbers(names: pl.Series) -> tuple[IntArray, list[str]]:
 
 def numbers_among(names: pl.Series, known: pl.Series) -> IntArray:
     """Row of each name in ``known``, which has all of them, each once; no nulls."""
+    import numpy as np  # lazily: a process that forks simulations has none
+
     number, named = numbers(names)
     row = {name: k for k, name in enumerate(known)}
     kind = np.min_scalar_type(len(row))  # numpy sorts small numbers sooner
@@ -59,6 +59,8 @@ def among(column: str, names: pl.Series, kind: pl.DataType) -> pl.Expr:
 
 def by_vehicle_and_time(vehicle: IntArray, time: pl.Series) -> IntArray:
     """Places of rows in the order of vehicles and times (s)."""
+    import numpy as np
+
     if time.is_sorted():  # as SUMO writes them
         return np.argsort(vehicle, kind="stable")
     return np.lexsort((time.to_numpy(), vehicle))
@@ -66,6 +68,8 @@ def by_vehicle_and_time(vehicle: IntArray, time: pl.Series) -> IntArray:
 
 def changes(values: IntArray | FloatArray) -> BoolArray:
     """Whether a value is another than the one before it, ``(N,)``; the first one is."""
+    import numpy as np
+
     found = np.ones(len(values), dtype=np.bool_)
     found[1:] = values[1:] != values[:-1]
     return found

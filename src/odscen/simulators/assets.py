@@ -169,7 +169,7 @@ class Assets:
 
 
 class ShippedCatalogue(AssetSource):
-    """What ships with odscen: the models and weather presets of CARLA 0.9.16."""
+    """What ships with odscen: the models and weather presets of CARLA."""
 
     def models(self) -> list[Blueprint]:
         """Read the models."""
