@@ -9,8 +9,9 @@ import {
 import { t } from "@lingui/core/macro";
 import { useLingui } from "@lingui/react";
 import { Trans } from "@lingui/react/macro";
-import { lazy, Suspense } from "react";
+import { lazy, Suspense, useEffect } from "react";
 
+import { noteViewShown } from "./language/load";
 import { PreferencesButton } from "./language/PreferencesButton";
 import { usePreferences } from "./language/preferences";
 import { IconMoon, IconSun } from "./ui/icons";
@@ -30,6 +31,12 @@ const SweepView = lazy(async () => ({ default: (await import("./experiments/Swee
 const StudiesView = lazy(async () => ({ default: (await import("./experiments/StudiesView")).StudiesView }));
 const StudyView = lazy(async () => ({ default: (await import("./experiments/StudyView")).StudyView }));
 const RunsView = lazy(async () => ({ default: (await import("./run/RunsView")).RunsView }));
+
+/** Beside a view, it is there when the view is. */
+function ViewShown() {
+  useEffect(noteViewShown, []);
+  return null;
+}
 
 /** One window: catalogue, editor and run. */
 export function App() {
@@ -151,6 +158,7 @@ export function App() {
           key={`${i18n.locale} ${speed} ${length} ${hours}`}
           fallback={<Loader m="xl" aria-label={t`Loading the page`} />}
         >
+          <ViewShown />
           {address.view === "catalogue" && <CatalogueView />}
           {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}
           {address.view === "imported" && <ImportView key={address.scenario} scenario={address.scenario} />}

@@ -10,8 +10,14 @@ const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
   de: () => import("../locales/de.po"),
 };
 
-/** Milliseconds after which sentences of the server are loaded, so that the page comes first. */
-const AFTER_PAGE = 800;
+/** Milliseconds after the first view is shown until sentences of the server are loaded. */
+const AFTER_VIEW = 800;
+
+let viewIsShown: () => void;
+const firstView = new Promise<void>((resolve) => (viewIsShown = resolve));
+
+/** A view is on the screen: what it does not need may be loaded. */
+export const noteViewShown = (): void => viewIsShown();
 
 /** Catalogues of these sentences; as the server sends them, they are English. */
 const SENTENCES: Record<Language, (() => Promise<{ messages: Messages }>) | null> = {
@@ -36,8 +42,11 @@ async function speak(language: Language): Promise<void> {
   serveSentences(null);
   i18n.loadAndActivate({ locale: language, messages });
   document.documentElement.lang = language;
-  // Where it cannot be had, sentences stay as the server says them.
-  setTimeout(() => void speakForServer(language).catch(() => undefined), AFTER_PAGE);
+  // Not counted from here: on a slow machine the view would wait for these sentences.
+  void firstView.then(() => {
+    // Where it cannot be had, sentences stay as the server says them.
+    setTimeout(() => void speakForServer(language).catch(() => undefined), AFTER_VIEW);
+  });
 }
 
 /** Has what the server says in a language, too. */
