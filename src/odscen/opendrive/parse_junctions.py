@@ -94,8 +94,8 @@ def _connection(
         contact = spelt_choice(element, "contactPoint", _CONTACT_POINTS, notes)
     else:
         contact = linked
-        detail = f"contactPoint is missing; it is the {contact} of road {shown_id(connecting)}"
-        notes.add(Rule.MISSING_CONTACT, element, f"{detail}, which is linked there")
+        detail = f"contactPoint is missing; the {contact} of road {shown_id(connecting)} is linked"
+        notes.add(Rule.MISSING_CONTACT, element, detail)
     return Connection(
         id=element.get("id", ""),
         incoming_road=incoming,

@@ -77,8 +77,9 @@ def _with_contacts(road: Road, roads: Roads, notes: Notes) -> Road:
             continue
         contact = _end_that_links_back(roads.get(RoadId(link.element_id)), road, end)
         changes[name] = None if contact is None else link._replace(contact_point=contact)
-        detail = "contactPoint is missing; "
-        detail += "the link is left out" if contact is None else f"the {contact} links back here"
+        detail = "contactPoint is missing; the link is left out"
+        if contact is not None:
+            detail = f"contactPoint is missing; the {contact} of that road links back here"
         notes.add(Rule.MISSING_CONTACT, f"road {shown_id(road.id)} > {name}", detail)
     return replace(road, **changes) if changes else road  # type: ignore[arg-type]
 
