@@ -9,6 +9,7 @@ import pytest
 
 from odscen.base.checksums import sums_of, write_sums
 from tests.cli.conftest import SHIPPED, odscen
+from tests.opendrive.snippets import document, road
 
 STATISTICS = {
     "bounds",
@@ -185,6 +186,43 @@ def test_verify_refuses_a_network_that_is_none(workspace, tmp_path):
     done = odscen("maps", "verify", "t_junction_signs", "--json", "--workspace", tmp_path)
     assert done.code == 2
     assert done.json["error"]["file"] == "net.net.xml"
+
+
+def test_add_warns_of_a_network_that_does_not_follow_its_map_and_sampling_says_what_is_wrong(
+    tmp_path,
+):
+    file = tmp_path / "inside.xodr"
+    file.write_text(document(road("1", junction="9"), '<junction id="9" name=""/>'))
+    done = odscen("maps", "add", file, "--workspace", tmp_path, "--json")
+    assert done.code == 0
+    warning, added = done.err.splitlines()
+    assert warning == (
+        "inside: warning: its SUMO network does not follow the map within the limits (drivable "
+        "lanes covered, share 0, limit 0.998); odscen maps verify inside says where"
+    )
+    assert added.startswith("inside: 100 nodes")
+    missed = [{"name": "drivable lanes covered, share", "value": 0.0, "limit": 0.998}]
+    expected = {"passed": False, "not_held": missed}
+    assert done.json["maps"][0]["fidelity"] == expected
+    listed = odscen("maps", "list", "--workspace", tmp_path, "--json")
+    assert listed.json["maps"][0]["fidelity"] == expected
+    assert odscen("maps", "verify", "inside", "--workspace", tmp_path).code == 1
+    sampled = odscen("generate", "--map", "inside", "--workspace", tmp_path)
+    assert sampled.code == 2
+    assert sampled.err.startswith("error: no actor fits on map 'inside'")
+
+
+def test_a_map_that_follows_says_so_without_a_word(workspace):
+    listed = odscen("maps", "list", "--workspace", workspace, "--json").json
+    assert all(one["fidelity"] == {"passed": True, "not_held": []} for one in listed["maps"])
+
+
+def test_a_road_whose_nodes_would_be_those_of_walks_is_refused(tmp_path):
+    file = tmp_path / "ped.xodr"
+    file.write_text(document(road("ped.1")))
+    done = odscen("maps", "add", file, "--workspace", tmp_path)
+    assert done.code == 2
+    assert "ped.xodr: road ped.1: nodes of walks begin with 'ped.'" in done.err
 
 
 def test_help_needs_none_of_the_heavy_packages():

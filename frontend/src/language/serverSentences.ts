@@ -742,6 +742,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "node {node} has no room for it" }),
   msg({ message: "node {node} is outside the region" }),
   msg({ message: "node {node} is taken" }),
+  msg({ message: "nodes of walks begin with {walk_prefix}, so no id of a road may; rename it" }),
   msg({ message: "none of its {given} road users can be placed; the first: {why}" }),
   msg({ message: "none of the lanes beside it leads to the place" }),
   msg({ message: "none of the {areas} parking areas of the map is in the region of interest; add their segments or drop parking from the demand" }),

@@ -119,6 +119,8 @@ def add(
             log(f"{printable(str(file))}: refused: {error}")
         else:
             rows.append({**_row(entry), "source": str(file)})
+            if missed := entry.info.get("fidelity", {}).get("not_held"):  # not of older maps
+                log(_unfaithful(entry.name, missed))
             log(_added(entry))
     if as_json:
         print_json({"maps": rows})
@@ -366,7 +368,17 @@ def _figure(value: float) -> str:
 def _row(entry: MapEntry) -> dict[str, Any]:
     keys = ("name", "sha256", "opendrive", "statistics", "graph", "build_seconds")
     network = entry.info.get("network", {"converter": entry.converter})  # maps of 0.1 have none
-    return {**{key: entry.info[key] for key in keys}, "network": network}
+    fidelity = entry.info.get("fidelity")  # nor this
+    row = {**{key: entry.info[key] for key in keys}, "network": network}
+    return row if fidelity is None else {**row, "fidelity": fidelity}
+
+
+def _unfaithful(name: str, missed: list[dict[str, Any]]) -> str:
+    limits = "; ".join(f"{one['name']} {one['value']:g}, limit {one['limit']:g}" for one in missed)
+    return (
+        f"{name}: warning: its SUMO network does not follow the map within the limits ({limits}); "
+        f"odscen maps verify {name} says where"
+    )
 
 
 def _added(entry: MapEntry) -> str:

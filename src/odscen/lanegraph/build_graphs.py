@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, OpenDriveError
+from odscen.base.shown import shown_id
 from odscen.lanegraph.centrelines import MOST_LANES
 from odscen.lanegraph.graphs import LaneGraph, Lanes, MapGraph
 from odscen.lanegraph.lane_density import check_density
 from odscen.lanegraph.lane_edges import connect
 from odscen.lanegraph.lane_nodes import NodeTable, place_nodes
 from odscen.lanegraph.pedestrian_graph import build_pedestrians
+from odscen.lanegraph.query import WALK_PREFIX, is_walk_node_id
 from odscen.lanegraph.segments import SegmentMap, build_segments
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import crosswalks
@@ -58,10 +60,17 @@ def build_map_graph(
     InputError
         If ``spacing`` is out of range.
     OpenDriveError
-        If the lanes together are longer, need too many nodes, or lie on each other.
+        If the lanes together are longer, need too many nodes, or lie on each other, or a road has
+        an id with which its nodes would be those of walks.
     """
     if not MIN_SPACING <= spacing <= MAX_SPACING:
         raise InputError(f"spacing {spacing} m is not within {MIN_SPACING} to {MAX_SPACING} m")
+    for road in odr.roads:
+        if is_walk_node_id(road):
+            raise OpenDriveError(
+                f"nodes of walks begin with {WALK_PREFIX!r}, so no id of a road may; rename it",
+                element=f"road {shown_id(road)}",
+            )
     table = RoadTable.of(odr) if table is None else table
     successors = lane_successors(odr)
     nodes = place_nodes(table, spacing, most=most_lanes)

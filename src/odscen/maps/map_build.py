@@ -11,6 +11,7 @@ import numpy as np
 
 from odscen.convert.lane_table.table_json import table_to_json
 from odscen.convert.model.conversion_report import ConversionReport
+from odscen.convert.verify.fidelity import verify
 from odscen.drawing.map_shapes import map_drawing
 from odscen.drawing.map_sheet import render_drawing
 from odscen.lanegraph.build_graphs import build_map_graph
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from odscen.convert.lane_table.table import SumoLight
     from odscen.convert.model.conversion_settings import ConversionSettings
+    from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.maps.converters import GivenNetwork
     from odscen.maps.importers.base import ImportRecord
 
@@ -136,12 +138,23 @@ def build_map(
         "files": FILES if imported is None else {**FILES, "original": imported.original},
         "semantics": map_semantics(odr, table),
         "report": report.to_dict(),
+        "fidelity": _fidelity(verify(network.net_xml, odr, table)),
         **({} if imported is None else {"import": imported.to_dict()}),
         "build_seconds": round(time.perf_counter() - start, 3),
     }
     text = json.dumps(info, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / FILES["info"]).write_text(text + "\n", encoding="utf-8")
     progress("done", 1.0)
+
+
+def _fidelity(fidelity: Fidelity) -> dict[str, Any]:
+    """Whether the SUMO network follows the map, and the limits that are not held."""
+    missed = [
+        {"name": one.name, "value": float(one.value), "limit": float(one.limit)}
+        for one in fidelity.verdicts
+        if not one.ok
+    ]
+    return {"passed": not missed, "not_held": missed}
 
 
 def _light(light: SumoLight) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from odscen.scenario.placing.region import Usable
 from odscen.sumo.realize.road_net import PEDESTRIAN
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from odscen.base.arrays import BoolArray
     from odscen.lanegraph.graphs import LaneGraph
     from odscen.sumo.realize.road_net import RoadNetLane
@@ -42,16 +44,11 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     admitted = _admitted(sumo_map, sumo_map.lane_places, "passenger")
     exact = admitted & _near(sumo_map.lane_places) & ~_at_dead_end(sumo_map, sumo_map.lane_places)
     reach = int(np.ceil(REACH / lanes.spacing))
-    walked = np.array(
-        [
-            not lane.internal and sumo_map.net.walked_lane(lane.edge) is lane
-            for lane in _lanes(sumo_map, sumo_map.walk_places)
-        ],
-        dtype=np.bool_,
+    walked = _of_lanes(
+        not lane.internal and sumo_map.net.walked_lane(lane.edge) is lane
+        for lane in _lanes(sumo_map, sumo_map.walk_places)
     )
-    inside = np.array(
-        [lane.internal for lane in _lanes(sumo_map, sumo_map.lane_places)], dtype=np.bool_
-    )
+    inside = _of_lanes(lane.internal for lane in _lanes(sumo_map, sumo_map.lane_places))
     on_foot = _admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
     on_foot &= walked[sumo_map.walk_places.lane] & _near(sumo_map.walk_places)
     return Usable(
@@ -66,17 +63,22 @@ def _lanes(sumo_map: SumoMap, places: NodePositions) -> list[RoadNetLane]:
     return [sumo_map.net.lanes[name] for name in places.lanes]
 
 
+def _of_lanes(values: Iterable[bool]) -> BoolArray:
+    """One value for each lane; the last one, at -1, is of nodes that are on no lane."""
+    return np.array([*values, False], dtype=np.bool_)
+
+
 def _admitted(sumo_map: SumoMap, places: NodePositions, vclass: str) -> BoolArray:
     """Nodes on a SUMO lane that a vehicle class may use, shape ``(N,)``."""
-    allowed = np.array([lane.allows(vclass) for lane in _lanes(sumo_map, places)], dtype=np.bool_)
+    allowed = _of_lanes(lane.allows(vclass) for lane in _lanes(sumo_map, places))
     return (places.lane >= 0) & allowed[places.lane]
 
 
 def _at_dead_end(sumo_map: SumoMap, places: NodePositions) -> BoolArray:
     """Nodes close to the end of a SUMO lane without links: a front could not reach over it."""
     lanes = _lanes(sumo_map, places)
-    dead = np.array([not sumo_map.net.links_from.get(lane.id) for lane in lanes], dtype=np.bool_)
-    length = np.array([lane.length for lane in lanes])
+    dead = _of_lanes(not sumo_map.net.links_from.get(lane.id) for lane in lanes)
+    length = np.array([*(lane.length for lane in lanes), np.inf])
     return dead[places.lane] & (places.pos > length[places.lane] - REACH)
 
 
