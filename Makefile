@@ -11,7 +11,7 @@ DOCS := .venv/docs-ready
 MODULES := frontend/node_modules/.package-lock.json
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test test-interchange test-interchange-part fuzz regression test-page chromium allocator page api check docs hooks format bench golden maps large-town check-maps check-wheel screenshots clean
+.PHONY: demo test test-interchange test-interchange-part fuzz regression test-page chromium allocator page api check docs hooks format bench golden maps large-town check-maps check-wheel test-lowest test-newest screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
@@ -84,6 +84,14 @@ bench: $(READY) $(PAGE) chromium allocator
 # Faults of every kind, an hour of them; see docs/faults.md.
 fuzz: $(READY) $(PAGE)
 	$(BIN)/python -m bench fuzz $(FUZZ)
+
+# With the lowest versions that pyproject.toml admits: the demo and a part of the tests.
+test-lowest: $(READY) $(PAGE)
+	$(BIN)/python -m tools.try_versions lowest
+
+# The same with the newest ones, on Pythons that are on this machine.
+test-newest: $(READY) $(PAGE)
+	$(BIN)/python -m tools.try_versions newest 3.12 3.13
 
 # The wheel from a clone of what is committed, on a machine without Node.
 check-wheel: $(READY)

@@ -200,3 +200,15 @@ def test_an_entity_bomb_as_scenario_is_refused(client: TestClient) -> None:
         answer = client.post("/api/scenarios/upload", files={"file": ("s.graphml", content)})
         assert answer.status_code == 422, answer.text
         assert answer.json()["error"]["kind"] == "ScenarioError"
+
+
+def test_the_list_of_the_interface_runs_no_script_and_loads_nothing(client: TestClient) -> None:
+    page = client.get("/api/docs")
+    assert page.status_code == 200
+    assert page.headers["content-security-policy"].startswith("default-src 'none'; style-src")
+    assert "<script" not in page.text
+    assert "//" not in page.text
+    assert "<code>POST /api/scenarios</code>" in page.text
+    schema = client.get("/api/openapi.json").json()
+    operations = sum(len(methods) for methods in schema["paths"].values())
+    assert page.text.count("<h2>") == operations > 100

@@ -20,6 +20,7 @@ from odscen.base.version import __version__
 from odscen.carla.server.client import Address
 from odscen.maps.child_process import keep_ready
 from odscen.scenario.document.scenario_document import Scenario
+from odscen.web.entry_pages import interface_page
 from odscen.web.error_answers import ERROR_RESPONSES, add_error_handlers, error_response
 from odscen.web.exchange import exchange_routes
 from odscen.web.large.large_documents import LARGE
@@ -114,7 +115,7 @@ def create_app(
     app = _Api(
         title="odscen",
         version=__version__,
-        docs_url="/api/docs",
+        docs_url=None,  # FastAPI's own loads scripts from elsewhere
         redoc_url=None,
         openapi_url="/api/openapi.json",
         lifespan=lifespan,
@@ -147,6 +148,10 @@ def create_app(
     app.include_router(demand_routes.days)
     app.include_router(exchange_routes.router)
     app.include_router(exchange_routes.exports)
+
+    @app.get("/api/docs", include_in_schema=False)
+    def describe_interface() -> Response:
+        return interface_page(app.openapi())
 
     @app.get("/api", include_in_schema=False)
     @app.get("/api/{path:path}", include_in_schema=False)

@@ -1,11 +1,13 @@
-"""The two pages of the token: the one that asks for it, and the one behind the printed link.
+"""Pages that need nothing but their text and run no script.
 
-They need nothing from the server, and run no script.
+Two of the token, the one that asks for it and the one behind the printed link, and the list of what
+programs can ask the server for.
 """
 
 from __future__ import annotations
 
 from html import escape
+from typing import Any
 
 from starlette.responses import HTMLResponse
 
@@ -67,6 +69,47 @@ def enter(address: str) -> HTMLResponse:
     body = f'<p>Opening <a href="{shown}">odscen</a> ...</p>'
     head = f'<meta http-equiv="refresh" content="0;url={shown}">'
     return HTMLResponse(_page("odscen", body, head), headers=_HEADERS)
+
+
+def interface_page(schema: dict[str, Any]) -> HTMLResponse:
+    """List what an OpenAPI schema has, by path: what it does, takes and gives."""
+    listed = "".join(
+        f"<h2><code>{method.upper()} {escape(path)}</code></h2>{_describe_operation(operation)}"
+        for path, methods in sorted(schema["paths"].items())
+        for method, operation in methods.items()
+    )
+    body = f"""<h1>Interface of odscen {escape(schema["info"]["version"])}</h1>
+<p>The whole schema, with the fields of all messages, for programs that read OpenAPI:
+<a href="/api/openapi.json">/api/openapi.json</a>.</p>{listed}"""
+    return HTMLResponse(_page("odscen: interface", body), headers=_HEADERS)
+
+
+def _describe_operation(operation: dict[str, Any]) -> str:
+    text = operation.get("description") or operation.get("summary", "")
+    takes = [
+        f"{parameter['name']} ({parameter['in']}{', needed' if parameter.get('required') else ''})"
+        for parameter in operation.get("parameters", ())
+    ]
+    body = operation.get("requestBody", {}).get("content", {})
+    takes += [_name_message(kind, content) for kind, content in body.items()]
+    gives = [
+        " ".join((code, *(_name_message(*each) for each in answer.get("content", {}).items())))
+        for code, answer in operation["responses"].items()
+        if code != "default"
+    ]
+    lines = [f"<p>{escape(text.partition(chr(10) * 2)[0])}</p>"]
+    lines += [
+        f"<p>{name}: {escape('; '.join(values))}</p>"
+        for name, values in (("Takes", takes), ("Gives", gives))
+        if values
+    ]
+    return "".join(lines)
+
+
+def _name_message(kind: str, content: dict[str, Any]) -> str:
+    """Name of a message's model, else its media type."""
+    reference: str = content.get("schema", {}).get("$ref", "")
+    return reference.rpartition("/")[2] or kind
 
 
 def _page(title: str, body: str, head: str = "") -> str:
