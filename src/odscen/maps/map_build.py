@@ -134,7 +134,7 @@ def build_map(
             "sha256": hashlib.sha256(network.net_xml).hexdigest(),
         },
         "sumo": {"net_file": FILES["net"], **network.table.counts},
-        "lights": [_light(light) for light in network.table.lights],
+        "lights": [_describe_light(light) for light in network.table.lights],
         "files": FILES if imported is None else {**FILES, "original": imported.original},
         "semantics": map_semantics(odr, table),
         "report": report.to_dict(),
@@ -150,14 +150,14 @@ def build_map(
 def _fidelity(fidelity: Fidelity) -> dict[str, Any]:
     """Whether the SUMO network follows the map, and the limits that are not held."""
     missed = [
-        {"name": one.name, "value": float(one.value), "limit": float(one.limit)}
-        for one in fidelity.verdicts
-        if not one.ok
+        {"name": verdict.name, "value": float(verdict.value), "limit": float(verdict.limit)}
+        for verdict in fidelity.verdicts
+        if not verdict.ok
     ]
     return {"passed": not missed, "not_held": missed}
 
 
-def _light(light: SumoLight) -> dict[str, Any]:
+def _describe_light(light: SumoLight) -> dict[str, Any]:
     """A traffic light, as scenarios name and time it."""
     return {
         "id": light.id,

@@ -55,7 +55,7 @@ ends in <code>/?token=</code> and a long text. Each start has a token of its own
 <button>Open odscen</button></div>
 </form>
 <p>Came here by a link of another page? <a href="/">Load this page again.</a></p>"""
-    return HTMLResponse(_page("odscen: token needed", body), status_code=401, headers=_HEADERS)
+    return HTMLResponse(_html_page("odscen: token needed", body), status_code=401, headers=_HEADERS)
 
 
 def enter(address: str) -> HTMLResponse:
@@ -68,7 +68,7 @@ def enter(address: str) -> HTMLResponse:
     shown = escape(address, quote=True)
     body = f'<p>Opening <a href="{shown}">odscen</a> ...</p>'
     head = f'<meta http-equiv="refresh" content="0;url={shown}">'
-    return HTMLResponse(_page("odscen", body, head), headers=_HEADERS)
+    return HTMLResponse(_html_page("odscen", body, head), headers=_HEADERS)
 
 
 def interface_page(schema: dict[str, Any]) -> HTMLResponse:
@@ -81,7 +81,7 @@ def interface_page(schema: dict[str, Any]) -> HTMLResponse:
     body = f"""<h1>Interface of odscen {escape(schema["info"]["version"])}</h1>
 <p>The whole schema, with the fields of all messages, for programs that read OpenAPI:
 <a href="/api/openapi.json">/api/openapi.json</a>.</p>{listed}"""
-    return HTMLResponse(_page("odscen: interface", body), headers=_HEADERS)
+    return HTMLResponse(_html_page("odscen: interface", body), headers=_HEADERS)
 
 
 def _describe_operation(operation: dict[str, Any]) -> str:
@@ -112,7 +112,7 @@ def _name_message(kind: str, content: dict[str, Any]) -> str:
     return reference.rpartition("/")[2] or kind
 
 
-def _page(title: str, body: str, head: str = "") -> str:
+def _html_page(title: str, body: str, head: str = "") -> str:
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>{title}</title>{head}<style>{_STYLE}</style></head>
