@@ -161,8 +161,8 @@ def _giving_way(net: NetConnections) -> dict[str, list[str]]:
     return found
 
 
-def _metres(text: str | None) -> float | None:
-    """A place along a lane, if it is a number and not one of SUMO's words."""
+def _number(text: str | None) -> float | None:
+    """A place or a time, if it is a number and not one of SUMO's words."""
     try:
         return None if text is None else float(text)
     except ValueError:
@@ -186,6 +186,7 @@ def _drivers(routes: Path) -> pl.DataFrame:
             factor = float(found.get("speedFactor", "1"))
             serves = found.find("stop") is not None
             top = min(speed, desired * factor)
+            route = found.find("route")
             rows.append(
                 (
                     found.get("id"),
@@ -194,7 +195,9 @@ def _drivers(routes: Path) -> pl.DataFrame:
                     length,
                     heavy,
                     serves,
-                    _metres(found.get("arrivalPos")),
+                    _number(found.get("arrivalPos")),
+                    _number(found.get("depart")),
+                    None if route is None else route.get("edges"),
                 )
             )
     schema = {
@@ -205,5 +208,7 @@ def _drivers(routes: Path) -> pl.DataFrame:
         "heavy": pl.Boolean,
         "serves": pl.Boolean,
         "arrival_pos": pl.Float64,
+        "depart": pl.Float64,
+        "edges": pl.String,
     }
     return pl.DataFrame(rows, schema=schema, orient="row")
