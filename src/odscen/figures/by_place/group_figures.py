@@ -98,7 +98,7 @@ def group_sums(
     if states is not None:
         greens = shown_greens(programs, states, clock, facts)
         capacity = pl.concat(
-            [_capacity(passed, groups, facts, greens), capacity], how="diagonal_relaxed"
+            [_capacity_of_groups(passed, groups, facts, greens), capacity], how="diagonal_relaxed"
         )
     parts.append(capacity)
     if waits is not None:
@@ -121,7 +121,7 @@ def group_sums(
     )
 
 
-def _capacity(
+def _capacity_of_groups(
     passed: pl.DataFrame, groups: LaneGroups, facts: NetFacts, greens: pl.DataFrame
 ) -> pl.DataFrame:
     lit = groups.ways.join(greens, on="via", how="semi")
