@@ -72,6 +72,13 @@ BehaviourCommandOption = Annotated[
     str | None,
     typer.Option("--behaviour-cmd", help="A program that drives, over a pipe.", metavar="COMMAND"),
 ]
+OverwriteOption = Annotated[
+    bool,
+    typer.Option(
+        "--overwrite",
+        help="Replace runs that have ended in the folder of --out; those of the workspace are.",
+    ),
+]
 BehaviourTimeoutOption = Annotated[
     float,
     typer.Option(

@@ -160,6 +160,7 @@ def run_until_confident(
     most: int = 50,
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
+    overwrite: bool = False,
     processes: int = 1,
     reports: bool = True,
     reporter: Reporter = SILENT,
@@ -176,6 +177,8 @@ def run_until_confident(
         That are run in any case; then come those that follow the largest.
     most
         Seeds in all, at most.
+    overwrite
+        Whether runs that have ended are replaced in ``out``; in the workspace's ``runs`` they are.
     reports
         Whether each run gets its report.
     reporter
@@ -197,8 +200,8 @@ def run_until_confident(
     batch = list(seeds)[:most]
     while True:
         done += run_many(
-            workspace, [scenario], settings=settings, seeds=batch, out=out, processes=processes,
-            reports=reports, figures=reports, reporter=reporter,
+            workspace, [scenario], settings=settings, seeds=batch, out=out, overwrite=overwrite,
+            processes=processes, reports=reports, figures=reports, reporter=reporter,
         )  # fmt: skip
         found = confidence_of(
             [_value(run, figure) for run in done],

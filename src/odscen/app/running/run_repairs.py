@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from odscen.app.map_repairs import NO_SUMS, RepairStep, listed, set_aside
 from odscen.app.maps import load_map
 from odscen.app.running.reports import write_report
-from odscen.base.checksums import SUMS_FILE, file_digest, read_sums, write_sums
+from odscen.base.checksums import MISSING, SUMS_FILE, file_digest, read_sums, write_sums
 from odscen.base.errors import DamagedFile, InputError, OdscenError
 from odscen.base.folder_locks import is_locked
 from odscen.figures.by_place.analysis_times import AnalysisTimes
@@ -109,6 +109,8 @@ def _rebuild(workspace: Workspace, run: Path, one: DamagedFile) -> str:
         return _figures_again(run)
     if one.file == layout.REPORT_FILE:
         return _report_again(workspace, run)
+    if one.expected == MISSING:  # somebody has put it there
+        return _without(run, one.file)
     if one.file == layout.LOG_FILE or (one.file == layout.SUMMARY_FILE and unfinished(run)):
         return _without(run, one.file)
     raise InputError(f"nothing else says what was in {one.file}")
