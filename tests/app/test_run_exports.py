@@ -428,8 +428,6 @@ def test_records_that_a_run_has_not_written_itself_are_refused(run: Run, tmp_pat
     folder = tmp_path / "run"
     shutil.copytree(run.folder, folder)
     (folder / "trajectories").mkdir()
-    shutil.copyfile(
-        folder / "trajectories.parquet", folder / "trajectories" / "part-0001.parquet"
-    )
+    shutil.copyfile(folder / "trajectories.parquet", folder / "trajectories" / "part-0001.parquet")
     with pytest.raises(DamagedError, match=r"part-0001\.parquet: expected no such file"):
         Run.open(folder)

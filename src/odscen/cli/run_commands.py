@@ -277,8 +277,8 @@ def _run_until_confident(
     for path in paths:
         runs, found = run_until_confident(
             store, path, share=wanted, figure=figure, most=most, settings=settings, out=out,
-            overwrite=overwrite, seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds, processes=processes,
-            reports=reports, reporter=_BarReporter(),
+            overwrite=overwrite, processes=processes, reports=reports, reporter=_BarReporter(),
+            seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds,
         )  # fmt: skip
         results += runs
         intervals.append(found)

@@ -13,7 +13,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from odscen.base.errors import InputError, WorkspaceError, in_file
+from odscen.base.errors import InputError, in_file
+from odscen.base.system_errors import disk_errors
 from odscen.formats import find_format, list_formats
 from odscen.formats.base import NOTES_SUFFIX
 
@@ -284,7 +285,7 @@ def _make_source(
 
 def _write_files(files: ExportFiles, out: Path) -> list[Path]:
     written = []
-    try:
+    with disk_errors(str(out)):
         for name, content in sorted(files.items()):
             path = out / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -295,6 +296,4 @@ def _write_files(files: ExportFiles, out: Path) -> list[Path]:
             else:
                 shutil.copyfile(content, path)
             written.append(path)
-    except OSError as error:
-        raise WorkspaceError(f"{out}: {error.strerror or error}") from error
     return written
