@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
 
 from odscen.base.categories import Category
-from odscen.base.xml_text import quoteattr
 from odscen.records.run_plan import begin_area
 from odscen.sumo.realize.driving import number
 from odscen.sumo.realize.road_user import appears_at

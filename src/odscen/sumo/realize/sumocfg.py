@@ -6,8 +6,8 @@ Paths are relative to the file. What each setting is for is said in ``docs/runs.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from xml.sax.saxutils import quoteattr
 
-from odscen.base.xml_text import quoteattr
 from odscen.figures.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
 from odscen.runs.layout import (
     CLOSURES_FILE,
