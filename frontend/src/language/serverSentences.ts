@@ -619,6 +619,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "lanes {width} m wide" }),
   msg({ message: "latent delay" }),
   msg({ message: "leads to ({x}, {y}); the limit is {max_coordinate} m" }),
+  msg({ message: "leads to lane {lane} of road {road}, which alone states the link" }),
   msg({ message: "leads to no lane" }),
   msg({ message: "leaves lane {before} by {edge}, not {left_out}" }),
   msg({ message: "left out, for only rules are obeyed there" }),

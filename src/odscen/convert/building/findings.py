@@ -17,7 +17,7 @@ from odscen.convert.model.net import CROSSING
 from odscen.opendrive.objects import is_crosswalk, signal_kind
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES, lane_use
 from odscen.opendrive.sign_catalogue import country_of, sign_meaning
-from odscen.opendrive.topology import dead_ends
+from odscen.opendrive.topology import dead_ends, one_sided_links
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -116,6 +116,7 @@ def findings(
         ),
         *nowhere,
         *one_way_ends(odr, table, found),
+        *_find_one_sided_links(odr),
         *_find_crosswalk_entries(odr, crosswalks),
         *_find_signal_entries(odr, table, net, control),
     ]
@@ -173,6 +174,14 @@ def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> It
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(key.road)}", reason)
+
+
+def _find_one_sided_links(odr: OpenDrive) -> Iterator[ReportEntry]:
+    """Say which connections of lanes only the lane behind states."""
+    for here, there in one_sided_links(odr):
+        road = shown_id(there.road)
+        reason = f"leads to lane {there.lane} of road {road}, which alone states the link"
+        yield ReportEntry(ElementOutcome.REPAIRED, _describe_place(*here), reason)
 
 
 def _why_uncovered(odr: OpenDrive, table: RoadTable, row: int) -> str:
@@ -316,10 +325,10 @@ def _count_idle_signs(odr: OpenDrive) -> Iterator[ReportEntry]:
             country = country_of(signal)
             code = " ".join(part for part in (country, signal.type, signal.subtype) if part)
             counts[code.removesuffix(" -1") or "none", meaning] += 1
-    for (code, meaning), count in sorted(counts.items()):
+    for (code, what), count in sorted(counts.items()):
         element = f"signals of type {code}"
-        if meaning:
-            yield ReportEntry(ElementOutcome.GUESSED, element, f"{count} {_IDLE_SIGNS[meaning]}")
+        if what:
+            yield ReportEntry(ElementOutcome.GUESSED, element, f"{count} {_IDLE_SIGNS[what]}")
         else:
             reason = f"{count} signs that are not understood have no effect"
             yield ReportEntry(ElementOutcome.LOST, element, reason)
