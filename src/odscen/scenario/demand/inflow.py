@@ -62,7 +62,12 @@ def entries(region: Region) -> tuple[Entry, ...]:
 
     A lane leads into the region where its node has no predecessor inside, and the lanes beside it
     have none there either: one that begins where the road widens is no entry. Junctions have none.
+    They are found once for all that ask for those of a region.
     """
+    return region.remembered("entries", lambda: _find_entries(region))
+
+
+def _find_entries(region: Region) -> tuple[Entry, ...]:
     graph = region.graph
     lanes, ids = graph.lanes, graph.segments.ids
     found: dict[tuple[int, bool], list[EntryLane]] = defaultdict(list)
