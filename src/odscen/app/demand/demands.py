@@ -359,38 +359,41 @@ _FIELDS = {
 
 
 @contextmanager
-def _by_line(scenario: Scenario, kind: str, lines: Mapping[str, Sequence[int]]) -> Iterator[None]:
+def _by_line(scenario: Scenario, kind: str, rows: Mapping[str, Sequence[int]]) -> Iterator[None]:
     """Say of problems of the parts that are being read in which line and column they stand.
 
-    ``lines`` are those of the rows of each part; an input has one.
+    ``rows`` are the lines of the rows of each part; an input has one.
     """
     parts = getattr(scenario.demand, _FIELDS[kind])
     places = {part.id: index for index, part in reversed([*enumerate(parts)])}
     new = count(len(parts))
-    line_of = {places[name] if name in places else next(new): rows for name, rows in lines.items()}
+    line_of = {places[name] if name in places else next(new): lines for name, lines in rows.items()}
     row = r"(?:\.\w+\[(?P<row>\d+)\](?:\[(?P<cell>\d+)\])?)?"
     place = re.compile(rf"demand\.{_FIELDS[kind]}\[(?P<part>\d+)\]{row}[^:]*: ")
 
     def with_line(problem: str) -> str:
         match = place.match(problem)
-        if match is None or (own := line_of.get(int(match["part"]))) is None:
+        if match is None or (lines := line_of.get(int(match["part"]))) is None:
             return problem
-        words = problem[match.end() :]
+        return told(match, lines) + problem[match.end() :]
+
+    def told(match: re.Match[str], lines: Sequence[int]) -> str:
         if kind == "inputs":
-            return f"line {own[0]}: {words}"
-        if match["row"] is None or not own:
-            return words
+            return f"line {lines[0]}: "
+        if match["row"] is None or not lines:
+            return ""
         column = COLUMNS[kind][int(match["cell"] or 0)]
         exact = match["cell"] is not None or len(COLUMNS[kind]) == 1
-        return f"line {own[int(match['row'])]}{f', column {column!r}' if exact else ''}: {words}"
+        return f"line {lines[int(match['row'])]}{f', column {column!r}' if exact else ''}: "
 
     try:
         yield
     except ScenarioError as error:
         problems = [f"{error.element}: {error.problem}"] if error.element else error.problems
-        told = [with_line(problem) for problem in problems]
-        if told == list(problems):
+        found = [with_line(problem) for problem in problems]
+        if found == list(problems):
             raise
-        if len(told) == 1:
-            raise ScenarioError(told[0], problems=error.problems) from error
-        raise ScenarioError(f"{len(told)} problems", problems=told) from error
+        if len(found) == 1:
+            others = error.problems if error.element else ()
+            raise ScenarioError(found[0], problems=others) from error
+        raise ScenarioError(f"{len(found)} problems", problems=found) from error

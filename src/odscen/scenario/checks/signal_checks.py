@@ -6,7 +6,7 @@ from collections import Counter
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from odscen.base.shown import some_of
+from odscen.base.shown import shown, some_of
 from odscen.scenario.document.problems import error, warning
 from odscen.scenario.signals.light import find_movements, known_names, lights_by_name
 from odscen.scenario.signals.program_design import (
@@ -319,7 +319,7 @@ def signal_problems(
         where = f"signals.junctions[{index}]"
         light = light_of.get(timing.junction)
         if light is None:
-            message = f"there is no traffic light in junction {timing.junction!r}; {_known(lights)}"
+            message = no_light_in(timing.junction, lights)
             yield error("unknown_light", f"{where}.junction", message)
             continue
         if light.names in timed:
@@ -394,6 +394,11 @@ def _coordination_problems(signals: Signals) -> Iterator[Problem]:
                     f"{timing.coordination!r} has {seconds:g} s; give both one"
                 )
                 yield error("cycles_of_coordination", f"{where}.cycle", message)
+
+
+def no_light_in(junction: str, lights: Sequence[Light]) -> str:
+    """Say that a junction has no light, and some that have one."""
+    return f"there is no traffic light in junction {shown(junction)}; {_known(lights)}"
 
 
 def _known(lights: Sequence[Light]) -> str:
