@@ -133,10 +133,10 @@ class Trial:
         own = {"workspace", "cache", "alone", "killed", self.plan.name}
         left_files = [
             str(path.relative_to(self.folder))
-            for path in (*self.folder.iterdir(), *self.folder.glob("odscen-studies-*/*"))
+            for path in (*self.folder.iterdir(), *self.folder.glob("odscen-*/.*"))
             if path.name not in own
             and path.suffix != ".err"
-            and not path.name.startswith("odscen-studies-")
+            and not path.name.startswith("odscen-")
         ]
         print(
             f"{self.runs} runs, {what}: {len(rows)} runs have a row ({dict(statuses)}), "

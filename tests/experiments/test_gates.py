@@ -7,9 +7,10 @@ from lxml import etree
 
 from odscen.base.errors import InputError
 from odscen.experiments.gates import Update, run_suite
+from odscen.experiments.plan import StudyPlan, found_sources
 from odscen.experiments.suite import read_suite
 from odscen.experiments.suite_page import suite_page
-from odscen.experiments.suite_runs import read_parts, results_json
+from odscen.experiments.suite_runs import load_cases, read_parts, results_json
 from odscen.experiments.suite_words import (
     NOWHERE,
     headline,
@@ -18,7 +19,8 @@ from odscen.experiments.suite_words import (
     suite_summary,
     to_dict,
 )
-from tests.experiments.conftest import copy_suite, edit_json, write_tiny
+from odscen.maps.store import Workspace
+from tests.experiments.conftest import ROOT, copy_suite, edit_json, write_tiny
 
 
 def run(store, file, **options):
@@ -429,6 +431,28 @@ def test_a_large_suite_with_everything_in_it_is_reported_whole(store, tiny, coun
     assert all(f">{name}<" in page for name in names)
     assert f"4 of {count} scenarios do not pass" in page
     assert f"2 error, 1 missing, 1 new, {count - 4} passed" in suite_summary(result)
+
+
+def test_a_changed_map_of_a_suite_is_none_to_choose_or_sample_from(tmp_path):
+    own = Workspace.open(tmp_path / "own")
+    own.add_map(ROOT / "maps" / "t_junction_signs.xodr")
+    suite = read_suite(write_tiny(tmp_path / "suite", "one"))
+    changed = tmp_path / "suite" / "maps" / "t_junction_signs.xodr"
+    changed.write_text(changed.read_text().replace('<speed max="50"', '<speed max="20"'))
+    (case_,) = load_cases(own, suite, with_baseline=False)
+    entry = case_.run.entry
+    assert entry.name == f"t_junction_signs-{entry.sha256[:8]}-odscen"
+    assert own.map_names() == ["t_junction_signs"]
+    assert [one.name for one in own.maps()] == ["t_junction_signs"]
+    plan = StudyPlan.model_validate({"name": "n", "sample": [{"maps": ["*"], "count": 2}]})
+    assert set(found_sources(plan, own, beside=tmp_path)) == {
+        "t_junction_signs-0000",
+        "t_junction_signs-0001",
+    }
+    # It is found again by what it is, by the next test and by a run of this one.
+    (again,) = load_cases(own, suite, with_baseline=False)
+    assert again.run.entry.folder == entry.folder
+    assert own.map_for("t_junction_signs", entry.sha256).folder == entry.folder
 
 
 @pytest.mark.slow

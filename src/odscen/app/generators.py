@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import shlex
 import subprocess
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, NotFoundError, OdscenError
 from odscen.learning.fill import (
     CheckedFill,
@@ -34,6 +33,7 @@ from odscen.scenario.document.distributions import stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from pathlib import Path
 
     import numpy as np
 
@@ -217,8 +217,8 @@ class _Command:
 
     def fill(self, graph: MapGraph, request: FillRequest, rng: np.random.Generator) -> Fill:
         del graph, rng  # the request has both: the map, and the seed
-        with tempfile.TemporaryDirectory(prefix="odscen-fill-") as folder:
-            given, made = Path(folder) / "request", Path(folder) / "fill"
+        with scratch_folder() as folder:
+            given, made = folder / "request", folder / "fill"
             given.with_suffix(".npz").write_bytes(request_bytes(request))
             self._run([word.format_map(_names(given, made)) for word in self.words])
             out = made.with_suffix(".npz")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,6 +10,7 @@ import numpy as np
 from odscen.app.maps import load_map
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, ToolError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.lanegraph.query import largest_part, node_id
@@ -180,8 +179,8 @@ def compare_converters(
     """
     entry = workspace.map(name)
     tell = progress or (lambda _what, _share: None)
-    with tempfile.TemporaryDirectory(prefix="odscen-compare-") as folder:
-        place = Workspace.open(Path(folder))
+    with scratch_folder() as folder:
+        place = Workspace.open(folder)
         networks = tuple(_networks(place, entry, tell))
         entries = {one.converter: one.entry for one in networks if one.entry is not None}
         figures = entries["odscen"].info["report"]["figures"]

@@ -1,4 +1,4 @@
-"""Folders that appear whole or not at all, and what is left of those that did not.
+"""Folders that appear whole or not at all, those for a while, and what is left of both.
 
 While a process fills or deletes a folder it holds a lock on it, the system's own: what is left of a
 process that was killed is recognised by a lock that nobody holds, see :func:`clear_leftovers`.
@@ -9,8 +9,10 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
+import stat
 import tempfile
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,6 +63,50 @@ def passing_folder(parent: Path) -> Iterator[Path]:
     """
     with _temporary(parent, _BUILDING) as folder:
         yield folder
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Yield an empty folder in the temporary directory that is removed afterwards.
+
+    It lies in a folder that only its user can enter; what killed processes of that user have left
+    there is removed by the next one, once.
+    """
+    with ExitStack() as stack:
+        while True:
+            with suppress(FileNotFoundError):  # another process has just removed it
+                parent = _private_folder()
+                stack.callback(_remove_if_empty, parent)
+                folder = stack.enter_context(passing_folder(parent))
+                break
+        yield folder
+
+
+def _private_folder() -> Path:
+    """Folder of this user in the temporary directory, which is everybody's.
+
+    Whoever is there first can take the name, with a link to where files are to be deleted or with
+    a folder to write runs into: another name, which nobody can foresee, is taken then.
+    """
+    name = f"odscen-{os.getuid()}"
+    folder = Path(tempfile.gettempdir(), name)
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    found = folder.lstat()
+    if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077:
+        _clear_once(folder)
+        return folder
+    return Path(tempfile.mkdtemp(prefix=f"{name}-"))
+
+
+@cache
+def _clear_once(folder: Path) -> None:
+    clear_leftovers(folder)
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def discard(folder: Path) -> None:

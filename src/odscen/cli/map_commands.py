@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from collections import Counter
 from dataclasses import asdict
 from enum import StrEnum
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, OdscenError
 from odscen.base.shown import printable
 from odscen.cli.console import (
@@ -419,8 +419,8 @@ def pull(
                 if server.map_name != name:
                     server.load_map(name)
                 text = server.opendrive()
-                with tempfile.TemporaryDirectory() as folder, progress(name) as step:
-                    file = Path(folder) / f"{name}.xodr"
+                with scratch_folder() as folder, progress(name) as step:
+                    file = folder / f"{name}.xodr"
                     file.write_text(text, encoding="utf-8")
                     entry = store.add_map(file, name=name, progress=step)
                 nodes = entry.info["graph"]["nodes"]

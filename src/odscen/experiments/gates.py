@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import gzip
 import shutil
-import tempfile
 import zlib
 from dataclasses import replace
-from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, NamedTuple
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, OdscenError
 from odscen.base.text_files import write_file
 from odscen.changes.map_differences import map_differences
@@ -46,6 +45,7 @@ from odscen.sumo.realize.driving import normal_headway
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from pathlib import Path
 
     from odscen.app.running.runs import CheckedRun
     from odscen.changes.map_change import MapChange
@@ -319,11 +319,11 @@ def run_suite(
     else:
         if update.wanted:
             _refuse_given_seeds(suite)
-        with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
+        with scratch_folder() as temporary:
             runner = SeedRunner(suite, LocalExecutor(workspace, processes), progress)
-            place = RunPlace(out or Path(temporary), keep=out is not None)
+            place = RunPlace(out or temporary, keep=out is not None)
             if update.wanted:
-                aside = RunPlace(Path(temporary) / "changed", keep=False)
+                aside = RunPlace(temporary / "changed", keep=False)
                 choose_seeds(loaded, runner, place, aside)
             runner.run(loaded, place)
     judged = [_case_result(case, update) for case in cases]

@@ -200,9 +200,9 @@ class _SuiteMaps:
                 )
 
     def _found(self, scenario: Scenario) -> MapEntry:
-        """The map of the suite, built in the workspace if need be; else the workspace's own.
+        """The map of the suite, built beside those of the workspace if need be; else one of these.
 
-        A map of that name and another content or converter in the workspace is left alone.
+        So the workspace has no map more to choose or draw from, and none in place of another.
         """
         workspace, converter = self._workspace, self._suite.converter
         name = scenario.map.name
@@ -221,9 +221,10 @@ class _SuiteMaps:
         there = workspace.first_map(lambda one: (one.sha256, one.conversion) == (sha256, wished))
         if there is not None:
             return there
-        free = name not in workspace.map_names()
+        kept = workspace.of_suites()
+        free = name not in {*workspace.map_names(), *kept.map_names()}
         new = name if free else f"{name[:40]}-{sha256[:8]}-{wished.converter}"
-        return workspace.add_map(source, name=new, settings=wished)
+        return kept.add_map(source, name=new, settings=wished)
 
 
 def _run_settings(case: Case) -> RunSettings:

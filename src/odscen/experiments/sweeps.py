@@ -12,13 +12,13 @@ import re
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.app.exchange.exports import export
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
 from odscen.app.scenarios import SUFFIX, read_scenario, scenario_name
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.durations import clock
 from odscen.base.errors import ConflictError, InputError, NotFoundError, ScenarioError, in_file
 from odscen.base.folder_locks import locked
@@ -602,9 +602,9 @@ def estimate(
     """
     refuse_unknown(plan.names, scenario)
     CaseRuns(scenario, Path(), settings)  # an unknown figure or limit is refused
-    with TemporaryDirectory(prefix="odscen-sweep-") as folder:
+    with scratch_folder() as folder:
         began = time.monotonic()
-        run = _possible(workspace, scenario, plan, settings, patience, Path(folder))
+        run = _possible(workspace, scenario, plan, settings, patience, folder)
         (ended,) = run_all([run], reports=False, figures=False)
         seconds = time.monotonic() - began
         disk = sum(file.stat().st_size for file in run.folder.rglob("*") if file.is_file())

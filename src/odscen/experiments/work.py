@@ -9,25 +9,23 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import platform
 import tarfile
 import threading
 import time
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from odscen.app.maps import load_map
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
 from odscen.app.variants import edited
-from odscen.base.atomic_folders import clear_leftovers, passing_folder
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import ConflictError, InputError, MissingDependencyError
 from odscen.base.version import __version__
 from odscen.experiments.table import REFUSED, outcome_row, row_of
@@ -177,7 +175,7 @@ def _carried_out(
 ) -> Outcome:
     began = time.monotonic()
     workspace = workspaces[order.sources[run.scenario].map_name]
-    with passing_folder(_work_folder()) as folder:
+    with scratch_folder() as folder:
         try:
             checked = _checked(order, run, values, workspace, folder)
             outcome = _simulated(order, run, checked, workspace, stopped)
@@ -185,15 +183,6 @@ def _carried_out(
             outcome = Outcome(run.name, outcome_row(REFUSED, _words(error)))
     outcome.row["seconds"] = round(time.monotonic() - began, 3)
     return outcome
-
-
-@cache
-def _work_folder() -> Path:
-    """Where runs are carried out; what killed processes have left there is removed."""
-    folder = Path(gettempdir()) / f"odscen-studies-{os.getuid()}"
-    folder.mkdir(parents=True, exist_ok=True)
-    clear_leftovers(folder)
-    return folder
 
 
 def _words(error: InputError) -> str:
@@ -309,9 +298,9 @@ def _exported(
 
     found = {}
     for one in formats:
-        with TemporaryDirectory(prefix="odscen-export-") as name:
-            files = export_run(workspace, result.folder, Path(name), to=one)
-            found[one] = {file.relative_to(name).as_posix(): file.read_bytes() for file in files}
+        with scratch_folder() as folder:
+            files = export_run(workspace, result.folder, folder, to=one)
+            found[one] = {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
     return found
 
 

@@ -10,8 +10,8 @@ import json
 import re
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
+from xml.sax.saxutils import quoteattr
 
-from odscen.base.xml_text import quoteattr
 from odscen.formats.base import WINDOW_OPTIONS, Format
 
 if TYPE_CHECKING:

@@ -19,11 +19,11 @@ from __future__ import annotations
 
 import json
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
 
 import numpy as np
 
 from odscen.base.errors import GraphFormatError
-from odscen.base.xml_text import escape
 from odscen.lanegraph.columns import NODE_COLUMNS, WALK_NODE_COLUMNS, Array
 from odscen.lanegraph.graphs import MapGraph, Relation, Segments, WalkKind
 from odscen.lanegraph.map_graphml_reader import FORMAT, SEGMENT_PREFIX, VERSION, from_graphml

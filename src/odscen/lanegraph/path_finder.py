@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csgraph
 
 from odscen.base.errors import InputError
 from odscen.lanegraph.searches.blocks import Blocks
@@ -14,7 +15,6 @@ from odscen.lanegraph.searches.connected_parts import ConnectedParts
 from odscen.lanegraph.searches.corridor_paths import CorridorPaths
 from odscen.lanegraph.searches.edge_matrix import shortest_edges
 from odscen.lanegraph.searches.farthest_nodes import FarthestNodes
-from odscen.lanegraph.searches.graph_searches import csgraph
 from odscen.lanegraph.searches.kept_trees import KEPT_TREES, ROUTERS, Tree
 from odscen.lanegraph.searches.paths_to_goal import NO_PREDECESSOR, PathsTo
 from odscen.lanegraph.searches.ring_goals import RingGoals

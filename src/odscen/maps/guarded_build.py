@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import in_file
 from odscen.maps.allowances import for_document
 from odscen.maps.child_process import work_in_child
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.maps.allowances import BuildLimits
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from odscen.maps.importers.base import ImportSettings
     from odscen.scenario.document.scenario_document import Scenario
 
-_SCRATCH = "odscen-child-"
 _XODR = "map.xodr"
 
 
@@ -51,8 +50,7 @@ def build_in_child(
     """
     size = len(content) + (len(given.net_xml) if given else 0)
     allowance = limits.for_map(size, spacing=settings.spacing)
-    with tempfile.TemporaryDirectory(prefix=_SCRATCH, ignore_cleanup_errors=True) as made:
-        scratch = Path(made)
+    with scratch_folder() as scratch:
         (folder / _XODR).write_bytes(content)
         network = None
         if given is not None:
@@ -95,15 +93,15 @@ def read_scenario_in_child(content: bytes, *, file: str | None = None) -> Scenar
     """
     from odscen.scenario.document.json_form import loads
 
-    with tempfile.TemporaryDirectory(prefix=_SCRATCH, ignore_cleanup_errors=True) as made:
-        path = Path(made) / "scenario"
+    with scratch_folder() as scratch:
+        path = scratch / "scenario"
         path.write_bytes(content)
         with in_file(file or "the scenario"):
             work_in_child(
                 "scenario",
                 what="reading the scenario",
                 arguments={"path": str(path), "file": file},
-                folders=(Path(made),),
+                folders=(scratch,),
                 allowance=for_document(len(content)),
             )
         return loads(path.read_text(encoding="utf-8"), file=file)

@@ -7,10 +7,10 @@ import os
 import re
 import signal
 import subprocess
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import MissingDependencyError, ToolError
 from odscen.convert.imported.netconvert_recipe import (
     TYPES_FILE,
@@ -117,8 +117,7 @@ def run_netconvert(
         If SUMO is not installed.
     """
     program, environment = _program()
-    with tempfile.TemporaryDirectory(prefix="odscen-netconvert-") as name:
-        folder = Path(name)
+    with scratch_folder() as folder:
         for file, content in files.items():
             (folder / file).write_bytes(content)
         output = folder / "made.net.xml"

@@ -37,13 +37,15 @@ if TYPE_CHECKING:
     from odscen.maps.importers.base import ImportSettings
     from odscen.simulators.assets import Assets
 
-BUILDER = "12"
+BUILDER = "13"
 """Raised whenever what a map folder contains changes; older folders are rebuilt when opened."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"
 
 PATIENCE = 600.0
 """Wall seconds to wait for another process that builds the same map."""
+
+_SUITES = "suite-maps"
 
 ProgressCallback = Callable[[str, float], None]
 """Called with what is being done and the share done, 0 to 1, again and again while nothing changes
@@ -136,6 +138,18 @@ class Workspace:
         """Folder of studies that were started in the page."""
         return self.root / "studies"
 
+    def of_suites(self) -> Workspace:
+        """Where maps are that suites of tests name and this one does not have.
+
+        They are no maps to choose from: a suite is there to be run on changed ones.
+
+        Raises
+        ------
+        WorkspaceError
+            If it cannot be created or written.
+        """
+        return Workspace.open(self.root / _SUITES)
+
     def map_names(self) -> list[str]:
         """Names of all maps, sorted; some may be broken, see :meth:`catalogue`."""
         return sorted(name for name in self._map_folders() if self._is_map(name))
@@ -170,12 +184,16 @@ class Workspace:
         return entries, broken
 
     def first_map(self, fits: Callable[[MapEntry], bool]) -> MapEntry | None:
-        """Open the first map by name that fits, as it is stored, and is not damaged."""
+        """Open the first map by name that fits, as it is stored, and is not damaged.
+
+        Those of suites come after all others, see :meth:`of_suites`.
+        """
         for one in self.maps():
             if fits(one):
                 with suppress(DamagedError):
                     return self.map(one.name)
-        return None
+        suites = Workspace(self.root / _SUITES)
+        return suites.first_map(fits) if (suites.root / "maps").is_dir() else None
 
     def stored(self, name: str) -> MapEntry:
         """One map by name as it is stored: to be listed or compared, as it may be outdated.

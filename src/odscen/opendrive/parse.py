@@ -12,11 +12,13 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from odscen.base.errors import in_file
+from odscen.base.errors import OpenDriveError, in_file
 from odscen.base.shown import shown, shown_id
-from odscen.opendrive.parse_checks import check_numbers
+from odscen.opendrive.parse_checks import check_numbers, find_faults
 from odscen.opendrive.parse_coincident import merge_coincident_roads
 from odscen.opendrive.parse_junctions import parse_controller, parse_junction
+from odscen.opendrive.parse_left_out import RoadFault, leave_out_faulty
+from odscen.opendrive.parse_lengths import fit_lengths
 from odscen.opendrive.parse_references import check_references
 from odscen.opendrive.parse_repairs import repair_junction_tables
 from odscen.opendrive.parse_road import parse_road
@@ -25,10 +27,8 @@ from odscen.opendrive.parse_xml import (
     CONTROLS,
     Element,
     children,
-    integer,
     load,
     may_have_controls,
-    number_or,
     only,
     optional_number,
     refusal,
@@ -69,11 +69,24 @@ def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
         element and the value.
     """
     with in_file(file) if file else nullcontext():
-        root = load(text, max_bytes=MAX_BYTES, max_tags=MAX_TAGS)
         notes = Notes()
+        started = _without_leading_space(text)
+        if len(started) != len(text):
+            detail = f"{len(text) - len(started)} characters before <?xml are skipped"
+            notes.add(Rule.LEADING_SPACE, "map", detail)
+        root = load(started, max_bytes=MAX_BYTES, max_tags=MAX_TAGS)
         if may_have_controls(text):
             _space_controls(root, notes)
         return _parse_root(root, notes)
+
+
+def _without_leading_space(text: str | bytes) -> str | bytes:
+    """The text from its XML declaration on: XML permits nothing before, not even a space."""
+    if isinstance(text, str):
+        start = text.lstrip("\ufeff \t\r\n")
+        return start if start.startswith("<?xml") else text
+    data = text.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
+    return data if data.startswith(b"<?xml") and not text.startswith(b"\xef\xbb\xbf<") else text
 
 
 def _space_controls(root: Element, notes: Notes) -> None:
@@ -95,20 +108,33 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
             rule = Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN
             notes.skip(rule, "OpenDRIVE", tag, len(found))
     header = _header(root, only(groups, "header"), notes)
-    roads: dict[RoadId, Road] = {}
-    for element in groups.get("road", ()):
-        road = parse_road(element, notes)
-        _add(roads, road.id, road, element)
-    if not roads:
+    elements = groups.get("road", [])
+    if not elements:
         raise refusal(root, "there is no <road>")
+    roads: dict[RoadId, Road] = {}
+    faults: list[RoadFault] = []
+    for element in elements:
+        try:
+            road = parse_road(element, notes)
+        except OpenDriveError as error:
+            faults.append(RoadFault(element.get("id", ""), error))
+        else:
+            _add(roads, road.id, road, element)
+    twice = next((fault for fault in faults if fault.road in roads), None)
+    if twice is not None:
+        raise twice.error
     junctions: dict[JunctionId, Junction] = {}
     for element in groups.get("junction", ()):
-        junction = parse_junction(element, notes)
+        junction = parse_junction(element, roads, notes)
         _add(junctions, junction.id, junction, element)
     controllers: dict[str, Controller] = {}
     for element in groups.get("controller", ()):
-        controller = parse_controller(element, notes)
-        _add(controllers, controller.id, controller, element)
+        _add_controller(controllers, element, notes)
+    roads, unfit = fit_lengths(roads, notes)
+    astray = {fault.road for fault in unfit}
+    fit = {road_id: road for road_id, road in roads.items() if road_id not in astray}
+    faults += [*unfit, *find_faults(fit)]
+    roads = leave_out_faulty(roads, faults, elements, junctions, notes)
     check_numbers(roads, notes)
     roads = merge_coincident_roads(roads, junctions.values(), notes)
     roads, junctions, controllers = check_references(roads, junctions, controllers, notes)
@@ -118,8 +144,27 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
 
 def _add(known: dict[K, V], key: K, value: V, element: Element) -> None:
     if key in known:
-        raise refusal(element, f"there is another {element.tag} with the id {shown(str(key))}")
+        tag = str(element.tag)
+        problem = f"there is another {tag} with the id {shown(str(key))}"
+        raise refusal(element, f"{problem}: a link to it could mean either")
     known[key] = value
+
+
+def _add_controller(known: dict[str, Controller], element: Element, notes: Notes) -> None:
+    """Add a controller, or its signals to the one of its id."""
+    try:
+        controller = parse_controller(element, notes)
+    except OpenDriveError as error:
+        detail = f"{error.problem}; the controller is left out"
+        notes.add(Rule.SIGNAL_LEFT_OUT, error.element or element, detail)
+        return
+    same = known.get(controller.id)
+    if same is not None:
+        detail = "another controller has the same id; it controls the signals of both"
+        notes.add(Rule.REPEATED_CONTROLLER, element, detail)
+        controls = tuple(dict.fromkeys((*same.controls, *controller.controls)))
+        controller = replace(same, controls=controls)
+    known[controller.id] = controller
 
 
 def _header(root: Element, element: Element | None, notes: Notes) -> Header:
@@ -127,7 +172,7 @@ def _header(root: Element, element: Element | None, notes: Notes) -> Header:
         detail = "there is no <header>; the file is read by the rules of 1.4 to 1.8"
         notes.add(Rule.MISSING_HEADER, root, detail)
         return NO_HEADER
-    major, minor = integer(element, "revMajor"), integer(element, "revMinor")
+    major, minor = (_revision(element, *part, notes) for part in (("revMajor", 1), ("revMinor", 4)))
     if major != 1 or minor < 0:
         raise refusal(element, f"OpenDRIVE {major}.{minor} is not supported; 1.4 to 1.8 are")
     if not 4 <= minor <= 8:
@@ -141,20 +186,39 @@ def _header(root: Element, element: Element | None, notes: Notes) -> Header:
         rev_major=major,
         rev_minor=minor,
         name=element.get("name", ""),
-        north=optional_number(element, "north"),
-        south=optional_number(element, "south"),
-        east=optional_number(element, "east"),
-        west=optional_number(element, "west"),
+        north=_described(element, "north", notes),
+        south=_described(element, "south", notes),
+        east=_described(element, "east", notes),
+        west=_described(element, "west", notes),
         geo_reference=text,
         crs=_crs(text, element, notes),
-        offset=_offset(offset),
+        offset=_offset(offset, notes),
     )
 
 
-def _offset(element: Element | None) -> tuple[float, float, float, float]:
+def _revision(element: Element, name: str, usual: int, notes: Notes) -> int:
+    """A part of the version; the oldest one stands for what is no number."""
+    text = element.get(name, "").strip()
+    if re.fullmatch(r"[-+]?\d{1,9}", text):
+        return int(text)
+    what = f"{name}={shown(text)} is no number" if text else f"{name} is missing"
+    notes.add(Rule.VERSION, element, f"{what}; the file is read by the rules of 1.4 to 1.8")
+    return usual
+
+
+def _described(element: Element, name: str, notes: Notes) -> float | None:
+    """A number that only describes the file; ``None`` if it is none."""
+    try:
+        return optional_number(element, name)
+    except OpenDriveError as error:
+        notes.add(Rule.PAINT, element, f"{error.problem}; it is not used")
+        return None
+
+
+def _offset(element: Element | None, notes: Notes) -> tuple[float, float, float, float]:
     if element is None:
         return (0.0, 0.0, 0.0, 0.0)
-    x, y, z, hdg = (number_or(element, name, 0.0) for name in ("x", "y", "z", "hdg"))
+    x, y, z, hdg = (_described(element, name, notes) or 0.0 for name in ("x", "y", "z", "hdg"))
     return (x, y, z, hdg)
 
 

@@ -6,7 +6,7 @@ one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,7 @@ from odscen.base.errors import OpenDriveError
 from odscen.base.shown import shown_id
 from odscen.opendrive import parse_rules as rules
 from odscen.opendrive.geometry import PlanView
+from odscen.opendrive.parse_left_out import RoadFault
 from odscen.opendrive.parse_rules import Notes, Rule
 from odscen.opendrive.profiles import CubicTable
 
@@ -38,12 +39,34 @@ def check_numbers(roads: dict[RoadId, Road], notes: Notes) -> None:
         Naming the first element at fault.
     """
     in_order = list(roads.values())
+    _check_roads(in_order, notes)
+    _check_lane_length(in_order)
+
+
+def _check_roads(roads: list[Road], notes: Notes) -> None:
     # Absurd coefficients overflow; the comparisons below then refuse them by name.
     with np.errstate(all="ignore"):
-        _check_plan_view(in_order, notes)
-        _check_road_profiles(in_order, notes)
-        _check_lane_widths(in_order, notes)
-    _check_lane_length(in_order)
+        _check_plan_view(roads, notes)
+        _check_road_profiles(roads, notes)
+        _check_lane_widths(roads, notes)
+
+
+def find_faults(roads: Mapping[RoadId, Road]) -> list[RoadFault]:
+    """Roads that :func:`check_numbers` refuses, and why; nothing is noted."""
+    return _faults_among(list(roads.values()))
+
+
+def _faults_among(roads: list[Road]) -> list[RoadFault]:
+    if not roads:
+        return []
+    try:
+        _check_roads(roads, Notes())
+    except OpenDriveError as error:
+        if len(roads) == 1:
+            return [RoadFault(roads[0].id, error)]
+        middle = len(roads) // 2
+        return _faults_among(roads[:middle]) + _faults_among(roads[middle:])
+    return []
 
 
 def _namer(roads: list[Road], groups: list[int], tag: str) -> NameOf:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from odscen.base.errors import OpenDriveError
 from odscen.base.shown import shown
-from odscen.opendrive.parse_rules import MAX_COORDINATE, MAX_FAULTY_OBJECTS, Notes, Rule
+from odscen.opendrive.parse_rules import MAX_COORDINATE, Notes, Rule
 from odscen.opendrive.parse_values import speed_factor, validities
 from odscen.opendrive.parse_xml import (
     Element,
@@ -38,15 +38,11 @@ def parse_objects(container: Element | None, notes: Notes) -> tuple[RoadObject, 
     if container is None:
         return ()
     objects = []
-    faulty = 0
     for element in container:
         if element.tag == "object":
             try:
                 objects.append(_object(element, notes))
             except OpenDriveError as error:
-                faulty += 1
-                if faulty > MAX_FAULTY_OBJECTS:
-                    raise
                 detail = f"{error.problem}; the object is left out"
                 notes.add(Rule.OBJECT_LEFT_OUT, error.element or element, detail)
         elif element.tag != "userData":
@@ -86,17 +82,20 @@ def _object(element: Element, notes: Notes) -> RoadObject:
         height=optional_number(element, "height"),
         radius=optional_number(element, "radius"),
         valid_length=optional_number(element, "validLength"),
-        outlines=tuple(_outline(outline) for outline in found),
+        outlines=tuple(_outline(outline, notes) for outline in found),
         repeats=tuple(_repeat(repeat) for repeat in groups.get("repeat", ())),
         validities=validities(groups.get("validity", ())),
     )
 
 
-def _outline(element: Element) -> Outline:
+def _outline(element: Element, notes: Notes) -> Outline:
     corners = []
     for child in element:
         if child.tag == "cornerLocal":
-            u, v, z = (number(child, name, limit=MAX_COORDINATE) for name in ("u", "v", "z"))
+            u, v = (number(child, name, limit=MAX_COORDINATE) for name in ("u", "v"))
+            z = number_or(child, "z", 0.0)
+            if not child.get("z", "").strip():
+                notes.add(Rule.UNKNOWN_VALUE, child, "z is missing; the corner is on the ground")
             corners.append(Corner(True, u, v, z, number_or(child, "height", 0.0)))
         elif child.tag == "cornerRoad":
             s, t = (number(child, name, limit=MAX_COORDINATE) for name in ("s", "t"))
@@ -129,11 +128,18 @@ def parse_signals(
     signals = []
     references = []
     for element in container:
-        if element.tag == "signal":
-            signals.append(_signal(element, notes))
-        elif element.tag == "signalReference":
-            references.append(_reference(element))
-        elif element.tag != "userData":
+        try:
+            if element.tag == "signal":
+                signals.append(_signal(element, notes))
+                continue
+            if element.tag == "signalReference":
+                references.append(_reference(element))
+                continue
+        except OpenDriveError as error:
+            detail = f"{error.problem}; the {element.tag} is left out"
+            notes.add(Rule.SIGNAL_LEFT_OUT, error.element or element, detail)
+            continue
+        if element.tag != "userData":
             notes.skip(Rule.UNKNOWN, "signals", str(element.tag))
     return tuple(signals), tuple(references)
 
@@ -152,7 +158,7 @@ def _signal(element: Element, notes: Notes) -> Signal:
             rule = Rule.IGNORED if tag in _SIGNAL_IGNORED else Rule.UNKNOWN
             notes.skip(rule, "signal", tag)
     unit = element.get("unit", "")
-    value = optional_number(element, "value")
+    value = _value(element, notes)
     factor = speed_factor(unit)
     return Signal(
         id=required(element, "id"),
@@ -174,6 +180,15 @@ def _signal(element: Element, notes: Notes) -> Signal:
         validities=validities(groups.get("validity", ())),
         dependencies=_dependencies(groups.get("dependency", ())),
     )
+
+
+def _value(element: Element, notes: Notes) -> float | None:
+    """The value of a signal, if it is a number: what it means does not depend on it."""
+    try:
+        return optional_number(element, "value")
+    except OpenDriveError as error:
+        notes.add(Rule.UNKNOWN_VALUE, element, f"{error.problem}; the signal has no value")
+        return None
 
 
 def _dynamic(element: Element, notes: Notes) -> bool:

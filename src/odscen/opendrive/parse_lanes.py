@@ -7,6 +7,7 @@ import sys
 from operator import attrgetter
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from odscen.base.errors import OpenDriveError
 from odscen.base.shown import shown_id
 from odscen.opendrive.parse_rules import (
     MAX_LANE_ID,
@@ -16,18 +17,16 @@ from odscen.opendrive.parse_rules import (
     Notes,
     Rule,
 )
-from odscen.opendrive.parse_values import cubics, ordered_s, speed
+from odscen.opendrive.parse_values import cubics, ordered_s, speed, spelt_choice
 from odscen.opendrive.parse_xml import (
     Element,
     boolean,
     children,
-    choice,
     integer,
     number,
     number_or,
     only,
     refusal,
-    required,
     unread,
 )
 from odscen.opendrive.road_model import (
@@ -115,8 +114,17 @@ def _section(element: Element, s: float, s_end: float, notes: Notes) -> LaneSect
         s,
         s_end,
         {lane.id: lane for lane in found},
-        single_side=boolean(element, "singleSide"),
+        single_side=_drawn_boolean(element, "singleSide", notes),
     )
+
+
+def _drawn_boolean(element: Element, name: str, notes: Notes) -> bool:
+    """A boolean that nothing depends on: another value counts as not given."""
+    try:
+        return boolean(element, name)
+    except OpenDriveError as error:
+        notes.add(Rule.PAINT, element, f"{error.problem}; it counts as not given")
+        return False
 
 
 def _check_ids(element: Element, ids: list[int], notes: Notes) -> None:
@@ -135,12 +143,17 @@ _SIDES: Final = {"left": 1, "center": 0, "right": -1}
 def _lane(element: Element, side: str, s0: float, s_end: float, notes: Notes) -> Lane:
     lane_id = integer(element, "id", limit=MAX_LANE_ID)
     if (lane_id > 0) - (lane_id < 0) != _SIDES[side]:
-        raise refusal(element, f"lane {lane_id} is in <{side}>")
+        if not lane_id or side == "center":
+            problem = f"lane {lane_id} is in <{side}>: whether it is the centre line is not clear"
+            raise refusal(element, problem)
+        other = "left" if lane_id > 0 else "right"
+        detail = f"lane {lane_id} is in <{side}>; by the sign of its id it lies on the {other}"
+        notes.add(Rule.LANE_SIDE, element, detail)
     groups = children(element)
     if not READ.issuperset(groups):
         for tag, count in unread(groups, READ).items():
             notes.skip(Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN, "lane", tag, count)
-    predecessors, successors = _lane_links(only(groups, "link"))
+    predecessors, successors = _lane_links(only(groups, "link"), notes)
     widths = cubics(groups.get("width", ()), "sOffset", s0, s_end, notes)
     borders = cubics(groups.get("border", ()), "sOffset", s0, s_end, notes)
     if lane_id:
@@ -148,13 +161,13 @@ def _lane(element: Element, side: str, s0: float, s_end: float, notes: Notes) ->
     return Lane(
         id=lane_id,
         type=sys.intern(element.get("type", "none")),
-        level=boolean(element, "level"),
+        level=_drawn_boolean(element, "level", notes),
         widths=widths,
         borders=borders,
         heights=_heights(groups.get("height", ()), s0, notes),
         road_marks=_road_marks(groups.get("roadMark", ()), s0, notes),
         speeds=_speeds(groups.get("speed", ()), s0, notes),
-        access=_access(groups.get("access", ()), s0),
+        access=_access(groups.get("access", ()), s0, notes),
         predecessors=predecessors,
         successors=successors,
         direction=element.get("direction", "standard"),
@@ -177,17 +190,16 @@ def _check_widths(element: Element, groups: dict[str, list[Element]], notes: Not
             raise refusal(width, f"a={width.get('a')} is beyond the limit of {MAX_WIDTH:g} m")
 
 
-def _lane_links(link: Element | None) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    if link is None:
-        return (), ()
-    predecessors: list[int] = []
-    successors: list[int] = []
-    for element in link:
-        if element.tag == "predecessor":
-            predecessors.append(integer(element, "id", limit=MAX_LANE_ID))
-        elif element.tag == "successor":
-            successors.append(integer(element, "id", limit=MAX_LANE_ID))
-    return tuple(predecessors), tuple(successors)
+def _lane_links(link: Element | None, notes: Notes) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    linked: dict[str, list[int]] = {"predecessor": [], "successor": []}
+    for element in () if link is None else link:
+        if element.tag not in linked:
+            continue
+        if not element.get("id", "").strip():
+            notes.add(Rule.DANGLING_LINK, element, "it names no lane; the link is left out")
+            continue
+        linked[str(element.tag)].append(integer(element, "id", limit=MAX_LANE_ID))
+    return tuple(linked["predecessor"]), tuple(linked["successor"])
 
 
 def _s(element: Element, s0: float) -> float:
@@ -204,8 +216,11 @@ def _heights(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[Lane
                 names = ("inner", "outer")  # missing is what the message then says
             else:
                 notes.add(Rule.OLD_NAMES, element, "heightInner, heightOuter are inner, outer")
-        inner, outer = (number(element, name) for name in names)
-        found.append((element, LaneHeight(_s(element, s0), inner, outer)))
+        try:
+            inner, outer = (number(element, name) for name in names)
+            found.append((element, LaneHeight(_s(element, s0), inner, outer)))
+        except OpenDriveError as error:
+            notes.add(Rule.PAINT, element, f"{error.problem}; the height is left out")
     return _ordered(found, notes)
 
 
@@ -217,11 +232,19 @@ def _speeds(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneS
     )
 
 
-def _access(elements: Sequence[Element], s0: float) -> tuple[LaneAccess, ...]:
+_ACCESS_RULES: Final[dict[str | None, str]] = {
+    None: "",
+    "": "",
+    "allow": "allow",
+    "deny": "deny",
+}
+
+
+def _access(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneAccess, ...]:
     """One record per restriction: an attribute up to 1.7, elements below from 1.8 on."""
     records = []
     for element in elements:
-        rule = choice(element, "rule", {None: "allow", "allow": "allow", "deny": "deny"})
+        rule = spelt_choice(element, "rule", _ACCESS_RULES, notes)
         below = [str(child.get("type", "")) for child in element if child.tag == "restriction"]
         names = below or [str(element.get("restriction", ""))]
         records += [LaneAccess(_s(element, s0), rule, name) for name in names]
@@ -231,26 +254,45 @@ def _access(elements: Sequence[Element], s0: float) -> tuple[LaneAccess, ...]:
 def _road_marks(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[RoadMark, ...]:
     intern = sys.intern
     marks: list[RoadMark] = []
+    placed: list[Element] = []
     for element in elements:
         get = element.get
-        lane_change = choice(element, "laneChange", _LANE_CHANGES)
+        lane_change = spelt_choice(element, "laneChange", _LANE_CHANGES, notes, otherwise="both")
+        try:
+            s = _s(element, s0)
+        except OpenDriveError as error:
+            notes.add(Rule.PAINT, element, f"{error.problem}; the mark is left out")
+            continue
+        kind = get("type")
+        if not kind:
+            notes.add(Rule.PAINT, element, "attribute type is missing or empty; nothing is painted")
         marks.append(
             RoadMark(
-                _s(element, s0),
-                intern(get("type") or required(element, "type")),
+                s,
+                intern(kind or "none"),
                 intern(get("color", "standard")),
                 intern(get("weight", "standard")),
-                number_or(element, "width", 0.0),
+                _painted_width(element, notes),
                 lane_change,
             )
         )
-    for (before, mark), element in zip(itertools.pairwise(marks), elements[1:], strict=True):
+        placed.append(element)
+    for (before, mark), element in zip(itertools.pairwise(marks), placed[1:], strict=True):
         if mark.s < before.s:
             offsets = f"{element.get('sOffset')} is below that of the mark before"
             notes.add(Rule.MARK_ORDER, element, f"sOffset={offsets}; marks are put in order")
             marks.sort(key=_start)  # stable: of marks at the same s the later one holds
             break
     return tuple(marks)
+
+
+def _painted_width(element: Element, notes: Notes) -> float:
+    """Width of a mark, metres; 0, which stands for the usual one, if it is no number."""
+    try:
+        return number_or(element, "width", 0.0)
+    except OpenDriveError as error:
+        notes.add(Rule.PAINT, element, f"{error.problem}; the mark has the usual width")
+        return 0.0
 
 
 _start = attrgetter("s")

@@ -10,6 +10,7 @@ from odscen.base.shown import shown_id
 from odscen.opendrive.parse_rules import S_TOLERANCE, Notes, Rule
 from odscen.opendrive.road_model import (
     Connection,
+    ContactPoint,
     Controller,
     Junction,
     LaneSection,
@@ -33,6 +34,7 @@ def check_references(
     and :func:`~odscen.opendrive.topology.lane_successors` does not follow them.
     """
     signals = _signal_ids(roads, notes)
+    roads = {key: _with_contacts(road, roads, notes) for key, road in roads.items()}
     roads = {key: _road(road, roads, junctions, signals, notes) for key, road in roads.items()}
     for road in roads.values():
         _note_lane_links(road, roads, notes)
@@ -62,6 +64,44 @@ def _signal_ids(roads: Roads, notes: Notes) -> set[str]:
                 notes.add(Rule.DUPLICATE_ID, place, "another object of the road has the same id")
             objects.add(obj.id)
     return seen
+
+
+def _with_contacts(road: Road, roads: Roads, notes: Notes) -> Road:
+    """The road with the contact points that its links leave out and the other roads show."""
+    changes: dict[str, RoadLink | None] = {}
+    for name, end in (("predecessor", "start"), ("successor", "end")):
+        link: RoadLink | None = getattr(road, name)
+        if link is None or link.element_type != "road":
+            continue
+        if link.contact_point is not None or link.element_s is not None:
+            continue
+        contact = _end_that_links_back(roads.get(RoadId(link.element_id)), road, end)
+        changes[name] = None if contact is None else link._replace(contact_point=contact)
+        detail = "contactPoint is missing; the link is left out"
+        if contact is not None:
+            detail = f"contactPoint is missing; the {contact} of that road links back here"
+        notes.add(Rule.MISSING_CONTACT, f"road {shown_id(road.id)} > {name}", detail)
+    return replace(road, **changes) if changes else road  # type: ignore[arg-type]
+
+
+def _end_that_links_back(other: Road | None, road: Road, end: str) -> ContactPoint | None:
+    """The end of a road that leads to an end of another or to its junction, if one does."""
+    if other is None:
+        return None
+    ends: list[ContactPoint] = []
+    sides: tuple[tuple[ContactPoint, RoadLink | None], ...] = (
+        ("start", other.predecessor),
+        ("end", other.successor),
+    )
+    for side, link in sides:
+        if link is None or (other is road and side == end):
+            continue
+        to_road = link.element_type == "road" and link.element_id == road.id
+        if (to_road and link.contact_point in (None, end)) or (
+            link.element_type == "junction" and link.element_id == road.junction
+        ):
+            ends.append(side)
+    return ends[0] if len(ends) == 1 else None
 
 
 def _road(road: Road, roads: Roads, junctions: Junctions, signals: set[str], notes: Notes) -> Road:

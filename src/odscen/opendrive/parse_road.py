@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -13,14 +13,17 @@ from odscen.opendrive.parse_furniture import parse_objects, parse_signals
 from odscen.opendrive.parse_lanes import parse_sections
 from odscen.opendrive.parse_rules import (
     MAX_COORDINATE,
+    MAX_NUMBER,
     MAX_ROAD_LENGTH,
     MAX_TURNING,
+    POINT_LENGTH,
     S_TOLERANCE,
     SLIVER_LENGTH,
+    STEP_BACK,
     Notes,
     Rule,
 )
-from odscen.opendrive.parse_values import cubics, speed
+from odscen.opendrive.parse_values import cubics, speed, spelt_choice
 from odscen.opendrive.parse_xml import (
     Element,
     children,
@@ -41,6 +44,9 @@ from odscen.opendrive.road_model import (
     RoadType,
     TrafficRule,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 READ: Final = frozenset(
     {"link", "type", "planView", "elevationProfile", "lateralProfile", "lanes", "objects"}
@@ -63,8 +69,8 @@ def parse_road(element: Element, notes: Notes) -> Road:
         if tag not in READ and tag != "userData":
             rule = Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN
             notes.skip(rule, "road", tag, len(found))
-    length = positive(element, "length", limit=MAX_ROAD_LENGTH)
     link = only(groups, "link")
+    length, is_point = _length(element, link, notes)
     lateral = _container(groups, "lateralProfile", {"superelevation"}, notes)
     lanes = only(groups, "lanes")
     if lanes is None:
@@ -76,11 +82,11 @@ def parse_road(element: Element, notes: Notes) -> Road:
         name=element.get("name", ""),
         length=length,
         junction=_junction(element, notes),
-        rule=choice(element, "rule", _TRAFFIC_RULES),
+        rule=spelt_choice(element, "rule", _TRAFFIC_RULES, notes),
         predecessor=_road_link(link, "predecessor", notes),
         successor=_road_link(link, "successor", notes),
-        types=tuple(_road_type(found, notes) for found in groups.get("type", ())),
-        geometry=_plan_view(element, groups, length, notes),
+        types=_road_types(groups.get("type", ()), notes),
+        geometry=_plan_view(element, groups, length if is_point else None, notes),
         elevation=_profile(
             _container(groups, "elevationProfile", {"elevation"}, notes), "elevation", length, notes
         ),
@@ -91,6 +97,18 @@ def parse_road(element: Element, notes: Notes) -> Road:
         signals=signals,
         signal_references=references,
     )
+
+
+def _length(element: Element, link: Element | None, notes: Notes) -> tuple[float, bool]:
+    """Length of a road, metres, and whether it is a point that joins two roads."""
+    length = number(element, "length", limit=MAX_ROAD_LENGTH)
+    joined = {} if link is None else children(link)
+    ends = [only(joined, name) for name in ("predecessor", "successor")]
+    if length == 0.0 and all(end is not None and end.get("elementId") for end in ends):
+        detail = f"length is 0; it joins two others and counts as {POINT_LENGTH:g} m long"
+        notes.add(Rule.POINT_ROAD, element, detail)
+        return POINT_LENGTH, True
+    return positive(element, "length", limit=MAX_ROAD_LENGTH), False
 
 
 def _junction(element: Element, notes: Notes) -> JunctionId | None:
@@ -113,11 +131,9 @@ def _road_link(link: Element | None, tag: str, notes: Notes) -> RoadLink | None:
         detail = f"elementType={shown(element_type)} is neither road nor junction"
         notes.add(Rule.DANGLING_LINK, element, f"{detail}; the link is left out")
         return None
-    contact_point = choice(element, "contactPoint", _CONTACT_POINTS)
-    element_s = element.get("elementS")
-    if element_type == "road" and contact_point is None and element_s is None:
-        notes.add(Rule.MISSING_CONTACT, element, "contactPoint is missing; the link is left out")
-        return None
+    # Which end a link without contactPoint means is looked for once all roads are known.
+    contact_point = spelt_choice(element, "contactPoint", _CONTACT_POINTS, notes, otherwise=None)
+    element_s = element.get("elementS") or None
     return RoadLink(
         "road" if element_type == "road" else "junction",
         required(element, "elementId"),
@@ -127,13 +143,21 @@ def _road_link(link: Element | None, tag: str, notes: Notes) -> RoadLink | None:
     )
 
 
-def _road_type(element: Element, notes: Notes) -> RoadType:
-    limit = only(children(element), "speed")
-    return RoadType(
-        number(element, "s", limit=MAX_ROAD_LENGTH),
-        element.get("type", ""),
-        None if limit is None else speed(limit, notes),
-    )
+def _road_types(elements: Sequence[Element], notes: Notes) -> tuple[RoadType, ...]:
+    types: list[RoadType] = []
+    for element in elements:
+        limit = only(children(element), "speed")
+        try:
+            s = number(element, "s", limit=MAX_ROAD_LENGTH)
+        except OpenDriveError as error:
+            if types:
+                raise
+            # Of the first type of a road one knows where it begins.
+            notes.add(Rule.UNKNOWN_VALUE, element, f"{error.problem}; it begins at s=0")
+            s = 0.0
+        own = None if limit is None else speed(limit, notes)
+        types.append(RoadType(s, element.get("type", ""), own))
+    return tuple(types)
 
 
 def _container(
@@ -153,13 +177,18 @@ def _container(
 
 # ----------------------------------------------------------------------------- plan view
 def _plan_view(
-    road: Element, groups: dict[str, list[Element]], length: float, notes: Notes
+    road: Element, groups: dict[str, list[Element]], point: float | None, notes: Notes
 ) -> tuple[Geometry, ...]:
+    """Geometries of a road; of one that is a ``point`` a line of that many metres."""
     plan_view = only(groups, "planView")
     elements = [] if plan_view is None else children(plan_view).get("geometry", [])
     if not elements:
         raise refusal(road, "there is no planView geometry")
     geometry: list[Geometry] = []
+    if point is not None:
+        limits = {"x": MAX_COORDINATE, "y": MAX_COORDINATE, "hdg": MAX_NUMBER}
+        x, y, hdg = (number(elements[0], name, limit=most) for name, most in limits.items())
+        return (Geometry(0.0, x, y, hdg, point, GeometryKind.LINE, ()),)
     for element in elements:
         found = _holding_a_point(element, notes)
         if found is not None and _behind(geometry, found, element, notes):
@@ -168,9 +197,6 @@ def _plan_view(
         raise refusal(road, "every planView geometry has the length 0")
     if abs(geometry[0].s) > S_TOLERANCE:
         raise refusal(road, f"the planView starts at s={geometry[0].s:g}, not at 0")
-    end = geometry[-1].s
-    if end >= length + S_TOLERANCE:
-        raise refusal(elements[-1], f"s={end:g} is beyond the road's length of {length:g}")
     return tuple(geometry)
 
 
@@ -202,8 +228,8 @@ def _behind(geometry: list[Geometry], new: Geometry, element: Element, notes: No
     while geometry and new.s <= geometry[-1].s:
         before = geometry[-1]
         # Files of single precision do not tell s apart that are nearer to each other than this.
-        least = max(S_TOLERANCE, float(np.spacing(np.float32(before.s))))
-        if new.s < before.s - S_TOLERANCE or min(new.length, before.length) > least:
+        least = max(STEP_BACK, float(np.spacing(np.float32(before.s))))
+        if new.s < before.s - STEP_BACK or min(new.length, before.length) > least:
             raise refusal(
                 element, f"s={new.s:g} is not beyond the s={before.s:g} of the geometry before"
             )

@@ -21,6 +21,10 @@ class Rule(StrEnum):
     escaped: names with them could not stand in lists and other files."""
     GEO_REFERENCE = "geo-reference"
     """A geoReference that pyproj does not understand is kept as text; coordinates do not change."""
+    LEADING_SPACE = "leading-space"
+    """White space before the XML declaration is skipped."""
+    SPELLING = "spelling"
+    """A value of the standard in other letters, as ``KMH`` for ``km/h``, means that value."""
     JUNCTION_ATTRIBUTE = "junction-attribute"
     """A road without ``junction``, or with an empty one, belongs to no junction."""
     DANGLING_LINK = "dangling-link"
@@ -29,9 +33,21 @@ class Rule(StrEnum):
     JUNCTION_TABLE = "junction-table"
     """A connecting lane that leads nowhere is joined to the one lane that it meets in the plane."""
     MISSING_CONTACT = "missing-contact-point"
-    """A road link without ``contactPoint`` is left out: which end it means is not guessed."""
+    """A link or connection without ``contactPoint`` means the end of the other road that links
+    back; where none or both do it is left out, for which end it means is not guessed."""
     DUPLICATE_ID = "duplicate-id"
     """Objects and signals may share an id; references mean the first."""
+    REPEATED_CONTROLLER = "repeated-controller"
+    """Controllers of one id are one: it controls the signals of all of them."""
+    ROAD_LEFT_OUT = "road-left-out"
+    """A road that cannot be read is left out, if the others hang together without it."""
+    POINT_ROAD = "point-road"
+    """A road of no length that joins two others counts as one of 1 mm."""
+    ROAD_LENGTH = "road-length"
+    """Of a length and a plan view that differ by more than 1 m that holds whose end the roads meet
+    that are linked there; where none is, the shorter one."""
+    CONNECTION_LEFT_OUT = "connection-left-out"
+    """A connection of a junction, or a lane link of it, that names no road or lane is left out."""
     COINCIDENT_ROAD = "coincident-road"
     """Of roads that no junction names and that are alike in all but id and name the first stays."""
     PLAN_VIEW_S = "plan-view-s"
@@ -46,15 +62,18 @@ class Rule(StrEnum):
     """Of a geometry of up to 0.1 mm whose numbers are beyond the limits, the rest of the road is
     kept; of such a record of a profile its first coefficient."""
     RECORD_ORDER = "record-order"
-    """A record, section or geometry that starts less than 1 mm before the one in front of it starts
-    where that one does; of geometries the one of less than 1 mm is left out."""
+    """A record, section or geometry that starts less than 5 cm before the one in front of it starts
+    where that one does; of geometries the one of less than 5 cm is left out."""
+    PAINT = "paint"
+    """What a road mark, a height or a header says that only paints, and cannot be read, counts as
+    not given."""
     MARK_ORDER = "mark-order"
     """Road marks may be written in any order; each holds from its ``sOffset`` to the next."""
     LATE_START = "late-start"
     """A profile of the road that starts after s = 0 is zero before."""
     SAME_S = "same-s"
     """Of two records at the same s the later one holds; of two geometries the one that is not
-    longer than 1 mm, or than single precision tells apart at that s, is left out."""
+    longer than 5 cm, or than single precision tells apart at that s, is left out."""
     JUMP = "jump"
     """Elevations and lane widths may jump within a road or section; they do so in the model."""
     WIDTH_AND_BORDER = "width-and-border"
@@ -62,17 +81,23 @@ class Rule(StrEnum):
     NO_WIDTH = "no-width"
     """A lane without width and border has zero width."""
     NEGATIVE_WIDTH = "negative-width"
-    """A width may fall below zero by up to 5 cm; it counts as zero there."""
+    """A width may fall below zero by up to 25 cm; it counts as zero there."""
+    LANE_SIDE = "lane-side"
+    """A lane in the element of the other side lies on the side that the sign of its id says."""
     LANE_NUMBERS = "lane-numbers"
     """Lane ids may leave numbers out; lanes lie side by side in the order of their ids."""
     NO_CENTER = "no-center-lane"
     """A lane section without centre lane has an unmarked centre line."""
     SPEED = "speed"
-    """A speed that is no positive number, "no limit" or "undefined" counts as not given."""
+    """A speed that is no positive number, "no limit" or "undefined", or has a unit that is not
+    known, counts as not given."""
     OLD_NAMES = "old-names"
     """``heightInner`` and ``heightOuter`` of a lane's height are read as ``inner``, ``outer``."""
     OBJECT_LEFT_OUT = "object-left-out"
     """An object without an id, or with a number that is missing or none, is left out."""
+    SIGNAL_LEFT_OUT = "signal-left-out"
+    """A signal, reference or controller without an id, or with a number that is missing or none, is
+    left out."""
     OUTSIDE_ROAD = "outside-road"
     """Objects and signals may lie before the start or behind the end of their road."""
     IGNORED = "ignored"
@@ -82,6 +107,11 @@ class Rule(StrEnum):
     UNKNOWN_VALUE = "unknown-value"
     """A value that the standard does not name is kept as text, or left out where it decides."""
 
+
+LOSING_RULES: Final = frozenset(
+    {Rule.ROAD_LEFT_OUT, Rule.CONNECTION_LEFT_OUT, Rule.OBJECT_LEFT_OUT, Rule.SIGNAL_LEFT_OUT}
+)
+"""Rules by which something of the file is lost, not repaired."""
 
 MAX_BYTES: Final = 256_000_000
 """Bytes of a file."""
@@ -110,8 +140,14 @@ S_TOLERANCE: Final = 1e-3
 """Metres by which s values may disagree without a note."""
 SLIVER_LENGTH: Final = 1e-4
 """Metres of geometries and records whose numbers may be beyond all limits (:attr:`Rule.SLIVER`)."""
-MAX_FAULTY_OBJECTS: Final = 1000
-"""Objects of a road that may be left out (:attr:`Rule.OBJECT_LEFT_OUT`)."""
+STEP_BACK: Final = 0.05
+"""Metres by which a record may start before the one in front of it (:attr:`Rule.RECORD_ORDER`)."""
+POINT_LENGTH: Final = 1e-3
+"""Metres that a road of no length counts as (:attr:`Rule.POINT_ROAD`)."""
+MEETING: Final = 0.5
+"""Metres along the road within which it meets a linked one (:attr:`Rule.ROAD_LENGTH`)."""
+MOST_LEFT_OUT: Final = 0.1
+"""Share of the roads that may be left out; one may be always (:attr:`Rule.ROAD_LEFT_OUT`)."""
 MAX_S_GAP: Final = 1.0
 """Metres by which s values of the plan view may disagree with a note (:attr:`Rule.PLAN_VIEW_S`)."""
 GAP_TOLERANCE: Final = 0.01
@@ -128,7 +164,7 @@ MAX_GAP: Final = 10.0
 """Metres between successive geometries with a note (:attr:`Rule.PLAN_VIEW_GAP`)."""
 WIDTH_TOLERANCE: Final = 1e-3
 """Metres below zero that a width may have without a note."""
-MAX_NEGATIVE_WIDTH: Final = 0.05
+MAX_NEGATIVE_WIDTH: Final = 0.25
 """Metres below zero that a width may have with a note (:attr:`Rule.NEGATIVE_WIDTH`)."""
 
 _LISTED_PER_RULE = 1000

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final, TypeVar, cast
 
+from odscen.base.errors import OpenDriveError
 from odscen.base.shown import shown
 from odscen.opendrive.parse_rules import (
     MAX_LANE_ID,
     MAX_NUMBER,
-    S_TOLERANCE,
     SLIVER_LENGTH,
+    STEP_BACK,
     Notes,
     Rule,
 )
@@ -19,15 +21,17 @@ from odscen.opendrive.parse_xml import Element, choice, integer, number, refusal
 from odscen.opendrive.road_model import Cubic, Validity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-_SPEED_UNITS: Final[dict[str | None, float]] = {
-    None: 1.0,
-    "": 1.0,
-    "m/s": 1.0,
-    "km/h": 1 / 3.6,
-    "mph": 0.44704,
+T = TypeVar("T")
+
+_SPEED_UNITS: Final[dict[str, float]] = {"": 1.0, "m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
+_UNIT_SPELLINGS: Final[dict[str, str]] = {
+    **dict.fromkeys(("km/h", "kmh", "kph", "kmph", "kmperh", "kilometersperhour"), "km/h"),
+    **dict.fromkeys(("mph", "mi/h", "mileh", "milesperhour"), "mph"),
+    **dict.fromkeys(("m/s", "ms", "mps", "mpers", "meterspersecond"), "m/s"),
 }
+"""Units of speed as writers spell them, without case and all but letters and strokes."""
 
 
 def cubics(
@@ -85,9 +89,9 @@ def ordered_s(element: Element, s_name: str, s: float, last: float, notes: Notes
     Raises
     ------
     OpenDriveError
-        If it starts before that one by more than :data:`S_TOLERANCE`.
+        If it starts before that one by more than :data:`STEP_BACK`.
     """
-    if s < last - S_TOLERANCE:
+    if s < last - STEP_BACK:
         raise refusal(element, f"{s_name}={s:g} is below the {last:g} of the record before")
     if s < last:
         detail = f"{s_name}={s:.9g} is below the {last:.9g} of the record before; it starts there"
@@ -101,20 +105,61 @@ def ordered_s(element: Element, s_name: str, s: float, last: float, notes: Notes
 def speed(element: Element, notes: Notes) -> float | None:
     """Speed in m/s of a ``max`` attribute, infinite for "no limit", ``None`` if none is given."""
     text = element.get("max", "").strip()
-    if text == "no limit":
+    if text.lower().replace("_", " ") in {"no limit", "nolimit"}:
         return math.inf
-    if text in {"undefined", ""}:
+    if text.lower() in {"undefined", ""}:
         return None
-    value = number(element, "max", limit=MAX_NUMBER) * choice(element, "unit", _SPEED_UNITS)
+    unit = element.get("unit", "")
+    factor = _SPEED_UNITS.get(unit, speed_factor(unit))
+    if factor is None:
+        detail = f"unit={shown(unit)} is none of km/h, m/s, mph; no speed is given"
+        notes.add(Rule.SPEED, element, detail)
+        return None
+    try:
+        value = number(element, "max", limit=MAX_NUMBER) * factor
+    except OpenDriveError as error:
+        notes.add(Rule.SPEED, element, f"{error.problem}; no speed is given")
+        return None
     if value <= 0.0:
         notes.add(Rule.SPEED, element, f"max={shown(text)} is not above zero; no speed is given")
         return None
+    if unit not in _SPEED_UNITS:
+        notes.add(Rule.SPELLING, element, f"unit={shown(unit)} is read as {_spelt(unit)}")
     return value
 
 
 def speed_factor(unit: str) -> float | None:
-    """Factor to m/s of a unit of speed, or ``None`` for other units."""
-    return _SPEED_UNITS.get(unit) if unit else None
+    """Factor to m/s of a unit of speed in any spelling, or ``None`` for other units."""
+    name = _spelt(unit)
+    return _SPEED_UNITS[name] if name else None
+
+
+def _spelt(unit: str) -> str | None:
+    """The standard's spelling of a unit of speed."""
+    return _UNIT_SPELLINGS.get(re.sub(r"[^a-z/]", "", unit.lower()))
+
+
+def spelt_choice(
+    element: Element, name: str, options: Mapping[str | None, T], notes: Notes, **usual: T
+) -> T:
+    """The meaning of an attribute out of ``options``, whatever its case and outer space.
+
+    Parameters
+    ----------
+    usual
+        As ``otherwise``: what another value counts as; without it, it is refused.
+    """
+    value = element.get(name)
+    if value is None or value in options:
+        return choice(element, name, options)
+    for option, meaning in options.items():
+        if option is not None and option.lower() == value.strip().lower():
+            notes.add(Rule.SPELLING, element, f"{name}={shown(value)} is read as {option}")
+            return meaning
+    if "otherwise" not in usual:
+        return choice(element, name, options)
+    notes.add(Rule.UNKNOWN_VALUE, element, f"{name}={shown(value)} counts as not given")
+    return usual["otherwise"]
 
 
 def validities(elements: Sequence[Element]) -> tuple[Validity, ...]:

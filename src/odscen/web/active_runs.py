@@ -8,14 +8,13 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from odscen.app.removal import KnownRun, known_runs, remove
 from odscen.app.running.resumed_runs import resume
 from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import SUFFIX, read_scenario
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
 from odscen.carla.served.served_run import ServedJob, run_served
 from odscen.records.run_plan import Plan
@@ -368,14 +367,14 @@ class Runs:
         self, active: Active, plan: Plan, settings: RunSettings, wish: NewRun
     ) -> tuple[RunState, str | None]:
         """Run it in SUMO and in CARLA, in a process that has CARLA's client."""
-        with TemporaryDirectory(prefix="odscen-") as folder:
-            file = Path(folder) / f"{active.id}{SUFFIX}"
+        with scratch_folder() as folder:
+            file = folder / f"{active.id}{SUFFIX}"
             file.write_text(dumps(active.scenario), encoding="utf-8")
             last = run_served(
                 ServedJob(
                     workspace=str(self._workspace.root),
                     scenario=str(file),
-                    log=str(Path(folder) / "carla.log"),
+                    log=str(folder / "carla.log"),
                     address=str(self._carla),
                     step_length=plan.step_length,
                     origin=origin(plan),

@@ -5,17 +5,16 @@ from __future__ import annotations
 import resource
 import secrets
 import socket
-import tempfile
 import threading
 import webbrowser
 from contextlib import ExitStack, contextmanager, suppress
 from html import escape
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, WorkspaceError
 from odscen.carla.server.client import Address
 from odscen.maps.wastebasket import Wastebasket
@@ -172,8 +171,8 @@ def _private_link(url: str) -> Iterator[str]:
 
     What a browser is started with is in the list of processes, which everybody on the machine sees.
     """
-    with tempfile.TemporaryDirectory(prefix="odscen-") as folder:  # mode 0700
-        file = Path(folder) / "open.html"
+    with scratch_folder() as folder:
+        file = folder / "open.html"
         file.write_text(
             f'<!doctype html><meta http-equiv="refresh" content="0;url={escape(url)}">\n'
             f'<title>odscen</title><a href="{escape(url)}">Open odscen</a>\n',

@@ -9,15 +9,14 @@ teleports, everyone inserted and served (:mod:`odscen.figures.measures.usability
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.app.maps import map_of
 from odscen.app.running.runs import carry_out, check_run, prepare_run
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, NotFoundError
 from odscen.figures.measures.usability import UsabilityLevel
 from odscen.runs.recording import Recording
@@ -226,10 +225,8 @@ class _Trials:
             slice_length=None,
             warm_up=0.0,
         )
-        with tempfile.TemporaryDirectory(prefix="odscen-trial-") as folder:
-            checked = check_run(
-                self.workspace, hour, name="trial", out=Path(folder), settings=settings
-            )
+        with scratch_folder() as folder:
+            checked = check_run(self.workspace, hour, name="trial", out=folder, settings=settings)
             prepared = prepare_run(checked)
             try:
                 limit = _BacklogLimit(prepared.plan)

@@ -7,13 +7,13 @@ socket in a folder of its own.
 from __future__ import annotations
 
 import socket
-import tempfile
 import threading
+from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.app.running.runs import carry_out, check_given, prepare_run
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import SimulationError
 from odscen.learning.behaviour.behaviour_messages import (
     HEAD,
@@ -28,6 +28,8 @@ from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from odscen.base.arrays import BoolArray
     from odscen.learning.behaviour.behaviour_model import (
         BehaviourScene,
@@ -74,16 +76,17 @@ class SteppedRun:
     def __init__(
         self, workspace: Workspace, scenario: Scenario | Path, *, settings: RunSettings = LEAN
     ) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="odscen-env-")
+        self._scratch = ExitStack()
+        folder = self._scratch.enter_context(scratch_folder())
         self._failure: BaseException | None = None
         self._run: Run | None = None
-        path = Path(self._folder.name) / "drive"
+        path = folder / "drive"
         door = BehaviourDoor(socket=str(path), time_limit=_PATIENCE)
         checked = check_given(
             workspace,
             scenario,
             name="run",
-            out=Path(self._folder.name),
+            out=folder,
             settings=replace(settings, behaviour=door),
         )
         prepared = prepare_run(checked)
@@ -131,7 +134,7 @@ class SteppedRun:
         """End the run, wherever it is, and remove its files."""
         self._connection.close()
         self._thread.join()
-        self._folder.cleanup()
+        self._scratch.close()
 
     def _accepted(self, listener: socket.socket) -> socket.socket:
         while True:

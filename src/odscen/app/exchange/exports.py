@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import shutil
-import tempfile
 import zipfile
 from contextlib import nullcontext
 from dataclasses import replace
@@ -13,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, WorkspaceError, in_file
 from odscen.formats import find_format, list_formats
 from odscen.formats.base import NOTES_SUFFIX
@@ -219,8 +219,7 @@ def export_to_memory(
     NotFoundError, InputError, ScenarioError
         As of these functions.
     """
-    with tempfile.TemporaryDirectory(prefix="odscen-export-") as scratch:
-        out = Path(scratch)
+    with scratch_folder() as out:
         if isinstance(source, Path):
             files = export_run(workspace, source, out, to=to, options=options)
         else:

@@ -8,12 +8,12 @@ sent; then another child reads all of it.
 from __future__ import annotations
 
 import json
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from odscen.app.exchange.imports import bare_map_name, plan_text, read_content
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.checksums import digest
 from odscen.base.errors import InputError, OdscenError
 from odscen.base.given_files import MOST, read_given
@@ -102,10 +102,7 @@ def read_sent_scenario(
     if len(named) > _MOST_FILES:
         raise InputError(f"more than {_MOST_FILES} files were sent")
     size = sum(len(one.content) for one in stories)
-    with tempfile.TemporaryDirectory(
-        prefix="odscen-import-", ignore_cleanup_errors=True
-    ) as scratch:
-        folder = Path(scratch)
+    with scratch_folder() as folder:
         given = []
         for row, story in enumerate(stories):  # under names of ours
             path = folder / f"sent-{row}"
@@ -122,7 +119,7 @@ def read_sent_scenario(
                     "workspace": str(workspace.root),
                     "map_name": map_name,
                     "options": dict(options or {}),
-                    "folder": scratch,
+                    "folder": str(folder),
                 },
                 folders=(folder,),
                 allowance=for_import(size),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,6 +9,7 @@ import numpy as np
 from odscen.app.learned.snapshot_data import BRAKING_SECONDS, braking_of
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.runs.recording import Recording
@@ -50,7 +49,7 @@ def first_seconds(workspace: Workspace, scenarios: Sequence[Scenario]) -> list[F
     InputError
         If a run fails.
     """
-    with tempfile.TemporaryDirectory(prefix="odscen-learn-") as folder:
+    with scratch_folder() as folder:
         settings = RunSettings(
             until=BRAKING_SECONDS + STEP,
             step_length=STEP,
@@ -58,7 +57,7 @@ def first_seconds(workspace: Workspace, scenarios: Sequence[Scenario]) -> list[F
             recording=Recording(emissions=False),
         )
         checked = [
-            check_run(workspace, one, name=f"{place:03d}", out=Path(folder), settings=settings)
+            check_run(workspace, one, name=f"{place:03d}", out=folder, settings=settings)
             for place, one in enumerate(scenarios)
         ]
         found = []

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,6 +10,7 @@ from odscen.app.learned.snapshot_data import town_of, traffic_scenario
 from odscen.app.maps import load_map
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, SimulationError
 from odscen.base.text_files import write_file
 from odscen.base.version import __version__
@@ -25,6 +24,7 @@ from odscen.scenario.document.distributions import stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     from odscen.base.arrays import FloatArray
     from odscen.learning.fill import Array
@@ -109,14 +109,14 @@ def _recorded(
     density = float(stream(seed, "density", name).uniform(*_DENSITY))
     loaded = load_map(workspace.map(name))
     scenario = traffic_scenario(loaded, seed=seed, density=density, duration=duration)
-    with tempfile.TemporaryDirectory(prefix="odscen-learn-") as folder:
-        file = Path(folder) / "seen.npz"
+    with scratch_folder() as folder:
+        file = folder / "seen.npz"
         settings = RunSettings(
             recording=Recording(emissions=False),
             behaviour=BehaviourDoor(name=RECORDER, options={"file": str(file)}),
         )
         checked = check_run(
-            workspace, scenario, name=f"{name}-{seed:04d}", out=Path(folder), settings=settings
+            workspace, scenario, name=f"{name}-{seed:04d}", out=folder, settings=settings
         )
         (run,) = run_all([checked], reports=False)
         if run.status is not RunStatus.COMPLETED:

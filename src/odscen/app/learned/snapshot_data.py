@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,6 +17,7 @@ from odscen.app.learned.steady_traffic import most_stopped, stopped_growth
 from odscen.app.maps import load_map
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.base.text_files import write_file, write_text
@@ -46,6 +45,7 @@ from odscen.sumo.realize.signals_ahead import lights_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     import polars as pl
 
@@ -219,12 +219,12 @@ def _attempted(
 ) -> MadeShard:
     loaded = load_map(workspace.map(name))
     scenario = traffic_scenario(loaded, seed=seed, density=density, duration=settings.duration)
-    with tempfile.TemporaryDirectory(prefix="odscen-learn-") as folder:
+    with scratch_folder() as folder:
         checked = check_run(
             workspace,
             scenario,
             name=f"{name}-{seed:04d}",
-            out=Path(folder),
+            out=folder,
             settings=RunSettings(recording=Recording(emissions=False)),
         )
         (run,) = run_all([checked], reports=False, figures=False)

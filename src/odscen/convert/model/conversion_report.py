@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.opendrive.parse_rules import LOSING_RULES
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
@@ -67,7 +69,9 @@ def parser_entries(notes: Iterable[str]) -> list[ReportEntry]:
     for note in notes:
         element, mark, reason = note.partition(": ")
         parts = (element, reason) if mark else ("map", note)
-        entries.append(ReportEntry(ElementOutcome.REPAIRED, *parts))
+        rule = note.rpartition("[")[2].removesuffix("]")
+        outcome = ElementOutcome.LOST if rule in LOSING_RULES else ElementOutcome.REPAIRED
+        entries.append(ReportEntry(outcome, *parts))
     return entries
 
 

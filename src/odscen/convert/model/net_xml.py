@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
 
 import numpy as np
 
-from odscen.base.xml_text import escape
 from odscen.convert.model.net import DIGITS, INTERNAL, NORMAL
 from odscen.convert.model.net_shapes import border
 

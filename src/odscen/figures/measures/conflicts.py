@@ -122,8 +122,7 @@ def walking_conflicts(
     """
     import numpy as np
     import polars as pl
-
-    from odscen.base.near_points import cKDTree
+    from scipy.spatial import cKDTree
 
     people, bodies = set(), {}
     for actor in actors:

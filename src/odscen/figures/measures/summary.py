@@ -7,12 +7,12 @@ seed.
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.base.json_text import indented
 from odscen.base.stored_files import typed_rows
 from odscen.records.outcomes import ActorStatus
 from odscen.records.row_text import VERSION, row_text, rows_from_json, text_with_rows
@@ -255,4 +255,4 @@ def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
 
 def summary_to_json(summary: Mapping[str, Any]) -> str:
     """``summary.json``; NaN and infinity are refused."""
-    return indented(summary, indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
-from odscen.base.json_text import indented
 from odscen.base.stored_files import stored_document, tables
 from odscen.figures.by_place.facility_levels import with_missing
 from odscen.figures.by_place.traffic import TABLES, TrafficFigures
@@ -137,7 +137,7 @@ def figures_json(data: RunData, figures: TrafficFigures) -> str:
         "run": rounded(of_run),
         **{name: _short(table).to_dicts() for name, table in figures.whole.items()},
     }
-    return indented(content, indent=1) + "\n"
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def _short(table: pl.DataFrame) -> pl.DataFrame:

@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.sparse import csgraph
 
 from odscen.lanegraph.searches.edge_matrix import shortest_edges
-from odscen.lanegraph.searches.graph_searches import csgraph
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,8 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from odscen.lanegraph.searches.graph_searches import csgraph
+from scipy.sparse import csgraph
 
 if TYPE_CHECKING:
     from scipy import sparse

@@ -16,9 +16,9 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.sparse import csgraph
 
 from odscen.lanegraph.searches.blocks import spans, square
-from odscen.lanegraph.searches.graph_searches import csgraph
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,8 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
-
-from odscen.lanegraph.searches.graph_searches import csgraph
+from scipy.sparse import csgraph
 
 if TYPE_CHECKING:
     from collections.abc import Callable

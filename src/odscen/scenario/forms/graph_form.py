@@ -20,10 +20,10 @@ import json
 import math
 from itertools import chain, count
 from typing import TYPE_CHECKING, Any, TypeVar
+from xml.sax.saxutils import escape, quoteattr
 
 from odscen.base.errors import InputError, LimitError, ScenarioError
 from odscen.base.xml_reading import read_xml
-from odscen.base.xml_text import escape, quoteattr
 from odscen.lanegraph.graph_files import to_networkx
 from odscen.scenario.checks.scenario_checks import (
     duplicate_ids,

@@ -8,13 +8,12 @@ then counted alike.
 
 from __future__ import annotations
 
-import tempfile
 from collections import defaultdict
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.scenario.demand.count_stations import Passing
 from odscen.scenario.demand.trips import FIRST, Trips, drawn_categories
 from odscen.scenario.document.distributions import stream
@@ -161,8 +160,7 @@ def _choose(
     """Let routeSampler choose: the kind of each vehicle's route, and when it passes, seconds."""
     from lxml import etree
 
-    with tempfile.TemporaryDirectory(prefix="odscen-counts-") as name:
-        folder = Path(name)
+    with scratch_folder() as folder:
         (folder / "ways.rou.xml").write_text(_routes_xml(kinds), encoding="utf-8")
         (folder / "counts.xml").write_text(_counts_xml(passing, wanted), encoding="utf-8")
         run_tool(

@@ -13,14 +13,13 @@ and the method finds a stochastic user equilibrium (Sheffi and Powell 1982, Netw
 from __future__ import annotations
 
 import math
-import tempfile
 from collections import defaultdict
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import SimulationError
 from odscen.records.assignment_steps import Assignment, AssignmentStep
@@ -45,6 +44,7 @@ from odscen.sumo.runner.worker_process import run_worker
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
+    from pathlib import Path
 
     from odscen.base.arrays import FloatArray, Int32Array
     from odscen.runs.run_settings import RunSettings
@@ -157,8 +157,7 @@ def assign_routes(
     changed = len(best)
     for iteration in range(1, choice.iterations + 1):
         prepared = prepare(scenario, sumo_map, net, assets, settings=plain, assigned=search.paths())
-        with tempfile.TemporaryDirectory(prefix="odscen-routes-") as name:
-            folder = Path(name)
+        with scratch_folder() as folder:
             prepared.write(folder)
             ended = run_worker(folder, time_limit=settings.time_limit, forked=True)
             if ended.sim_seconds is None:

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
-from contextlib import suppress
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from odscen.runs.layout import BEHAVIOUR_FILE, STORY_FILE, SUMO_FOLDER
 
-_XERCES = "libxerces-c-3"
-_INITIALIZE = (
-    "_ZN11xercesc_3_216XMLPlatformUtils10InitializeEPKcS2_PNS_12PanicHandlerEPNS_13MemoryManagerE"
-)
-"""``xercesc::XMLPlatformUtils::Initialize(locale, home, handler, memory)``."""
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def import_all() -> None:
@@ -25,7 +20,6 @@ def import_all() -> None:
 
     del lxml, output_tables
     libsumo_import.import_libsumo()
-    _ready_xerces()
 
 
 def import_for(folder: Path, *, watched: bool = False) -> None:
@@ -36,21 +30,3 @@ def import_for(folder: Path, *, watched: bool = False) -> None:
         import odscen.sumo.worker.story.story_run
     if (folder / SUMO_FOLDER / BEHAVIOUR_FILE).is_file():
         import odscen.sumo.worker.behaviour.behaviour_run  # noqa: F401
-
-
-def _ready_xerces() -> bool:
-    """Have the XML reader that SUMO uses make its tables of characters, which are always the same.
-
-    Each fork would make them, which takes a tenth of a short simulation. It is SUMO's own first
-    call, and counted there: to make it again is nothing. Where its library is another one, or built
-    in, nothing is done, and the answer is false.
-    """
-    with suppress(OSError, AttributeError):
-        maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace")
-        paths = {line.split(maxsplit=5)[-1] for line in maps.splitlines() if _XERCES in line}
-        for path in paths:
-            initialize = getattr(ctypes.CDLL(path), _INITIALIZE)
-            initialize.argtypes, initialize.restype = [ctypes.c_char_p] * 4, None
-            initialize(b"en_US", None, None, None)  # what it is called with by default
-        return bool(paths)
-    return False

@@ -10,12 +10,9 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import tempfile
 import threading
 from collections import defaultdict
-from contextlib import nullcontext
-from functools import partial
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +24,7 @@ from fastapi.routing import APIRoute
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response, StreamingResponse
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.maps.allowances import for_large_document
 from odscen.maps.child_process import work_in_child
 from odscen.maps.folder_names import is_name
@@ -41,7 +39,6 @@ LARGE = 1_000_000
 """Bytes of a document, or of a request, from which on a child works on it. To read a megabyte holds
 Python's lock for 0.07 s."""
 _CHILD = "odscen.web.large.child_requests"
-_SCRATCH = "odscen-child-"
 _PASSED_ON = (b"accept-encoding", b"content-type", b"content-length", b"if-none-match")
 """What the child has to know of a request; who asks is known here."""
 _PIECE = 1 << 20
@@ -88,12 +85,12 @@ class LargeDocuments:
 
     def row_of(self, name: str) -> dict[str, Any]:
         """What the list of scenarios says of a large one."""
-        with self._names[name], tempfile.TemporaryDirectory(prefix=_SCRATCH) as scratch:
+        with self._names[name], scratch_folder() as scratch:
             return work_in_child(
                 f"{_CHILD}:scenario_row",
                 what=f"reading scenario {name!r}",
                 arguments={"workspace": str(self._workspace.root), "scenario": name},
-                folders=(Path(scratch),),
+                folders=(scratch,),
                 allowance=for_large_document(self.size(name)),
             )
 
@@ -101,16 +98,17 @@ class LargeDocuments:
         """Have a child answer a request."""
         if self._children is None:
             self._children = CapacityLimiter(max(2, os.cpu_count() or 1))
-        folder = Path(await run_sync(partial(tempfile.mkdtemp, prefix=_SCRATCH)))
+        scratch = ExitStack()
+        folder = await run_sync(scratch.enter_context, scratch_folder())
         try:
             await _write_down(request, folder)
             await run_sync(self._answered, folder, name, limiter=self._children)
-            response = await run_sync(_read_answer, folder)
+            response = await run_sync(_read_answer, folder, scratch)
         except BaseException:
-            shutil.rmtree(folder, ignore_errors=True)
+            scratch.close()
             raise
         if not isinstance(response, StreamingResponse):
-            await run_sync(partial(shutil.rmtree, folder, ignore_errors=True))
+            await run_sync(scratch.close)
         return response
 
     def _answered(self, folder: Path, name: str | None) -> None:
@@ -181,25 +179,25 @@ async def _write_down(request: Request, folder: Path) -> None:
     await anyio.Path(folder / REQUEST).write_text(json.dumps(said), encoding="utf-8")
 
 
-def _read_answer(folder: Path) -> Response:
-    """What the child has answered; the folder is removed when a long answer has been sent."""
+def _read_answer(folder: Path, scratch: ExitStack) -> Response:
+    """What the child has answered; ``scratch`` is left when a long answer has been sent."""
     head = json.loads((folder / HEAD).read_text(encoding="utf-8"))
     content = folder / ANSWER
     response: Response
     if content.stat().st_size <= _PIECE:
         response = Response(content.read_bytes(), head["status"])
     else:
-        response = StreamingResponse(_pieces(folder), head["status"])
+        response = StreamingResponse(_pieces(folder, scratch), head["status"])
     response.raw_headers = [
         (name.encode("latin-1"), value.encode("latin-1")) for name, value in head["headers"]
     ]
     return response
 
 
-async def _pieces(folder: Path) -> AsyncIterator[bytes]:
+async def _pieces(folder: Path, scratch: ExitStack) -> AsyncIterator[bytes]:
     try:
         async with await anyio.open_file(folder / ANSWER, "rb") as content:
             while piece := await content.read(_PIECE):
                 yield piece
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        scratch.close()

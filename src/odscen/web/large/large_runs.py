@@ -6,9 +6,11 @@ import json
 import subprocess
 import sys
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.error_data import error_from_data
 from odscen.base.errors import ToolError
 from odscen.scenario.document.json_form import loads
@@ -54,7 +56,8 @@ class LargeRun:
         self, workspace: Workspace, scenario: Path, *, name: str, settings: RunSettings, live: Live
     ) -> None:
         self._live = live
-        self._folder = tempfile.TemporaryDirectory(prefix="odscen-run-", ignore_cleanup_errors=True)
+        self._scratch = ExitStack()
+        self._folder = self._scratch.enter_context(scratch_folder())
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         self._process = _AskedToEnd(
             [sys.executable, "-m", _WORKER],
@@ -87,7 +90,7 @@ class LargeRun:
 
     def forget(self) -> None:
         """Remove what introduces its road users."""
-        self._folder.cleanup()
+        self._scratch.close()
 
     def follow(
         self,
@@ -141,7 +144,7 @@ class LargeRun:
 
     @property
     def _introduction(self) -> Path:
-        return Path(self._folder.name) / "introduction.json"
+        return self._folder / "introduction.json"
 
     def _tell(self, message: dict[str, Any]) -> None:
         self._write(json.dumps(message).encode() + b"\n")

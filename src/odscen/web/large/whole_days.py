@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.app.demand import demands
 from odscen.app.demand.sized_demand import sized
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.text_files import write_text
 from odscen.maps.allowances import for_trial_runs
 from odscen.maps.child_process import work_in_child
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from odscen.web.services import Services
 
 _CHILD = "odscen.web.large.child_requests:whole_day"
-_SCRATCH = "odscen-day-"
 
 
 def make_day(
@@ -37,7 +36,7 @@ def make_day(
         If no such day is possible.
     """
     large = shared.large is not None and shared.large.is_large(name)
-    with tempfile.TemporaryDirectory(prefix=_SCRATCH) as scratch:
+    with scratch_folder() as scratch:
         day = work_in_child(
             _CHILD,
             what=f"making a day of traffic for scenario {name!r}",
@@ -47,7 +46,7 @@ def make_day(
                 "wish": wish.model_dump(mode="json"),
                 "made": None if large else f"{scratch}/made",
             },
-            folders=(Path(scratch),),
+            folders=(scratch,),
             allowance=for_trial_runs(),
             progress=progress,
         )

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
 
-from odscen.base.xml_text import quoteattr
 from odscen.sumo.realize.lights.light_detectors import AREA_END
 
 if TYPE_CHECKING:

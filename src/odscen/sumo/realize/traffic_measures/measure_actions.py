@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from odscen.base.xml_text import quoteattr
 from odscen.records.run_plan import ClosedPeriod, PlannedMeasure
 from odscen.scenario.document.measures_document import (
     ChangedPermission,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
+from xml.sax.saxutils import quoteattr
 
 from odscen.base.errors import ScenarioError
-from odscen.base.xml_text import quoteattr
 from odscen.scenario.placing.region import place_of
 
 if TYPE_CHECKING:
