@@ -43,9 +43,22 @@ _LISTED = 8
 
 
 def rule_problems(
-    scenario: Scenario, region: Region, lights: Sequence[Light] | None = None
+    scenario: Scenario,
+    region: Region,
+    lights: Sequence[Light] | None = None,
+    *,
+    only: int | None = None,
 ) -> Iterator[Problem]:
-    """Yield everything wrong with the rules of a scenario (R74)."""
+    """Yield everything wrong with the rules of a scenario (R74).
+
+    Parameters
+    ----------
+    lights
+        Traffic lights of the map for the rules on signals; without them those are left out.
+    only
+        Place of the rule that is looked at, besides the ids of all: an edit of one rule then takes
+        the same time however many others there are. All of them if not given.
+    """
     known = {actor.id: actor.category for actor in scenario.actors}
     flows = {flow.id for flow in scenario.flows}
     ids: dict[str, int] = {}
@@ -56,11 +69,13 @@ def rule_problems(
         if (first := ids[rule.id]) < index:
             message = f"id {rule.id!r} is taken by rules[{first}].id; give one of them another"
             yield error("duplicate_id", f"{where}.id", message)
-        yield from _actor(rule.actor, f"{where}.actor", known, flows)
-        for part in rule_parts(rule, where):
-            yield from _part(part, rule, known, flows, ids, region)
-            yield from _signal(part, lights)
-    yield from _at_once(scenario)
+        if only is None or index == only:
+            yield from _actor(rule.actor, f"{where}.actor", known, flows)
+            for part in rule_parts(rule, where):
+                yield from _part(part, rule, known, flows, ids, region)
+                yield from _signal(part, lights)
+    if only is None:
+        yield from _at_once(scenario)
 
 
 def _part(

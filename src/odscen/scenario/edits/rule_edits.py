@@ -59,12 +59,7 @@ def set_rule(
             changed_part(one, {"when": _waiting(one.when, instead_of, rule.id)}) for one in rules
         )
     scenario = with_fields(scenario, rules=rules)
-    problems = rule_problems(scenario, Region.of(graph, scenario.roi), lights)
-    refuse_errors(
-        one
-        for one in problems
-        if one.where.startswith(f"rules[{index}]") or one.code == "duplicate_id"
-    )
+    refuse_errors(rule_problems(scenario, Region.of(graph, scenario.roi), lights, only=index))
     return scenario
 
 
