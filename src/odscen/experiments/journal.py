@@ -46,15 +46,15 @@ def read_rows(folder: Path) -> Rows:
     """
     rows: Rows = {}
     for part in sorted((folder / PARTS_FOLDER).glob("part-*.jsonl")):
-        _take(rows, part.read_bytes(), part)
+        _take_rows(rows, part.read_bytes(), part)
     journal = folder / JOURNAL_FILE
     with suppress(FileNotFoundError):
         content = journal.read_bytes()
-        _take(rows, content[: content.rfind(b"\n") + 1], journal)
+        _take_rows(rows, content[: content.rfind(b"\n") + 1], journal)
     return rows
 
 
-def _take(rows: Rows, content: bytes, file: Path) -> None:
+def _take_rows(rows: Rows, content: bytes, file: Path) -> None:
     for number, line in enumerate(content.splitlines(), start=1):
         try:
             row = orjson.loads(line)
@@ -118,7 +118,7 @@ class StudyJournal:
         _trace: TracebackType | None,
     ) -> None:
         if self._file is not None:
-            self._sync()
+            self._sync_to_disk()
             self._file.close()
 
     def __contains__(self, name: object) -> bool:
@@ -136,9 +136,9 @@ class StudyJournal:
         self._file.flush()  # a killed process loses nothing; a power cut at most a second
         self._lines += 1
         if self._lines >= PART_ROWS:
-            self._move()
+            self._move_journal()
         elif time.monotonic() - self._synced > _EVERY:
-            self._sync()
+            self._sync_to_disk()
         return True
 
     def forget(self, names: Iterable[str]) -> None:
@@ -152,26 +152,26 @@ class StudyJournal:
         self._write_part(b"".join(line + b"\n" for line in lines))
         for part in parts:  # after the new one, which has their rows
             part.unlink()
-        self._empty()
+        self._empty_journal()
 
-    def _move(self) -> None:
-        self._sync()
+    def _move_journal(self) -> None:
+        self._sync_to_disk()
         self._write_part((self._folder / JOURNAL_FILE).read_bytes())
-        self._empty()
+        self._empty_journal()
 
     def _write_part(self, content: bytes) -> None:
         folder = self._folder / PARTS_FOLDER
         numbers = [int(path.stem.rpartition("-")[2]) for path in folder.glob("part-*.jsonl")]
         write_file(folder / f"part-{max(numbers, default=0) + 1:06d}.jsonl", content)
 
-    def _empty(self) -> None:
+    def _empty_journal(self) -> None:
         if self._file is not None:
             self._file.seek(0)
             self._file.truncate()
             self._lines = 0
-            self._sync()
+            self._sync_to_disk()
 
-    def _sync(self) -> None:
+    def _sync_to_disk(self) -> None:
         if self._file is not None:
             self._file.flush()
             os.fsync(self._file.fileno())

@@ -156,12 +156,12 @@ def unsupported_parts(
     InputError
         If it breaks while it says so.
     """
-    with _guarded(simulator):
+    with _name_simulator_in_errors(simulator):
         return tuple(simulator.unsupported(scenario, on))
 
 
 @contextmanager
-def _guarded(simulator: AnySimulator) -> Iterator[None]:
+def _name_simulator_in_errors(simulator: AnySimulator) -> Iterator[None]:
     """Name the simulator in what its code raises."""
     try:
         yield
@@ -222,7 +222,7 @@ def prepare_run(run: CheckedRun, *, reporter: Reporter = SILENT) -> PreparedRun:
     InputError
         If a simulator from outside breaks.
     """
-    with _guarded(run.simulator):
+    with _name_simulator_in_errors(run.simulator):
         prepared: PreparedRun = run.simulator.prepare(
             run.scenario, run.run_map, run.settings, reporter
         )
@@ -291,7 +291,7 @@ def carry_out(
             result = run_in_new_folder(
                 prepared,
                 run.folder,
-                lambda folder: _simulate(run.simulator, prepared, folder, reporter),
+                lambda folder: _run_simulator(run.simulator, prepared, folder, reporter),
                 finish=finish,
                 figures=figures,
             )
@@ -299,7 +299,7 @@ def carry_out(
     return result
 
 
-def _simulate(
+def _run_simulator(
     simulator: AnySimulator, prepared: PreparedRun, folder: Path, reporter: Reporter
 ) -> SimulationOutcome:
     """Let a simulator run; code from outside that breaks is a failed run."""

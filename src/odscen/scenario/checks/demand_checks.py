@@ -89,9 +89,9 @@ def _route_problems(
     if line.goal is not None:
         goal, found = _road_place(region, line.goal, f"{where}.goal", f"line {line.id!r}")
         yield from found
-    if start is None or any(one.stop not in places for one in line.stops):
+    if start is None or any(stop.stop not in places for stop in line.stops):
         return
-    named = [(line.start, start), *((one.stop, places[one.stop]) for one in line.stops)]
+    named = [(line.start, start), *((stop.stop, places[stop.stop]) for stop in line.stops)]
     if goal is not None:
         named.append((str(line.goal), goal))
     for (one, place), (other, further) in pairwise(named):
@@ -212,7 +212,7 @@ def route_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
         where = f"demand.routes.shares[{index}]"
         yield from _end_problems(one, places, where)
         yield from _via_problems(one, places, where)
-    generated = any(one.use == "generate" for one in demand.counts)
+    generated = any(count.use == "generate" for count in demand.counts)
     if demand.routes.by == "travel_time" and generated:
         message = (
             "traffic generated from counts is made beside trips on their quickest routes in free "
@@ -221,8 +221,11 @@ def route_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
         yield warning("counts_by_travel_time", "demand.routes.by", message)
 
 
-def _end_problems(one: SharedRoutes, places: _Places, where: str) -> Iterator[Problem]:
-    for field, name in (("origin", one.origin), ("destination", one.destination)):
+def _end_problems(shared_routes: SharedRoutes, places: _Places, where: str) -> Iterator[Problem]:
+    for field, name in (
+        ("origin", shared_routes.origin),
+        ("destination", shared_routes.destination),
+    ):
         if not places.has(name):
             message = f"{name!r} is neither a zone nor a segment of the map"
             yield error("unknown_zone", f"{where}.{field}", message)
@@ -231,8 +234,8 @@ def _end_problems(one: SharedRoutes, places: _Places, where: str) -> Iterator[Pr
             yield error("zone_outside_roi", f"{where}.{field}", message)
 
 
-def _via_problems(one: SharedRoutes, places: _Places, where: str) -> Iterator[Problem]:
-    for row, (via, _) in enumerate(one.routes):
+def _via_problems(shared_routes: SharedRoutes, places: _Places, where: str) -> Iterator[Problem]:
+    for row, (via, _) in enumerate(shared_routes.routes):
         here = f"{where}.routes[{row}]"
         for name in via:
             if name not in places.known:
@@ -328,7 +331,7 @@ def _entry_problems(
         message = f"vehicles can enter {part.segment!r} both ways; give its direction"
         yield error("entry_ambiguous", here, message, segments=[part.segment])
     else:
-        known = [one.lane for one in mine[0].lanes]
+        known = [lane.lane for lane in mine[0].lanes]
         for row, lane in enumerate(part.lanes):
             if lane not in known:
                 message = f"lane {lane} is not among those that enter on {part.segment!r}: {known}"
@@ -370,7 +373,7 @@ def _reached_segments(starts: Iterable[int], region: Region) -> frozenset[str]:
 
 
 def _list_entries(every: Sequence[Entry]) -> str:
-    names = [f"{one.segment} ({one.direction})" for one in every[:NAMED]]
+    names = [f"{entry.segment} ({entry.direction})" for entry in every[:NAMED]]
     more = len(every) - len(names)
     return ", ".join(names) + (f" and {more} more" if more else "") or "no segment"
 
@@ -427,9 +430,11 @@ def counts_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
     found = [*_place_problems(counts, region, where), *_slice_problems(counts, where)]
     yield from found
     if not found:
-        for one in contradictions(counts, region.graph):
-            message = f"{one.begin:g} to {one.end:g} s: {one.message}; not all can be met"
-            segments = dict.fromkeys(n for place in one.places for n in place_segments(place))
+        for contradiction in contradictions(counts, region.graph):
+            message = f"{contradiction.begin:g} to {contradiction.end:g} s: {contradiction.message}; not all can be met"
+            segments = dict.fromkeys(
+                n for place in contradiction.places for n in place_segments(place)
+            )
             yield warning("counts_contradict", where, message, segments=segments)
 
 
@@ -481,7 +486,7 @@ def _place_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
         here, names = f"{where}.rows[{index}][0]", place_segments(place)
         unknown = [name for name in names if name not in known]
         outside = [name for name in names if name not in inside]
-        broken = [pair for pair in pairwise(names) if not _leads(onwards, pair)]
+        broken = [pair for pair in pairwise(names) if not _leads_on(onwards, pair)]
         if unknown:
             message = f"place {place!r} has segment {unknown[0]!r}, which the map does not have"
             yield error("unknown_segment", here, message, segments=unknown)
@@ -494,7 +499,7 @@ def _place_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
             yield error("place_broken", here, message, segments=broken[0])
 
 
-def _leads(onwards: dict[str, set[str]], pair: tuple[str, str]) -> bool:
+def _leads_on(onwards: dict[str, set[str]], pair: tuple[str, str]) -> bool:
     return pair[1] in onwards.get(pair[0], ())
 
 

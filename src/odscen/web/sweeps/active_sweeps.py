@@ -66,7 +66,7 @@ class Sweeps:
         InputError
             If it is not possible.
         """
-        plan, settings = plan_from_data(wish.plan), _settings(wish)
+        plan, settings = plan_from_data(wish.plan), _settings_of_wish(wish)
         count, tried = len(plan.cases()), estimate(
             self._workspace, scenario, plan, settings=settings
         )  # fmt: skip
@@ -92,7 +92,7 @@ class Sweeps:
         ConflictError
             If another sweep is under way.
         """
-        plan, settings = plan_from_data(wish.plan), _settings(wish)
+        plan, settings = plan_from_data(wish.plan), _settings_of_wish(wish)
         refuse_unknown(plan.names, scenario)
         CaseRuns(scenario, self._folder, settings)  # an unknown figure or limit is refused
         plan.cases()
@@ -100,7 +100,7 @@ class Sweeps:
             self._work.refuse_more()
             folder = self._free_folder(name)
             begin_sweep(folder, scenario, plan, settings)
-            self._submit(folder.name, scenario, plan, settings, wish.processes)
+            self._submit_sweep(folder.name, scenario, plan, settings, wish.processes)
         return folder.name
 
     def resume(self, name: str, processes: int) -> None:
@@ -113,7 +113,7 @@ class Sweeps:
         ConflictError
             If nothing is missing, or a sweep is under way.
         """
-        folder = self._of(name)
+        folder = self._folder_of(name)
         scenario, plan, said = read_sweep(folder)
         with self._work.lock:
             self._work.refuse_more()
@@ -121,7 +121,7 @@ class Sweeps:
                 raise ConflictError(
                     f"sweep {name!r} has all of its cases; there is nothing to resume"
                 )
-            self._submit(name, scenario, plan, settings_from_dict(said), processes)
+            self._submit_sweep(name, scenario, plan, settings_from_dict(said), processes)
 
     def stop(self, name: str) -> None:
         """Stop a sweep; cases that are under way are given up, those that have ended are kept.
@@ -131,7 +131,7 @@ class Sweeps:
         NotFoundError, ConflictError
             If there is none of that name, or it is not under way.
         """
-        self._of(name)
+        self._folder_of(name)
         self._work.stop(name)
 
     def remove(self, name: str) -> None:
@@ -142,19 +142,19 @@ class Sweeps:
         NotFoundError, ConflictError
             If there is none of that name, or it is under way.
         """
-        folder = self._of(name)
+        folder = self._folder_of(name)
         with self._work.lock:
             self._work.forget(name)
             discard(folder)
 
     def info(self, name: str) -> SweepInfo:
         """How far a sweep is; :class:`NotFoundError` if there is none of that name."""
-        folder = self._of(name)
+        folder = self._folder_of(name)
         plan, _ = read_plan(folder)
-        cases, state = len(plan.cases()), self._state(name, folder)
+        cases, state = len(plan.cases()), self._state_of_sweep(name, folder)
         known, live = self._work.known(name), self._work.live(name)
-        ended = _ended(folder) if live is None else max(live.ended, live.before)
-        safe, unsafe = _verdicts(folder) if state == "done" else (None, None)
+        ended = _count_ended(folder) if live is None else max(live.ended, live.before)
+        safe, unsafe = _count_verdicts(folder) if state == "done" else (None, None)
         return SweepInfo(
             sweep=name,
             scenario=_scenario_of(name),
@@ -178,12 +178,12 @@ class Sweeps:
             if (folder / SWEEP_FILE).is_file() and not folder.name.startswith("."):
                 with suppress(InputError, OSError):  # not a name of ours, or just removed
                     found.append(self.info(folder.name))
-        wanted = [one for one in found if scenario is None or one.scenario == _stem(scenario)]
+        wanted = [one for one in found if scenario is None or one.scenario == _name_stem(scenario)]
         return sorted(wanted, key=lambda one: (one.changed, one.sweep))
 
     def table(self, name: str) -> tuple[Sweep, Scenario, dict[str, Any]]:
         """Table of a sweep as far as it is, its scenario, and how it is judged."""
-        folder = self._of(name)
+        folder = self._folder_of(name)
         scenario, _, settings = read_sweep(folder)
         return read_table(folder), scenario, settings
 
@@ -195,7 +195,7 @@ class Sweeps:
         NotFoundError
             If there is no such sweep, or file, or it is not one for download.
         """
-        found = self._of(name) / path
+        found = self._folder_of(name) / path
         if not _FILES.fullmatch(path) or not found.is_file():
             raise NotFoundError(f"file of sweep {name!r}", path, [])
         return found
@@ -208,13 +208,13 @@ class Sweeps:
         NotFoundError
             If there is no such case, or it is not possible.
         """
-        return opened_case(self._of(name), case)
+        return opened_case(self._folder_of(name), case)
 
     def close(self) -> None:
         """Stop what is under way; it can be resumed."""
         self._work.close()
 
-    def _submit(
+    def _submit_sweep(
         self,
         name: str,
         scenario: Scenario,
@@ -239,9 +239,9 @@ class Sweeps:
                 done=done,
             )
 
-        self._work.start(name, _ended(folder), work)
+        self._work.start(name, _count_ended(folder), work)
 
-    def _state(self, name: str, folder: Path) -> SweepState:
+    def _state_of_sweep(self, name: str, folder: Path) -> SweepState:
         if self._work.live(name) is not None:
             return "running"
         if _is_whole(folder):
@@ -249,19 +249,19 @@ class Sweeps:
         known = self._work.known(name)
         return "stopped" if known is None or known.error is None else "failed"
 
-    def _of(self, name: str) -> Path:
+    def _folder_of(self, name: str) -> Path:
         folder = self._folder / check_name(name, what="sweep")
         if not (folder / SWEEP_FILE).is_file():
-            raise NotFoundError("sweep", name, [one.sweep for one in self.rows()])
+            raise NotFoundError("sweep", name, [row.sweep for row in self.rows()])
         return folder
 
     def _free_folder(self, scenario: str) -> Path:
         numbers = itertools.count(1)
-        names = (f"{_stem(scenario)}-{number}" for number in numbers)
+        names = (f"{_name_stem(scenario)}-{number}" for number in numbers)
         return next(self._folder / name for name in names if not (self._folder / name).exists())
 
 
-def _settings(wish: SweepWish) -> SweepSettings:
+def _settings_of_wish(wish: SweepWish) -> SweepSettings:
     return SweepSettings(wish.safe, wish.figures, seed=wish.seed)
 
 
@@ -270,7 +270,7 @@ def _at_most(processes: int) -> int:
     return min(processes, os.cpu_count() or 1)
 
 
-def _stem(scenario: str) -> str:
+def _name_stem(scenario: str) -> str:
     """Beginning of the names of a scenario's sweeps; a number follows."""
     return scenario[:56]
 
@@ -284,11 +284,11 @@ def _is_whole(folder: Path) -> bool:
     return all((folder / name).is_file() for name in (TABLE_FILE, PAGE_FILE))
 
 
-def _ended(folder: Path) -> int:
+def _count_ended(folder: Path) -> int:
     return sum(1 for _ in folder.glob(f"runs/case-*/{layout.SUMMARY_FILE}"))
 
 
-def _verdicts(folder: Path) -> tuple[int, int]:
+def _count_verdicts(folder: Path) -> tuple[int, int]:
     """How many cases are safe, and how many are not."""
     import polars as pl
 
