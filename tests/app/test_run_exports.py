@@ -19,7 +19,7 @@ from lxml import etree
 
 from odscen.app.exchange.exports import export, export_run, export_runs
 from odscen.app.running.batches import run_many
-from odscen.base.errors import InputError
+from odscen.base.errors import DamagedError, InputError
 from odscen.formats import list_formats
 from odscen.formats.base import RecordedRun
 from odscen.formats.recordings.tfrecord import read_tfrecord
@@ -347,7 +347,7 @@ def test_a_scenario_that_has_not_run_is_refused(
 def _thinned(run: Run, every: int) -> RecordedRun:
     from odscen.app.exchange.exports import _read_recorded
 
-    recorded = _read_recorded(run.folder)
+    recorded = _read_recorded(run)
     ticks = (pl.col("time") * 10).round().cast(pl.Int64)
     rows = recorded.rows.filter(ticks % every == 0)
     return replace(recorded, rows=rows, step=every / 10)
@@ -390,3 +390,44 @@ def test_a_gap_in_what_was_recorded_is_not_bridged(
     there = {round(time, 1) for time in times[valid].tolist()}
     assert {1.5, 3.5} <= there
     assert not there & {1.6, 2.0, 2.5, 3.0, 3.4}
+
+
+# ------------------------------------------------------------------------------- damaged files
+RUN_FORMATS = ("openscenario", *FORMATS)
+
+
+@pytest.mark.parametrize("to", RUN_FORMATS)
+def test_shifted_trajectories_are_not_exported(
+    workspace: Workspace, run: Run, tmp_path: Path, to: str
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(run.folder, folder)
+    (file,) = folder.glob("traj*.parquet")
+    pl.read_parquet(file).with_columns(pl.col("^vehicle_x|person_x$") + 100.0).write_parquet(file)
+    with pytest.raises(DamagedError, match=r"trajectories\.parquet: expected sha256"):
+        export_run(workspace, folder, tmp_path / "out", to=to)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("to", RUN_FORMATS)
+@pytest.mark.parametrize("sealed", [True, False])
+def test_a_damaged_table_is_named_with_and_without_checksums(
+    workspace: Workspace, run: Run, tmp_path: Path, to: str, sealed: bool
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(run.folder, folder)
+    (folder / "signal_states.parquet").write_bytes(b"PAR1 is no table PAR1")
+    if not sealed:  # as of earlier versions
+        (folder / "SHA256SUMS").unlink()
+    with pytest.raises(InputError, match=r"signal_states\.parquet") as raised:
+        export_run(workspace, folder, tmp_path / "out", to=to)
+    assert isinstance(raised.value, DamagedError) is sealed
+
+
+def test_records_that_a_run_has_not_written_itself_are_refused(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(run.folder, folder)
+    (folder / "trajectories").mkdir()
+    shutil.copyfile(folder / "trajectories.parquet", folder / "trajectories" / "part-0001.parquet")
+    with pytest.raises(DamagedError, match=r"part-0001\.parquet: expected no such file"):
+        Run.open(folder)

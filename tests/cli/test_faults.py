@@ -262,3 +262,74 @@ def test_a_signal_where_python_cannot_raise_ends_a_command_all_the_same():
         [sys.executable, "-c", script], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+@pytest.fixture(scope="module")
+def short_run(workspace, scenario, tmp_path_factory):
+    out = tmp_path_factory.mktemp("short")
+    assert odscen("run", scenario, "--until", 2, "--workspace", workspace, "--out", out).code == 0
+    return run_folder(out, scenario)
+
+
+def test_an_export_onto_a_full_disk_says_so_in_our_words(workspace, short_run, tmp_path):
+    (tmp_path / f"{short_run.name}.npz").symlink_to("/dev/full")
+    done = odscen("export", short_run, "--to", "pyg", "--workspace", workspace, "--out", tmp_path)
+    assert done.code == 3
+    assert done.err == f"error: {tmp_path}: the disk is full; free some room\n"
+
+
+@pytest.mark.parametrize("place", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0"}])
+def test_a_run_folder_whose_path_is_no_text_is_refused_before_anything_runs(
+    workspace, scenario, tmp_path, place
+):
+    out = tmp_path / ("\u00e9" if place else os.fsdecode(b"r\xff"))
+    command = [sys.executable, "-m", "odscen", "run", scenario, "--until", "2", "--json",
+               "--workspace", workspace, "--out", out]  # fmt: skip
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env={**os.environ, **place}
+    )
+    assert done.returncode == 2
+    assert "is no text in" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert json.loads(done.stdout)["error"]["type"] == "InputError"
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("streams", "code"),
+    [("2>&-", 2), (">&- 2>&-", 2), ("2>/dev/full", 2), (">/dev/full", 2)],
+)
+def test_a_closed_or_full_stream_changes_no_exit_code(tmp_path, streams, code):
+    words = f"{sys.executable} -m odscen run nothing.json --json {streams}"
+    done = subprocess.run(["bash", "-c", words], capture_output=True, check=False, cwd=tmp_path)
+    assert done.returncode == code
+    assert b"Traceback" not in done.stderr
+
+
+def test_with_closed_streams_nothing_is_written_into_other_files(workspace, scenario, tmp_path):
+    words = (
+        f"{sys.executable} -m odscen run {scenario} --until 2 --workspace {workspace} "
+        f"--out {tmp_path} <&- >&- 2>&-"
+    )
+    assert subprocess.run(["bash", "-c", words], check=False).returncode == 0
+    sums = ["sha256sum", "--quiet", "-c", "SHA256SUMS"]
+    run = run_folder(tmp_path, scenario)
+    assert subprocess.run(sums, check=False, cwd=run).returncode == 0
+
+
+@pytest.mark.parametrize("command", ["run", "export", "compare"])
+def test_too_little_address_space_is_said_before_a_library_aborts(
+    workspace, scenario, short_run, tmp_path, command
+):
+    given = {
+        "run": [scenario, "--until", "2", "--out", tmp_path / "runs"],
+        "export": [short_run, "--to", "pyg", "--out", tmp_path / "out"],
+        "compare": [short_run, short_run],
+    }
+    process = start(
+        command, *given[command], "--workspace", workspace,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (10**9, 10**9)),
+    )  # fmt: skip
+    done = end_of(process)
+    assert done.code == 3
+    assert "this needs 2 GB of address space, and 1.0 GB are allowed here" in done.err

@@ -116,6 +116,18 @@ def test_a_dataset_that_was_killed_twice_is_that_of_one_go(tmp_path: Path) -> No
     assert (nothing.ran, contents(whole)) == ([], before)
 
 
+def test_a_plan_that_is_refused_leaves_the_folder_to_another(tmp_path: Path) -> None:
+    out = tmp_path / "made"
+    with pytest.raises(InputError, match="no pattern matches map"):
+        made(out, plan(splits={"train": ["signal*"]}), MadeUpExports())
+    with pytest.raises(InputError, match="no map matches"):
+        made(out, plan(study={"sample": [{"maps": ["none"]}]}), MadeUpExports())
+    assert not out.exists()
+    made(out, plan(), MadeUpExports())
+    with pytest.raises(ConflictError, match="another plan"):
+        made(out, plan(licence="MIT"), MadeUpExports())
+
+
 def test_shards_are_by_split_and_of_the_size_asked_for(tmp_path: Path) -> None:
     asked = plan(formats=["pyg", "scenarionet", "waymo"], shard=2, keep_if=["planned >= 1"])
     facts = made(tmp_path, asked, MadeUpExports())

@@ -136,3 +136,16 @@ def test_a_scenario_that_has_changed_is_another_study(tmp_path: Path) -> None:
     file.write_text(file.read_text("utf-8").replace("15.0", "16.0"), encoding="utf-8")
     with pytest.raises(ConflictError, match="'crossing' has changed"):
         refuse_other(old, grid(tmp_path))
+
+
+def test_an_absolute_pattern_is_of_files_as_a_relative_one_is(tmp_path: Path) -> None:
+    pattern = f"{tmp_path}/cross*.scenario.json"
+    assert list(grid(tmp_path, scenarios=[pattern]).sources) == ["crossing"]
+    with pytest.raises(InputError, match="no file matches"):
+        grid(tmp_path, scenarios=[f"{tmp_path}/none*.json"])
+
+
+@pytest.mark.parametrize("pattern", ["**x/*.json", "a/../**b"])
+def test_what_is_no_pattern_is_named(pattern: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is no pattern of files"):
+        grid(tmp_path, scenarios=[pattern])

@@ -217,6 +217,7 @@ def test_a_sweep_that_cannot_be_is_refused(
     plan = SweepPlan((axis_from_text(axis),))
     with pytest.raises(InputError, match=words):
         sweep(workspace(), cut_in, plan, tmp_path / "out", settings=SweepSettings(safe=safe))
+    assert not list(tmp_path.rglob("*.json"))  # the folder is left to another sweep
 
 
 def test_a_figure_of_an_installed_package_is_a_column_and_can_be_limited(

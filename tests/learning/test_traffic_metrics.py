@@ -7,13 +7,16 @@ import pytest
 
 from odscen.learning.reference.site_features import site_of
 from odscen.learning.traffic_metrics import (
+    BINS,
     FEATURES,
+    BinnedStatistics,
     TrafficScene,
     divergence,
     frechet_distance,
     interval,
     mean_discrepancy,
     novelty,
+    place_binned,
     scene_features,
 )
 from odscen.learning.traffic_snapshots import no_lights
@@ -53,6 +56,28 @@ def test_the_divergence_is_none_for_the_same_and_a_bit_for_what_never_meets() ->
     half = divergence(np.array([0.5]), np.array([0.5, 2.5]), bounds)
     assert half == pytest.approx(0.5 * np.log2(4 / 3) + 0.5 * (0.5 * np.log2(2 / 3) + 0.5))
     assert np.isnan(divergence(low, np.array([np.nan]), bounds))
+
+
+def test_kinds_that_the_statistics_have_never_seen_are_placed_nowhere() -> None:
+    site = site_of(two_lane_road(100.0).lanes)
+    cars_only = BinnedStatistics(
+        np.ones(BINS), np.ones((BINS, 29)), np.tile([1.0, 0, 0, 0, 0, 0], (BINS, 1))
+    )
+    allowed = np.zeros((6, len(site.limit)), dtype=bool)
+    allowed[:, site.lane == 0] = True
+    allowed[5] = True  # lane 1 is open to these alone
+    placed = place_binned(
+        cars_only, site, no_lights(2), allowed,
+        wanted=50, lengths=np.full(6, 4.5), rng=np.random.default_rng(1),
+    )  # fmt: skip
+    assert len(placed.node) > 5
+    assert set(site.lane[placed.node]) == {0}
+    allowed[:5] = False
+    nothing = place_binned(
+        cars_only, site, no_lights(2), allowed,
+        wanted=5, lengths=np.full(6, 4.5), rng=np.random.default_rng(1),
+    )  # fmt: skip
+    assert len(nothing.node) == 0
 
 
 def test_a_vehicle_sees_its_gap_its_leader_and_the_end_of_the_road() -> None:

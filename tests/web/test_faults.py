@@ -6,7 +6,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from odscen.maps.store import Workspace
-from tests.web.conftest import CROSSING
+from tests.web.conftest import CROSSING, finished
 
 
 def test_a_full_disk_is_507_with_what_to_do_and_the_scenario_stays(
@@ -80,3 +80,23 @@ def test_the_load_bench_measures_every_kind_of_load() -> None:
     rows = list(measure(connections=6, uploads=2, actors=7000, runs=2, seconds=0.2))
     assert [row.failed for row in rows] == [0] * 12
     assert all(row.asked for row in rows)
+
+
+@pytest.mark.parametrize("sums", [True, False])
+def test_damaged_records_of_lights_are_named_by_the_page(
+    client: TestClient, workspace: Workspace, sampled: str, sums: bool
+) -> None:
+    run = client.post("/api/runs", json={"scenario": sampled, "until": 2}).json()["run"]
+    assert finished(client, run)["state"] == "completed"
+    folder = workspace.runs / run
+    (file,) = (*folder.glob("signal_states.parquet"), *folder.glob("signal_states/*.parquet"))
+    file.write_bytes(b"PAR1 is no table PAR1")
+    if not sums:
+        (folder / "SHA256SUMS").unlink()
+    answer = client.get(f"/api/runs/{run}/signals")
+    assert answer.status_code == (409 if sums else 422)
+    assert file.name in answer.json()["error"]["message"]
+    download = client.get(f"/api/runs/{run}/files/{file.relative_to(folder)}")
+    assert download.status_code == (409 if sums else 200)
+    (folder / "scenario.json").write_text("[" * 100_000)
+    assert client.get(f"/api/runs/{run}/content").status_code == (409 if sums else 404)

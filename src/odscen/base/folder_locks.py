@@ -12,11 +12,13 @@ import fcntl
 import json
 import os
 import socket
+import sys
 import time
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import ConflictError
+from odscen.base.errors import ConflictError, InputError
+from odscen.base.shown import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,9 +52,12 @@ def locked(folder: Path, *, what: str, patience: float = 0.0) -> Iterator[int]:
     ------
     ConflictError
         If another process holds it; says which, and since when.
+    InputError
+        If the path of the folder is no text.
     NotADirectoryError
         If a file lies where its parent belongs.
     """
+    _refuse_undecodable(folder)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:  # a file of that name
@@ -66,6 +71,19 @@ def locked(folder: Path, *, what: str, patience: float = 0.0) -> Iterator[int]:
         with suppress(OSError):
             lock_file(folder).unlink()  # before it is given back: nobody else has it yet
         os.close(descriptor)
+
+
+def _refuse_undecodable(folder: Path) -> None:
+    """Refuse a folder whose path other programs and files cannot be given."""
+    path = str(folder.absolute())
+    try:
+        path.encode()
+    except UnicodeEncodeError:
+        raise InputError(
+            f"the path of this folder is no text in {sys.getfilesystemencoding()}; name another "
+            "one, or set a locale with UTF-8, as LC_ALL=C.UTF-8 is",
+            file=printable(path),
+        ) from None
 
 
 def is_locked(folder: Path) -> bool:

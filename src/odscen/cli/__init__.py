@@ -6,10 +6,12 @@ Heavy imports stay inside the commands, and a command is imported when it is ask
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
 from _thread import interrupt_main
+from importlib.abc import MetaPathFinder
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import OdscenError, ResourceError
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 
 _AGAIN = 0.05
 """Wall seconds after which an interruption that Python has only shown comes again."""
+_ADDRESSES = 2_000_000_000
+"""Bytes of address space with which every command has come to its end; 1.2e9 are too little."""
 _INTERRUPTED = 130
 """Exit code of a command that was interrupted, as shells know it."""
 
@@ -53,11 +57,51 @@ def _worker_ahead(given: Sequence[str]) -> None:
         get_ready()
 
 
+def _open_closed_streams() -> None:
+    """Let nothing that is opened later take the place of a stream that the caller has closed.
+
+    What is written there would end in that file. Texts that a terminal or locale cannot show are
+    escaped.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+        stream = getattr(sys, name)
+        if stream is None:
+            mode = "w" if number else "r"
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
+        elif number and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+class _AddressSpaceCheck(MetaPathFinder):
+    """Refuses tables where too little address space is allowed: Polars would abort the process.
+
+    It reserves addresses for its threads and its allocator, far more than the memory it uses.
+    """
+
+    def find_spec(self, fullname: str, path: object, target: object = None) -> None:  # noqa: ARG002
+        if fullname != "polars":
+            return
+        from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit
+
+        allowed, _ = getrlimit(RLIMIT_AS)
+        if allowed != RLIM_INFINITY and allowed < _ADDRESSES:
+            raise ResourceError(
+                f"this needs {_ADDRESSES / 1e9:g} GB of address space, and {allowed / 1e9:.1f} GB "
+                "are allowed here; allow more (ulimit -v)"
+            )
+
+
 def main() -> None:
     """Entry point: runs the command and turns errors into messages and exit codes.
 
     Errors are odscen's own, and those of the system that nobody has given a place.
     """
+    _open_closed_streams()
+    sys.meta_path.insert(0, _AddressSpaceCheck())
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does
     sys.unraisablehook = _interrupt_again
     given = sys.argv[1:]

@@ -6,7 +6,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -71,6 +71,13 @@ BehaviourSettingOption = Annotated[
 BehaviourCommandOption = Annotated[
     str | None,
     typer.Option("--behaviour-cmd", help="A program that drives, over a pipe.", metavar="COMMAND"),
+]
+OverwriteOption = Annotated[
+    bool,
+    typer.Option(
+        "--overwrite",
+        help="Replace runs that have ended in the folder of --out; those of the workspace are.",
+    ),
 ]
 BehaviourTimeoutOption = Annotated[
     float,
@@ -167,21 +174,29 @@ SeedsOption = Annotated[
 
 
 def print_json(value: Mapping[str, Any]) -> None:
-    """Write one JSON object to stdout; NaN and infinity are refused rather than written."""
-    sys.stdout.write(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    """Write one JSON object to stdout; NaN and infinity are refused rather than written.
+
+    Bytes of file names that are no text stand in it as JSON escapes them.
+    """
+    ascii_only = not sys.stdout.encoding.lower().startswith("utf")
+    text = json.dumps(value, indent=2, ensure_ascii=ascii_only, allow_nan=False)
+    sys.stdout.write(text.encode("utf-8", "backslashreplace").decode() + "\n")
 
 
 def log(message: str) -> None:
-    """Write a line for people to stderr."""
-    typer.echo(visible(message), err=True)
+    """Write a line for people to stderr; a command does not end because it cannot be written."""
+    with suppress(OSError):
+        typer.echo(visible(message), err=True)
 
 
 def report_error(error: OdscenError) -> None:
     """Write an error to stderr, and as JSON to stdout if the command line asked for JSON."""
-    typer.secho(f"error: {visible(str(error))}", err=True, fg=typer.colors.RED)
+    with suppress(OSError):
+        typer.secho(f"error: {visible(str(error))}", err=True, fg=typer.colors.RED)
     if "--json" in sys.argv[1:]:
         report = as_rows(error.lists) if isinstance(error, NoMapError) else {}
-        print_json({"error": error_fields(error), **report})
+        with suppress(OSError):  # which may be the error that is reported
+            print_json({"error": error_fields(error), **report})
 
 
 def as_rows(lists: Mapping[str, Sequence[ReportedRow]]) -> dict[str, list[dict[str, Any]]]:

@@ -16,6 +16,7 @@ from odscen.cli.console import (
     BehaviourSettingOption,
     BehaviourTimeoutOption,
     JsonOption,
+    OverwriteOption,
     WorkspaceOption,
     behaviour_door,
     log,
@@ -181,6 +182,7 @@ def cosim(
     behaviour_set: BehaviourSettingOption = None,
     behaviour_cmd: BehaviourCommandOption = None,
     behaviour_timeout: BehaviourTimeoutOption = 60.0,
+    overwrite: OverwriteOption = False,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -249,6 +251,7 @@ def cosim(
             # CARLA's ticks are its steps.
             replace(settings, step_length=None),
             out=out,
+            overwrite=overwrite,
             workspace=workspace,
             as_json=as_json,
         )
@@ -259,6 +262,7 @@ def cosim(
             options,
             settings=settings,
             out=out,
+            overwrite=overwrite,
             reporter=_BarReporter(step),
         )
     _show_result(result, report, as_json=as_json)
@@ -294,6 +298,7 @@ def _run_native(
     settings: RunSettings,
     *,
     out: Path | None,
+    overwrite: bool,
     workspace: Path | None,
     as_json: bool,
 ) -> NoReturn:
@@ -308,6 +313,7 @@ def _run_native(
             options,
             settings=settings,
             out=out,
+            overwrite=overwrite,
             reporter=_BarReporter(step),
         )
     if as_json:

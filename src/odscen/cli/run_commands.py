@@ -20,6 +20,7 @@ from odscen.cli.console import (
     IntervalOption,
     JobsOption,
     JsonOption,
+    OverwriteOption,
     SeedsOption,
     SimulatorOption,
     SimulatorSettingOption,
@@ -172,6 +173,7 @@ def run(
     most_seeds: Annotated[
         int, typer.Option(min=2, help="Seeds of --until-confident, at most.")
     ] = 50,
+    overwrite: OverwriteOption = False,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -229,7 +231,7 @@ def run(
         _run_until_confident(
             store, paths, settings=settings, seeds=seeds, out=out, processes=jobs,
             share=until_confident, figure=confident_of, most=most_seeds, reports=reports,
-            as_json=as_json,
+            overwrite=overwrite, as_json=as_json,
         )  # fmt: skip
         return
     with _hint_at_resuming(out or store.runs), progress("running") as step:
@@ -239,6 +241,7 @@ def run(
             settings=settings,
             seeds=seeds,
             out=out,
+            overwrite=overwrite,
             processes=jobs,
             reports=reports,
             figures=reports or as_json,
@@ -262,6 +265,7 @@ def _run_until_confident(
     figure: str,
     most: int,
     reports: bool,
+    overwrite: bool,
     as_json: bool,
 ) -> None:
     """Run each scenario with as many seeds as its interval needs, and print all of it."""
@@ -273,8 +277,8 @@ def _run_until_confident(
     for path in paths:
         runs, found = run_until_confident(
             store, path, share=wanted, figure=figure, most=most, settings=settings, out=out,
-            seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds, processes=processes,
-            reports=reports, reporter=_BarReporter(),
+            overwrite=overwrite, processes=processes, reports=reports, reporter=_BarReporter(),
+            seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds,
         )  # fmt: skip
         results += runs
         intervals.append(found)

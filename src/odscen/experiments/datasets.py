@@ -24,9 +24,15 @@ from odscen.base.errors import ConflictError, InputError, in_file
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_file, write_text
-from odscen.experiments.plan import StudyPlan, read_plan_data
+from odscen.experiments.plan import StudyPlan, found_sources, grid_of, read_plan_data
 from odscen.experiments.studies import begin_study_of, carry_out_study
-from odscen.experiments.table import STUDY, columns_of, read_limit, study_figures
+from odscen.experiments.table import (
+    STUDY,
+    columns_of,
+    read_limit,
+    refuse_taken_names,
+    study_figures,
+)
 from odscen.experiments.work import versions
 from odscen.figures.measures.usability import UsabilityLevel
 from odscen.formats.scenarionet_format import pickled
@@ -386,11 +392,13 @@ def make_dataset(
         If another dataset is in the folder, or another process works there.
     """
     with disk_errors(f"dataset {out}"), locked(out, what=f"dataset {out.name!r}"):
-        out.mkdir(parents=True, exist_ok=True)
+        # Before anything is written: a plan that is refused leaves the folder to another one.
+        sources = found_sources(plan.study, workspace, beside=beside)
+        plan.refuse_without_split(dict.fromkeys(source.map_name for source in sources.values()))
+        refuse_taken_names(grid_of(plan.study, sources).parameters)
         _begin_dataset(out, plan)
         study = out / STUDY_FOLDER
         grid = begin_study_of(workspace, plan.study, study, beside=beside)
-        plan.refuse_without_split({source.map_name: 0 for source in grid.sources.values()})
 
         def take(outcome: Outcome) -> None:
             _stage_exports(out, outcome)

@@ -15,6 +15,7 @@ import re
 import tomllib
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -34,7 +35,6 @@ from odscen.scenario.sweeps.sweep_plan import plan_from_data
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
     from odscen.maps.store import Workspace
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
@@ -362,7 +362,10 @@ def found_sources(
 def _of_files(plan: StudyPlan, workspace: Workspace, beside: Path) -> Iterator[ScenarioSource]:
     for pattern in plan.scenarios:
         path = beside / pattern
-        files = [path] if path.is_file() else sorted(beside.glob(pattern))
+        try:
+            files = [path] if path.is_file() else _matching(beside, pattern)
+        except (ValueError, NotImplementedError) as error:
+            raise InputError(f"scenarios: {pattern!r} is no pattern of files: {error}") from error
         if not files:
             raise InputError(f"scenarios: no file matches {pattern!r} in {beside}")
         for file in files:
@@ -370,6 +373,14 @@ def _of_files(plan: StudyPlan, workspace: Workspace, beside: Path) -> Iterator[S
             entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
             refuse_unknown_parameters(plan, scenario.parameters, str(file))
             yield ScenarioSource(scenario_name(file), entry.name, entry.sha256, dumps(scenario))
+
+
+def _matching(beside: Path, pattern: str) -> list[Path]:
+    """Files of a pattern that is relative to a folder, or absolute."""
+    path = PurePath(pattern)
+    if path.is_absolute():
+        return sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
+    return sorted(beside.glob(pattern))
 
 
 def refuse_unknown_parameters(

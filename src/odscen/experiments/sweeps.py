@@ -446,9 +446,13 @@ def sweep(
     refuse_unknown(plan.names, scenario)
     with disk_errors(f"sweep {out}"), locked(out, what=f"sweep {out.name!r}"):
         cases = named_cases(plan)
+        new = not (out / SWEEP_FILE).is_file()
         begin_sweep(out, scenario, plan, settings)
         checked = runs.check(workspace, cases)
         if not checked:
+            if new:  # the folder is left to another sweep
+                for name in (SWEEP_FILE, SCENARIO_FILE):
+                    (out / name).unlink()
             raise InputError(
                 f"no case of the sweep can be run: {next(iter(runs.refused.values()))}"
             )

@@ -107,7 +107,9 @@ def place_binned(
 ) -> PlacedTraffic:
     """Place vehicles by the rates of their bins, none into another; parameters as of the model."""
     bins = bins_of(site, lights)
-    rate = statistics.rate[bins] * allowed.any(axis=0)
+    # A lane may be open to kinds alone of which the statistics have seen none, in no bin.
+    known = (statistics.categories[bins].T * allowed).any(axis=0)
+    rate = statistics.rate[bins] * known
     chosen: dict[int, int] = {}
     if rate.sum() > 0:
         order = rng.choice(len(rate), size=min(_TRIES * wanted, int((rate > 0).sum())),

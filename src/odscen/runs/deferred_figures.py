@@ -111,10 +111,8 @@ def measured_summary(run: Path) -> dict[str, Any]:
     return summary
 
 
-def whole_summary(run: Path, *, leave: Collection[str] = ()) -> dict[str, Any]:
+def checked_summary(run: Path, *, leave: Collection[str] = ()) -> dict[str, Any]:
     """Summary of a run that has ended, when all of its files are as they were written.
-
-    Figures are computed if they are not there.
 
     Raises
     ------
@@ -125,7 +123,13 @@ def whole_summary(run: Path, *, leave: Collection[str] = ()) -> dict[str, Any]:
     """
     if not unfinished(run) and ((run / layout.SUMMARY_FILE).is_file() or not without_sums(run)):
         check_run_files(run, leave=leave)
-    return measured_summary(run)
+    return read_summary(run)
+
+
+def whole_summary(run: Path, *, leave: Collection[str] = ()) -> dict[str, Any]:
+    """Do as :func:`checked_summary`, and compute figures if they are not there."""
+    summary = checked_summary(run, leave=leave)
+    return measured_summary(run) if summary.get(RECORDS_ONLY) else summary
 
 
 def _to_disk(run: Path) -> None:

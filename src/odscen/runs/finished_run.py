@@ -17,8 +17,8 @@ from odscen.records.replay import body_centres
 from odscen.records.run_events import Event, events_from_json
 from odscen.records.run_plan import Plan
 from odscen.runs import layout
-from odscen.runs.deferred_figures import figure_of_actors, measured_summary
-from odscen.runs.ended import RECORDS_ONLY, read_summary
+from odscen.runs.deferred_figures import checked_summary, figure_of_actors, measured_summary
+from odscen.runs.ended import RECORDS_ONLY
 from odscen.runs.recorded import read_trajectories
 
 if TYPE_CHECKING:
@@ -75,8 +75,10 @@ class Run:
         ------
         InputError
             If no run has ended there.
+        DamagedError
+            If a file of it is not as it was written; its report is not looked at.
         """
-        return cls(folder, read_summary(folder))
+        return cls(folder, checked_summary(folder, leave=(layout.REPORT_FILE,)))
 
     @property
     def summary(self) -> Mapping[str, Any]:
@@ -337,7 +339,7 @@ class Run:
 
     def _read_text(self, name: str) -> str:
         try:
-            return (self.folder / name).read_text(encoding="utf-8")
+            return (self.folder / name).read_text(encoding="utf-8", errors="replace")
         except OSError as error:
             raise InputError(f"the run has no {name}", file=str(self.folder)) from error
 

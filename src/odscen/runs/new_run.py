@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.atomic_folders import clear_leftovers, new_folder
+from odscen.base.checksums import SUMS_FILE
 from odscen.base.errors import ConflictError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
@@ -37,7 +38,7 @@ from odscen.runs.finished_run import Run
 from odscen.runs.found_files import found_files
 from odscen.runs.judged import read_judged
 from odscen.runs.run_settings import AS_DESIGNED
-from odscen.runs.run_status import read_status
+from odscen.runs.run_status import read_status, unfinished
 from odscen.runs.run_sums import seal_run
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ if TYPE_CHECKING:
 Finish = Callable[[Path, Mapping[str, Any]], None]
 """Called with the folder and the summary of a run that has completed: the place for a report."""
 
+_MARKS = (SUMS_FILE, layout.SUMMARY_FILE, layout.PLAN_FILE, layout.SCENARIO_FILE)
+"""Files of which a folder of a run has at least one, also if it is damaged."""
 FORMAT = "odscen-run"
 VERSION = 1
 
@@ -143,6 +146,29 @@ def run_lock(folder: Path) -> AbstractContextManager[int]:
     return locked(folder, what=f"run {folder.name!r}")
 
 
+def refuse_finished_run(folder: Path) -> None:
+    """Refuse to replace a run that has ended, in a folder that the caller has chosen for a new one.
+
+    Raises
+    ------
+    ConflictError
+        If one is there.
+    """
+    if (folder / layout.SUMMARY_FILE).is_file() and not unfinished(folder):
+        raise ConflictError(
+            f"{folder} holds a run that has ended; name another folder, or say that it is to be "
+            "replaced (--overwrite, in Python overwrite=True)"
+        )
+
+
+def _refuse_other_content(folder: Path) -> None:
+    """Refuse a folder with something in it that is no run, which a new run would delete."""
+    if not folder.is_dir() or any((folder / name).exists() for name in _MARKS):
+        return
+    if any(folder.iterdir()):
+        raise ConflictError(f"{folder} is not empty, and no run is in it; name another folder")
+
+
 @contextmanager
 def claimed_folder(out: Path) -> Iterator[int]:
     """Hold the lock of the folder of a run that is to begin, and tidy up beside it.
@@ -150,7 +176,8 @@ def claimed_folder(out: Path) -> Iterator[int]:
     Raises
     ------
     ConflictError
-        If a run that can be resumed, or is going on, is there: hours may be in it.
+        If a run that can be resumed, or is going on, is there: hours may be in it; or something
+        that is no run.
     WorkspaceError
         If the disk cannot be written in the block.
     """
@@ -162,6 +189,7 @@ def claimed_folder(out: Path) -> Iterator[int]:
                 f"run {out.name!r} has not ended ({at}); "
                 f"odscen resume {out} resumes it; delete the folder to begin anew"
             )
+        _refuse_other_content(out)
         clear_leftovers(out.parent)
         yield lock
 

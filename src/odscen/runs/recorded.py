@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from odscen.base.stored_files import tables
 from odscen.figures.measures.conflicts import conflicts_of_slices
 from odscen.records.row_text import with_numbered_names
 from odscen.runs.layout import (
@@ -20,6 +21,7 @@ from odscen.runs.layout import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     import polars as pl
@@ -91,21 +93,27 @@ def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:
     Returns
     -------
     ``None`` if nothing was recorded.
+
+    Raises
+    ------
+    InputError
+        If a file is no table, as may be in a run without checksums.
     """
     import polars as pl
 
     files = trajectory_files(run)
     if not files:
         return None
-    table = pl.scan_parquet(files)
-    count = table.select(pl.len()).collect().item()
-    if most is None or count <= most or _TIME not in table.collect_schema():
-        return Recorded(table.collect())
-    every = -(-count // most)
-    times = table.select(pl.col(_TIME).unique().sort()).collect(engine="streaming")[_TIME]
-    kept = times.gather_every(every)
-    rows = table.join(kept.to_frame().lazy(), on=_TIME, how="semi", maintain_order="left")
-    return Recorded(rows.collect(engine="streaming"), every)
+    with tables(_place(files)):
+        table = pl.scan_parquet(files)
+        count = table.select(pl.len()).collect().item()
+        if most is None or count <= most or _TIME not in table.collect_schema():
+            return Recorded(table.collect())
+        every = -(-count // most)
+        times = table.select(pl.col(_TIME).unique().sort()).collect(engine="streaming")[_TIME]
+        kept = times.gather_every(every)
+        rows = table.join(kept.to_frame().lazy(), on=_TIME, how="semi", maintain_order="left")
+        return Recorded(rows.collect(engine="streaming"), every)
 
 
 def read_lanes(run: Path) -> pl.DataFrame | None:
@@ -154,7 +162,8 @@ def read_conflicts(run: Path) -> pl.DataFrame | None:
     import polars as pl
 
     files = recorded_files(run, CONFLICTS_FILE)
-    return conflicts_of_slices([pl.read_parquet(file) for file in files]) if files else None
+    with tables(_place(files)):
+        return conflicts_of_slices([pl.read_parquet(file) for file in files]) if files else None
 
 
 def read_light_states(run: Path) -> pl.DataFrame | None:
@@ -171,9 +180,10 @@ def read_light_states(run: Path) -> pl.DataFrame | None:
     if states is None:
         return None
     shown = pl.struct("program", "state")
-    return states.sort("light", "time", maintain_order=True).filter(
-        (shown != shown.shift(1).over("light")).fill_null(value=True)
-    )
+    with tables(str(run / LIGHT_STATES_FILE)):
+        return states.sort("light", "time", maintain_order=True).filter(
+            (shown != shown.shift(1).over("light")).fill_null(value=True)
+        )
 
 
 def read_calls(run: Path) -> pl.DataFrame | None:
@@ -213,4 +223,10 @@ def _read_recorded(run: Path, file: str) -> pl.DataFrame | None:
     import polars as pl
 
     files = recorded_files(run, file)
-    return pl.read_parquet(files) if files else None
+    with tables(_place(files)):
+        return pl.read_parquet(files) if files else None
+
+
+def _place(files: Sequence[Path]) -> str:
+    """What a file is called that cannot be read: its path, or the folder of several."""
+    return str(files[0] if len(files) == 1 else files[0].parent) if files else ""

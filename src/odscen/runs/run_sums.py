@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.base.checksums import (
+    MISSING,
     SUMS_FILE,
     damaged_files,
     file_digest,
@@ -18,7 +19,7 @@ from odscen.runs import layout
 from odscen.runs.checkpoint import part_sums
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Mapping
     from pathlib import Path
 
 CHANGING = frozenset({layout.STATUS_FILE, layout.LOG_FILE, layout.SUMMARY_FILE})
@@ -56,7 +57,7 @@ def refuse_additions(run: Path) -> None:
         return
     added = [name for name in _sumo_files(run) if name not in sums]
     if added:
-        wrong = [DamagedFile(name, "no such file", file_digest(run / name)) for name in added]
+        wrong = [DamagedFile(name, MISSING, file_digest(run / name)) for name in added]
         raise DamagedError(str(run), wrong)
 
 
@@ -126,7 +127,25 @@ def damaged_in(
     asked = {name: one for name, one in sums.items() if name not in leave}
     if only is not None:
         asked = {only: sums[only]} if only in sums else {}
-    return damaged_files(run, asked, may_miss=[name for name in asked if _may_miss(name)])
+    wrong = damaged_files(run, asked, may_miss=[name for name in asked if _may_miss(name)])
+    return wrong if only is not None else [*wrong, *_added_records(run, sums)]
+
+
+def _added_records(run: Path, sums: Mapping[str, str]) -> list[DamagedFile]:
+    """Records that a run which has ended did not write itself, and readers would take for its own.
+
+    Those of a run that has not ended are in the checkpoints of its slices.
+    """
+    if (run / layout.STATUS_FILE).is_file():
+        return []
+    there = [name for name in layout.RECORDED if (run / name).is_file()]
+    for folder in layout.RECORDED.values():
+        there += [f"{folder}/{path.name}" for path in (run / folder).glob("part-*.parquet")]
+    return [
+        DamagedFile(name, MISSING, file_digest(run / name))
+        for name in sorted(there)
+        if name not in sums
+    ]
 
 
 def without_sums(run: Path) -> bool:

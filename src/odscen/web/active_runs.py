@@ -155,10 +155,13 @@ class Runs:
             If there is no such run.
         ConflictError
             If it has ended, is going on, or too many are.
+        DamagedError
+            If a file of it is not as it was written.
         """
         folder = self.kept.folder(run)
         if (state := self.info(run).state) != "interrupted":
             raise ConflictError(f"run {run!r} is {state}; only an interrupted one can be resumed")
+        self.kept.whole(run)
         scenario = read_scenario(folder / layout.SCENARIO_FILE)
         plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
         with self._lock:

@@ -13,13 +13,13 @@ from pydantic import ValidationError
 from odscen.app.scenarios import SUFFIX
 from odscen.base.checksums import read_checked, read_sums
 from odscen.base.durations import clock
-from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
+from odscen.base.errors import ConflictError, DamagedError, InputError, NotFoundError, OdscenError
 from odscen.maps.folder_names import check_name
 from odscen.runs import layout
 from odscen.runs.deferred_figures import measured_summary
 from odscen.runs.ended import RECORDS_ONLY, read_summary
 from odscen.runs.run_status import going, read_status, unfinished, unfinished_words
-from odscen.runs.run_sums import REPAIR, check_run_files
+from odscen.runs.run_sums import REPAIR, check_run_files, damaged_in
 from odscen.sumo.runner.long_runs import about
 from odscen.web.wire.run_messages import (
     RunContent,
@@ -176,12 +176,16 @@ class KeptRuns:
     def content(self, run: str) -> RunContent:
         """What a run's scenario says: a digest without its name and description, and its counts."""
         try:
-            text = (self.folder(run) / layout.SCENARIO_FILE).read_text(encoding="utf-8")
-            said = json.loads(text)
+            folder = self.folder(run)
+            said = json.loads(read_checked(folder, layout.SCENARIO_FILE, read_sums(folder)))
             said.pop("name", None)
             said.pop("description", None)
             counts = sum(len(part["rows"]) for part in said.get("demand", {}).get("counts", ()))
-        except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
+        except DamagedError as error:
+            if (folder / layout.SCENARIO_FILE).is_file():
+                raise
+            raise NotFoundError("scenario of run", run, []) from error
+        except (ValueError, RecursionError, AttributeError, KeyError, TypeError) as error:
             raise NotFoundError("scenario of run", run, []) from error
         digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
         return RunContent(digest=digest, counts=counts)
@@ -195,11 +199,20 @@ class KeptRuns:
         ]
 
     def file(self, run: str, name: str) -> Path:
-        """One of :meth:`files`; :class:`NotFoundError` for any other name."""
+        """One of :meth:`files`; :class:`NotFoundError` for any other name.
+
+        Raises
+        ------
+        DamagedError
+            If it is not as it was written.
+        """
         known = [file.name for file in self.files(run)]
         if name not in known:
             raise NotFoundError(f"file of run {run!r}", name, known)
-        return self.folder(run) / name
+        folder = self.folder(run)
+        if wrong := damaged_in(folder, only=name):
+            raise DamagedError(str(folder), wrong, advice=REPAIR)
+        return folder / name
 
 
 def _files_of_run(folder: Path) -> Iterator[Path]:
@@ -216,12 +229,15 @@ def _file_of_run(folder: Path) -> Path | None:
 
 
 FileStates = dict[str, tuple[int, int]]
-"""Size and time of change of each file of a run, by its path in it."""
+"""Size and time of change of each file of a run, by its path in it.
+
+The time is that of the file's node, which a program cannot set back.
+"""
 
 
 def _file_states(folder: Path) -> FileStates:
     found = ((path, path.stat()) for path in folder.rglob("*") if path.is_file())
-    return {str(path): (state.st_size, state.st_mtime_ns) for path, state in found}
+    return {str(path): (state.st_size, state.st_ctime_ns) for path, state in found}
 
 
 def _summary_damage(folder: Path) -> str | None:

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from odscen.app.running.batches import run_all, run_many
-from odscen.app.running.runs import carry_out, check_file, check_run, prepare_run
+from odscen.app.running.runs import carry_out, check_file, check_run, prepare_run, run
+from odscen.app.running.watched_runs import watch
 from odscen.app.scenarios import read_scenario, write_scenario
-from odscen.base.errors import ScenarioError
+from odscen.base.errors import ConflictError, ScenarioError
 from odscen.figures.judging.expectations import parse_expectation
 from odscen.maps.store import Workspace
 from odscen.runs.new_run import SimulationOutcome
@@ -37,6 +38,38 @@ def test_a_scenario_with_errors_is_refused_and_none_of_the_others_is_run(
         run_many(workspace, [sampled, file], settings=SHORT, out=tmp_path / "runs")
     assert refused.value.file == str(file)
     assert not (tmp_path / "runs").exists()
+
+
+def test_a_run_that_has_ended_is_replaced_only_where_that_is_said(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    first = run(workspace, sampled, settings=SHORT, out=tmp_path)
+    before = (first.folder / "SHA256SUMS").read_bytes()
+    other = replace(SHORT, seed=9)
+    for again in (
+        lambda: run(workspace, sampled, settings=other, out=tmp_path),
+        lambda: run_many(workspace, [sampled], settings=other, out=tmp_path),
+        lambda: watch(workspace, sampled, settings=other, out=tmp_path).__enter__(),
+    ):
+        with pytest.raises(ConflictError, match=r"holds a run that has ended.*overwrite=True"):
+            again()
+    assert (first.folder / "SHA256SUMS").read_bytes() == before
+    again = run(workspace, sampled, settings=other, out=tmp_path, overwrite=True)
+    assert (again.folder, again.known["seed"]) == (first.folder, 9)
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_a_folder_that_is_no_run_is_never_replaced(
+    workspace: Workspace, sampled: Path, tmp_path: Path, overwrite: bool
+) -> None:
+    mine = tmp_path / "mine" / "thesis.txt"
+    mine.parent.mkdir()
+    (tmp_path / "empty").mkdir()
+    mine.write_text("years of work")
+    with pytest.raises(ConflictError, match="not empty, and no run is in it"):
+        run(workspace, sampled, settings=SHORT, out=tmp_path, name="mine", overwrite=overwrite)
+    assert mine.read_text() == "years of work"
+    run(workspace, sampled, settings=SHORT, out=tmp_path, name="empty", overwrite=overwrite)
 
 
 def test_settings_reach_plan_and_summary_unchanged(

@@ -91,6 +91,9 @@ def test_a_latin_hypercube_and_sobol_cover_each_parameter_evenly() -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
+        ({"vary": [{"parameters": 5, "table": [[1]]}]}, "parameters must be a list of names"),
+        ({"vary": [], "method": ["grid"]}, "method must be a name"),
+        ({"vary": [{"parameter": "a", "values": [10**400]}]}, "so many digits is not finite"),
         ({}, "nothing is varied"),
         ({"vary": 3}, "vary must be a list"),
         ({"vary": [{"parameter": "a"}]}, r"vary\[0\] has parameter; give parameter, from, to"),

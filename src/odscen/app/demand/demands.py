@@ -13,7 +13,9 @@ from odscen.app.maps import load_map, map_of
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ScenarioError, in_file
 from odscen.base.given_files import read_given_text
-from odscen.runs.layout import SCENARIO_FILE
+from odscen.base.stored_files import tables
+from odscen.runs.deferred_figures import checked_summary
+from odscen.runs.layout import REPORT_FILE, SCENARIO_FILE
 from odscen.runs.recorded import trajectory_files
 from odscen.scenario import edits
 from odscen.scenario.checks.demand_checks import parking_problems
@@ -331,8 +333,12 @@ def fit_counts(workspace: Workspace, path: Path) -> CountFits:
     ------
     InputError
         If the scenario has no counts, or the run no trajectories.
+    DamagedError
+        If a file of the run is not as it was written.
     """
     folder = path if path.is_dir() else None
+    if folder is not None:
+        checked_summary(folder, leave=(REPORT_FILE,))
     scenario = read_scenario(path if folder is None else folder / SCENARIO_FILE)
     if not scenario.demand.counts:
         raise InputError(
@@ -345,7 +351,8 @@ def fit_counts(workspace: Workspace, path: Path) -> CountFits:
     trajectories = trajectory_files(folder)
     if not trajectories:
         raise InputError("the run has no trajectories to count in", file=str(path))
-    return run_fit(scenario, loaded.sumo, pl.scan_parquet(trajectories))
+    with tables(str(folder)):
+        return run_fit(scenario, loaded.sumo, pl.scan_parquet(trajectories))
 
 
 _FIELDS = {

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from odscen.base.atomic_folders import scratch_folder
-from odscen.base.errors import InputError, WorkspaceError, in_file
+from odscen.base.errors import InputError, in_file
+from odscen.base.system_errors import disk_errors
 from odscen.formats import find_format, list_formats
 from odscen.formats.base import NOTES_SUFFIX
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from odscen.formats.base import ExportFiles, ExportSource, Format, RecordedRun
     from odscen.maps.store import Workspace
+    from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
 
 _DATE: Final = (2026, 1, 1, 0, 0, 0)
@@ -124,6 +126,8 @@ def export_run(
     InputError
         If the format cannot say what happened or has no such option, no run has ended there, or it
         has no trajectories or too many.
+    DamagedError
+        If a file of the run is not as it was written.
     WorkspaceError
         If the folder cannot be written.
     """
@@ -139,8 +143,9 @@ def export_run(
             if "run" in one.of and one.write is not None
         )
         raise InputError(f"the format {to} cannot say what happened in a run; {able} can")
-    recorded = _read_recorded(run)
-    seed = Run.open(run).summary["seed"]  # perhaps another one than the scenario's own
+    opened = Run.open(run)
+    recorded = _read_recorded(opened)
+    seed = opened.known["seed"]  # perhaps another one than the scenario's own
     document = read_scenario(run / SCENARIO_FILE).model_copy(update={"seed": seed})
     source = _make_source(workspace, document, run.resolve().name, options, recorded)
     if chosen.needs_roads:
@@ -235,16 +240,14 @@ def _choose_format(to: str, options: Mapping[str, str] | None) -> Format:
     return chosen
 
 
-def _read_recorded(folder: Path) -> RecordedRun:
+def _read_recorded(run: Run) -> RecordedRun:
     from odscen.formats.base import RecordedRun
     from odscen.records.run_plan import Plan
-    from odscen.runs.finished_run import Run
     from odscen.runs.layout import PLAN_FILE
     from odscen.runs.recorded import read_light_states
 
-    run = Run.open(folder)
     rows = run.trajectories()
-    file = folder / PLAN_FILE
+    file = run.folder / PLAN_FILE
     with in_file(str(file)):
         plan = Plan.from_json(file.read_text(encoding="utf-8"))
     times = rows["time"].unique().sort().to_list()
@@ -253,7 +256,7 @@ def _read_recorded(folder: Path) -> RecordedRun:
     until = float(times[-1] if ended is None else ended)
     if not plan.elevation and "z" in rows.columns:  # SUMO's network is flat, the map is not
         rows = rows.drop("z")
-    return RecordedRun(plan.actors, rows, read_light_states(folder), until, step)
+    return RecordedRun(plan.actors, rows, read_light_states(run.folder), until, step)
 
 
 def _make_source(
@@ -281,7 +284,7 @@ def _make_source(
 
 def _write_files(files: ExportFiles, out: Path) -> list[Path]:
     written = []
-    try:
+    with disk_errors(str(out)):
         for name, content in sorted(files.items()):
             path = out / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -292,6 +295,4 @@ def _write_files(files: ExportFiles, out: Path) -> list[Path]:
             else:
                 shutil.copyfile(content, path)
             written.append(path)
-    except OSError as error:
-        raise WorkspaceError(f"{out}: {error.strerror or error}") from error
     return written

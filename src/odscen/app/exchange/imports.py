@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from odscen.app.maps import load_map
 from odscen.app.scenarios import check_scenario, write_scenario
 from odscen.base.checksums import digest
-from odscen.base.errors import InputError, NotFoundError, WorkspaceError
+from odscen.base.errors import InputError, NotFoundError
 from odscen.base.given_files import MOST, read_given
+from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.formats import find_format, format_of_file
 from odscen.formats.base import ImportMap, ImportSource
@@ -209,14 +210,12 @@ def bare_map_name(named: str) -> str:
 
 
 def _write_tracks(tracks: pl.DataFrame, out: Path) -> None:
-    try:
+    with disk_errors(str(out)):
         out.parent.mkdir(parents=True, exist_ok=True)
         if out.suffix == ".parquet":
             tracks.write_parquet(out)
         else:
             tracks.write_csv(out)
-    except OSError as error:
-        raise WorkspaceError(f"{out}: {error.strerror or error}") from error
 
 
 @dataclass(frozen=True, slots=True)

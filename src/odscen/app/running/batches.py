@@ -18,6 +18,7 @@ from odscen.app.running.interruptible import Interruptible
 from odscen.app.running.runs import carry_out, check_given, prepare_run
 from odscen.app.scenarios import scenario_name
 from odscen.base.errors import InputError
+from odscen.runs.new_run import refuse_finished_run
 from odscen.runs.reporter import SILENT, Progress, Reporter
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.sumo.runner.forked_worker import expect_runs
@@ -148,6 +149,7 @@ def run_many(
     settings: RunSettings = AS_DESIGNED,
     seeds: Sequence[int] | None = None,
     out: Path | None = None,
+    overwrite: bool = False,
     processes: int = 1,
     reports: bool = True,
     figures: bool = True,
@@ -167,6 +169,8 @@ def run_many(
         Runs each scenario once with each of these, as ``NAME-seed-N``.
     out
         Folder that gets one folder per scenario; the workspace's ``runs`` if not given.
+    overwrite
+        Whether runs that have ended are replaced in ``out``; in the workspace's ``runs`` they are.
     processes
         How many run at a time.
     reports
@@ -192,6 +196,8 @@ def run_many(
         If a scenario has errors; none is run then.
     NotFoundError
         If the workspace does not have a map.
+    ConflictError
+        If a run that has ended is in a folder and is not to be replaced; none is run then.
     WorkspaceError
         If a folder cannot be written, or the disk cannot hold a run.
     """
@@ -203,6 +209,9 @@ def run_many(
         for problem in checked.unsupported:
             reporter.of_run(own).said(f"{own}: {problem.message}")
         runs += [checked] if seeds is None else [_with_seed(checked, seed) for seed in seeds]
+    if out is not None and not overwrite:
+        for run in runs:
+            refuse_finished_run(run.folder)
     return run_all(runs, processes=processes, reports=reports, figures=figures, reporter=reporter)
 
 

@@ -162,6 +162,7 @@ def run_until_confident(
     most: int = 50,
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
+    overwrite: bool = False,
     processes: int = 1,
     reports: bool = True,
     reporter: Reporter = SILENT,
@@ -178,6 +179,8 @@ def run_until_confident(
         That are run in any case; then come those that follow the largest.
     most
         Seeds in all, at most.
+    overwrite
+        Whether runs that have ended are replaced in ``out``; in the workspace's ``runs`` they are.
     reports
         Whether each run gets its report.
     reporter
@@ -199,8 +202,8 @@ def run_until_confident(
     batch = list(seeds)[:most]
     while True:
         done += run_many(
-            workspace, [scenario], settings=settings, seeds=batch, out=out, processes=processes,
-            reports=reports, figures=reports, reporter=reporter,
+            workspace, [scenario], settings=settings, seeds=batch, out=out, overwrite=overwrite,
+            processes=processes, reports=reports, figures=reports, reporter=reporter,
         )  # fmt: skip
         found = confidence_of(
             [_figure_value(run, figure) for run in done],

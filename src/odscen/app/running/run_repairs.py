@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from odscen.app.map_repairs import NO_SUMS, RepairStep, listed, set_aside
 from odscen.app.maps import load_map
 from odscen.app.running.reports import write_report
-from odscen.base.checksums import SUMS_FILE, file_digest, read_sums, write_sums
+from odscen.base.checksums import MISSING, SUMS_FILE, file_digest, read_sums, write_sums
 from odscen.base.errors import DamagedFile, InputError, OdscenError
 from odscen.base.folder_locks import is_locked
 from odscen.figures.by_place.analysis_times import AnalysisTimes
@@ -109,6 +109,8 @@ def _rebuild_file(workspace: Workspace, run: Path, damaged_file: DamagedFile) ->
         return _figures_again(run)
     if damaged_file.file == layout.REPORT_FILE:
         return _report_again(workspace, run)
+    if damaged_file.expected == MISSING:  # somebody has put it there
+        return _set_file_aside(run, damaged_file.file)
     if damaged_file.file == layout.LOG_FILE or (
         damaged_file.file == layout.SUMMARY_FILE and unfinished(run)
     ):

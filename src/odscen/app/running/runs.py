@@ -18,7 +18,12 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import InputError, OdscenError, in_file
 from odscen.figures.judging.criteria import criteria_problems
-from odscen.runs.new_run import SimulationOutcome, claimed_folder, run_in_new_folder
+from odscen.runs.new_run import (
+    SimulationOutcome,
+    claimed_folder,
+    refuse_finished_run,
+    run_in_new_folder,
+)
 from odscen.runs.reporter import SILENT, Reporter
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.checks.scenario_checks import check
@@ -343,6 +348,7 @@ def run(
     simulator: str | AnySimulator | None = None,
     name: str | None = None,
     out: Path | None = None,
+    overwrite: bool = False,
     reporter: Reporter = SILENT,
 ) -> Run:
     """Check a scenario, run it, and write its report; SUMO has a process of its own.
@@ -360,9 +366,11 @@ def run(
         :class:`~odscen.simulators.base.Simulator`. The one of the settings if not given: SUMO,
         unless they say otherwise.
     name
-        Of the run's folder; the scenario's if not given. A finished run of that name is replaced.
+        Of the run's folder; the scenario's if not given.
     out
         Folder that gets the run's folder; the workspace's ``runs`` if not given.
+    overwrite
+        Whether a run that has ended is replaced in ``out``; in the workspace's ``runs`` it is.
     reporter
         Hears how far it is, in this thread.
 
@@ -380,7 +388,7 @@ def run(
     NotFoundError
         If the workspace does not have its map.
     ConflictError
-        If a run that has not ended is in the folder.
+        If a run that has not ended is in the folder, or one that has and is not to be replaced.
     WorkspaceError
         If the folder cannot be written, or the disk cannot hold the run.
     """
@@ -390,6 +398,8 @@ def run(
     checked = check_given(
         workspace, scenario, name=name, out=out, settings=settings, simulator=made
     )
+    if out is not None and not overwrite:
+        refuse_finished_run(checked.folder)
     for problem in checked.unsupported:
         reporter.said(problem.message)
     return carry_out(checked, prepare_run(checked, reporter=reporter), reporter=reporter)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.app.running.runs import carry_out, check_given, prepare_run
 from odscen.base.errors import ConflictError
+from odscen.runs.new_run import refuse_finished_run
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.document.problems import refuse_errors, validated
@@ -192,6 +193,7 @@ def watch(
     settings: RunSettings = AS_DESIGNED,
     name: str | None = None,
     out: Path | None = None,
+    overwrite: bool = False,
 ) -> Iterator[WatchedRun]:
     """Run a scenario, see every step of it, and act in it; SUMO waits for the loop.
 
@@ -210,6 +212,8 @@ def watch(
         Of the run's folder; the scenario's if not given.
     out
         Folder that gets the run's folder; the workspace's ``runs`` if not given.
+    overwrite
+        Whether a run that has ended is replaced in ``out``; in the workspace's ``runs`` it is.
 
     Yields
     ------
@@ -227,7 +231,7 @@ def watch(
     NotFoundError
         If the workspace does not have its map.
     ConflictError
-        If a run that has not ended is in the folder.
+        If a run that has not ended is in the folder, or one that has and is not to be replaced.
     WorkspaceError
         If the folder cannot be written, or the disk cannot hold the run.
 
@@ -242,7 +246,10 @@ def watch(
     >>> steps.run.status
     """
     settings = replace(settings, slice_length=None)
-    watched = WatchedRun(check_given(workspace, scenario, name=name, out=out, settings=settings))
+    checked = check_given(workspace, scenario, name=name, out=out, settings=settings)
+    if out is not None and not overwrite:
+        refuse_finished_run(checked.folder)
+    watched = WatchedRun(checked)
     try:
         yield watched
     finally:

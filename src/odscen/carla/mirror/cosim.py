@@ -19,6 +19,7 @@ from odscen.carla.server.interruption import interrupts
 from odscen.carla.server.server_map import ensure_map
 from odscen.convert.lane_table.light_heads import Heads
 from odscen.convert.lane_table.table_json import table_from_json
+from odscen.runs.new_run import refuse_finished_run
 from odscen.runs.reporter import SILENT
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.simulators.base import Simulator
@@ -169,6 +170,7 @@ def cosim(
     *,
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
+    overwrite: bool = False,
     reporter: Reporter = SILENT,
 ) -> tuple[Run, CosimReport]:
     """Run a scenario in SUMO and show it on a CARLA server, see :class:`CarlaMirror`.
@@ -183,6 +185,8 @@ def cosim(
         How it is run; always in one piece.
     out
         Folder that gets the run's folder; the workspace's ``runs`` if not given.
+    overwrite
+        Whether a run that has ended is replaced in ``out``; in the workspace's ``runs`` it is.
     reporter
         Hears how far it is, in this thread.
 
@@ -195,6 +199,8 @@ def cosim(
     """
     mirror = CarlaMirror.with_options(options)
     run = check_file(workspace, path, out=out, settings=settings, simulator=mirror)
+    if out is not None and not overwrite:
+        refuse_finished_run(run.folder)
     result = carry_out(run, prepare_run(run), reporter=reporter)
     return result, mirror.report
 

@@ -25,7 +25,7 @@ from odscen.carla.server.environment import weather_parameters
 from odscen.carla.server.interruption import interrupts
 from odscen.records.run_events import EventKind
 from odscen.runs import layout
-from odscen.runs.new_run import SimulationOutcome
+from odscen.runs.new_run import SimulationOutcome, refuse_finished_run
 from odscen.runs.reporter import SILENT, Progress
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.document.problems import warning
@@ -226,6 +226,7 @@ def run_native(
     *,
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
+    overwrite: bool = False,
     reporter: Reporter = SILENT,
 ) -> tuple[Run, NativeReport]:
     """Let CARLA's Traffic Manager and walkers run a scenario, see :class:`CarlaNative`.
@@ -240,6 +241,8 @@ def run_native(
         How it is run; always in one piece.
     out
         Folder that gets the run's folder; the workspace's ``runs`` if not given.
+    overwrite
+        Whether a run that has ended is replaced in ``out``; in the workspace's ``runs`` it is.
     reporter
         Hears, in this thread, of each part of the scenario that CARLA will not do, of each tick,
         and of what else is to be known.
@@ -253,6 +256,8 @@ def run_native(
     """
     native = CarlaNative.with_options(options)
     run = check_file(workspace, path, out=out, settings=settings, simulator=native)
+    if out is not None and not overwrite:
+        refuse_finished_run(run.folder)
     for problem in run.unsupported:
         reporter.said(problem.message)
     return carry_out(run, prepare_run(run), reporter=reporter), native.report

@@ -384,6 +384,8 @@ def plan_from_data(data: Mapping[str, Any]) -> SweepPlan:
         raise InputError("vary must be a list of ranges, sets and tables")
     samples = data.get("samples")
     method = data.get("method", "grid" if samples is None else "sobol")
+    if not isinstance(method, str):
+        raise InputError(f"method must be a name, not {method!r:.60}")
     proposal_kind(method)
     count = None if samples is None else _require_whole(samples, "samples", least=1)
     seed = _require_whole(data.get("seed", 0), "seed", least=0)
@@ -406,6 +408,10 @@ def _read_axis(data: Mapping[str, Any], place: str) -> Range | Table:
         rows = tuple((_require_real(one, f"{place}.values"),) for one in data["values"])
         return _make_table((str(data["parameter"]),), rows, place)
     if keys == {"parameters", "table"} and isinstance(data["table"], list):
+        if not isinstance(data["parameters"], list):
+            raise InputError(
+                f"{place}.parameters must be a list of names, not {data['parameters']!r:.60}"
+            )
         names = tuple(map(str, data["parameters"]))
         return _make_table(
             names, tuple(_read_row(row, names, place) for row in data["table"]), place
@@ -446,9 +452,14 @@ def _parse_number(text: str, whole: str) -> float:
 
 
 def _require_real(value: object, place: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{place}: {value!r:.60} is not a finite number")
-    return float(value)
+    try:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            number = float(value)
+            if math.isfinite(number):
+                return number
+    except OverflowError:  # a whole number that no double holds
+        raise InputError(f"{place}: a number of so many digits is not finite") from None
+    raise InputError(f"{place}: {value!r:.60} is not a finite number")
 
 
 def _require_whole(value: object, place: str, *, least: int) -> int:

@@ -228,22 +228,13 @@ def _name_run_in_errors(run: Path) -> Iterator[None]:
 
 
 def _read_recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
-    """Trajectories, the plan, and every how manyth record was read.
-
-    A run that was killed has left no trajectories that can be read.
-    """
-    import polars as pl
-
+    """Trajectories, the plan, and every how manyth record was read."""
     path = _finished_file(shared, run, layout.PLAN_FILE)
     with _name_run_in_errors(path.parent):
         plan = Plan.from_json(_read_text(path))
-    what = "complete trajectories of run"
-    try:
-        recorded = read_trajectories(shared.runs.kept.whole(run), most=REPLAY_ROWS)
-    except pl.exceptions.PolarsError as error:
-        raise NotFoundError(what, run, []) from error
+    recorded = read_trajectories(path.parent, most=REPLAY_ROWS)
     if recorded is None:
-        raise NotFoundError(what, run, [])
+        raise NotFoundError("trajectories of run", run, [])
     return recorded.rows, plan, recorded.every
 
 

@@ -183,7 +183,7 @@ def export_programs(name: str, shared: Shared) -> Response:
 @router.get("/runs/{run}/signals", response_model=RunSignals, responses=UNCHANGED)
 def of_run(run: str, request: Request, shared: Shared) -> Response:
     """What the lights of a finished run showed, and when."""
-    states = read_light_states(shared.runs.kept.folder(run))
+    states = read_light_states(shared.runs.kept.whole(run))
     lights = [] if states is None else list(_shown_states(states))
     return answer(request, pack(orjson.dumps({"lights": lights})))
 
@@ -207,7 +207,7 @@ def _finished_run_folder(run: str, shared: Services) -> Path | None:
     with suppress(NotFoundError):
         folder = shared.runs.kept.folder(run)
         if (folder / layout.LIGHTS_FILE).is_file():
-            return folder
+            return shared.runs.kept.whole(run)
     shared.runs.active(run)
     return None
 
