@@ -1235,7 +1235,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "there is no simulator {name}; there are {names}" }),
   msg({ message: "there is no such program" }),
   msg({ message: "there is no traffic light in junction {junction}; there are {names}" }),
-  msg({ message: "there is no traffic light in junction {junction}; {known}" }),
+  msg({ message: "there is no traffic light in junction {junction}; {lights}" }),
   msg({ message: "there is no traffic of the file" }),
   msg({ message: "there is no weather preset {preset}; pick one of the catalogue" }),
   msg({ message: "there is no {element_type} {element_id}; the link is left out" }),
