@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from odscen.base.checksums import seal_files, unseal_files
 from odscen.base.errors import InputError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
@@ -280,7 +281,9 @@ class _Looking:
             "archive": [self.rows[k] for k in kept],
         }
         text = json.dumps(archive, indent=2, ensure_ascii=False) + "\n"
+        unseal_files(self._out, (ARCHIVE_FILE,))
         write_text(self._out / ARCHIVE_FILE, text)
+        seal_files(self._out, (ARCHIVE_FILE,))
         return found
 
 
