@@ -208,7 +208,7 @@ def test_recordings_of_real_runs_are_in_the_shards(tmp_path: Path) -> None:
     assert facts.left_out == {}
     indexes = tmp_path / "out/train/scenarionet/shard-00000/dataset_summary.pkl"
     index = pickle.loads(indexes.read_bytes())
-    assert [len(one["ts"]) for one in index.values()] == [101, 101]
+    assert [len(one["ts"]) for one in index.values()] == [96, 96]
     shard = tmp_path / "out/train/pyg/shard-00000"
     with np.load(shard / "signal_crossing-0000-as-designed-seed-2.npz") as arrays:
         assert json.loads(str(arrays["about"]))["seed"] == 2
