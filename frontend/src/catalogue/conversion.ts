@@ -27,8 +27,8 @@ const TITLES = localized((): [outcome: ElementOutcome, title: string][] => [
 /** The commonest findings in plain sentences. */
 const PLAIN = localized((): [RegExp, string][] => [
   [
-    /of a connecting road have no SUMO lane: nothing leads there/,
-    t`Short pieces of lanes inside junctions are left out, as no lane leads there`,
+    /of a connecting road have no SUMO lane: /,
+    t`Short pieces of lanes inside junctions are left out, as no connection needs them`,
   ],
   [/have no SUMO lane: nothing leads there/, t`Short pieces of lanes are left out, as no lane leads there`],
   [

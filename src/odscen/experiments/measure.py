@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from odscen.base.errors import in_file
 from odscen.base.stored_files import tables
 from odscen.figures.by_place.analysis_times import AnalysisTimes
-from odscen.figures.by_place.lane_places import LanePlaces
-from odscen.figures.by_place.traffic import over_run, traffic_figures
+from odscen.figures.by_place.traffic import over_run
 from odscen.figures.measures.registry import ACTOR_FIGURES, COUNTS, SEGMENT_FIGURES, figure_of
 from odscen.figures.measures.summary import actors_from_json
 from odscen.records.outcomes import RunStatus
 from odscen.runs import layout
-from odscen.runs.recorded import read_lanes
+from odscen.runs.measured import read_lane_figures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -103,21 +102,12 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
                     for figure in ACTOR_FIGURES
                 }
         times = AnalysisTimes.of_summary(summary)
-        figures = _of_lanes(folder, end=summary["sim_seconds"], times=times)
+        # Those of baselines need no queues, control delay or lane groups, which take most of the
+        # time that all figures of a run take.
+        figures = read_lane_figures(
+            folder, end=summary["sim_seconds"], meso=bool(summary.get("meso")), times=times
+        )
         for key, value in place_figures(figures) if figures is not None else ():
             if value is not None:
                 found[key] = round(float(value), DIGITS)
     return found
-
-
-def _of_lanes(folder: Path, *, end: float, times: AnalysisTimes) -> TrafficFigures | None:
-    """Figures by place of what was measured on lanes alone, ``None`` if nothing was.
-
-    Those of baselines need no more: no queues, control delay or lane groups, which take most of
-    the time that all figures of a run take.
-    """
-    lanes, file = read_lanes(folder), folder / layout.LANE_PLACES_FILE
-    if lanes is None or not file.is_file():
-        return None
-    places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
-    return traffic_figures(lanes, places, end=end, times=times)

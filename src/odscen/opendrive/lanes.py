@@ -15,6 +15,7 @@ from odscen.base.arrays import BoolArray, FloatArray, IntArray, offsets
 from odscen.base.ids import LaneKey, RoadId
 from odscen.opendrive.geometry import PlanView
 from odscen.opendrive.profiles import CubicTable, StepTable, locate
+from odscen.opendrive.road_model import lane_use
 from odscen.opendrive.surface import (
     LineOffset,
     ReferencePoints,
@@ -70,7 +71,8 @@ class RoadTable:
     lane_road, lane_section, lane_id
         Row of the road, index of the section within its road, id; shape ``(L,)``.
     lane_type
-        Lane type as in the file.
+        Lane type as in the file, or what access makes of a lane for driving
+        (:func:`~odscen.opendrive.road_model.lane_use`).
     lane_s0, lane_s1
         Road coordinates between which the lane lies, metres.
     lane_forward
@@ -136,7 +138,7 @@ class RoadTable:
             lane_road=np.array([row[0] for row in rows], dtype=np.int64),
             lane_section=np.array([row[2] for row in rows], dtype=np.int64),
             lane_id=np.array([lane.id for lane in lanes], dtype=np.int64),
-            lane_type=tuple(lane.type for lane in lanes),
+            lane_type=tuple(lane_use(lane) for lane in lanes),
             lane_s0=np.array([row[3].s for row in rows], dtype=np.float64),
             lane_s1=np.array([row[3].s_end for row in rows], dtype=np.float64),
             lane_forward=np.array([is_forward(row[1], row[4]) for row in rows], dtype=bool),

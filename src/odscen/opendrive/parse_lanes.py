@@ -233,8 +233,8 @@ def _speeds(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneS
 
 
 _ACCESS_RULES: Final[dict[str | None, str]] = {
-    None: "allow",
-    "": "allow",
+    None: "",
+    "": "",
     "allow": "allow",
     "deny": "deny",
 }

@@ -87,7 +87,7 @@ class LaneHeight(NamedTuple):
 
 
 class LaneAccess(NamedTuple):
-    """``<access>``: ``rule`` is ``allow`` or ``deny``; ``restriction`` as in the file."""
+    """``<access>``: ``rule`` is ``allow``, ``deny`` or empty; ``restriction`` as in the file."""
 
     s: float
     rule: str
@@ -349,3 +349,41 @@ DRIVABLE_TYPES = frozenset(
 
 WALKABLE_TYPES = frozenset({"sidewalk", "walking"})
 """Lane types on which pedestrians are placed and routed; ``walking`` is 1.8's name."""
+
+_USES_BY_ACCESS: tuple[tuple[str, frozenset[str]], ...] = (
+    ("biking", frozenset({"bicycle"})),
+    ("walking", frozenset({"pedestrian"})),
+    ("taxi", frozenset({"taxi", "emergency"})),
+    ("bus", frozenset({"bus", "taxi", "emergency"})),
+    ("HOV", frozenset({"HOV", "bus", "taxi", "motorcycle", "emergency"})),
+)
+"""What a lane is that only these may use: the first of which it admits the namesake and no other.
+
+Version 1.8 has no types ``bus``, ``taxi`` and ``HOV`` any more; its files say the same by access.
+"""
+_NAMESAKES = {"biking": "bicycle", "walking": "pedestrian"}
+
+
+def access_at(lane: Lane, s: float) -> tuple[LaneAccess, ...]:
+    """Access records that hold at s of the road: all that begin where the last one began."""
+    begun = [record for record in lane.access if record.s <= s + 1e-6]
+    return tuple(record for record in begun if record.s == begun[-1].s)
+
+
+def lane_use(lane: Lane) -> str:
+    """What a lane is used as: its type, or what its access makes of a lane for driving.
+
+    Only access that holds along the whole lane makes it another one.
+    """
+    if not lane.access or lane.type not in {"driving", "shared"}:
+        return lane.type
+    first = lane.access[0].s
+    if any(record.s != first or record.rule != "allow" for record in lane.access):
+        return lane.type
+    if lane.widths and first > lane.widths[0].s + 1e-3:
+        return lane.type
+    admitted = {record.restriction for record in lane.access}
+    for use, names in _USES_BY_ACCESS:
+        if _NAMESAKES.get(use, use) in admitted and admitted <= names:
+            return use
+    return lane.type

@@ -35,6 +35,10 @@ if TYPE_CHECKING:
     from odscen.records.traces import Paths
 
 
+MOSTLY_SPREAD = 0.05
+"""Share of the time on a segment from which its figures are said to be those of whole lanes."""
+WHOLE_LANE = "figures of the whole lane, which reaches further"
+
 _CENTRE_TOLERANCE = 0.5
 """Metres by which a drawn lane may leave its centre."""
 
@@ -401,6 +405,8 @@ def _service_layer(
         if row is not None and row["speed"] is not None:
             graded = f"level {level}" if level else f"n/a ({row['vehicles']:,} vehicles)"
             words = f"{name}: {graded}, {number(row['speed'] * 3.6, 0)} km/h"
+            if (row["spread"] or 0.0) > MOSTLY_SPREAD:
+                words += f" ({WHOLE_LANE})"
         parts.append(
             element(
                 "use", element("title", words), href=f"#place-{index}", class_=_level_style(level)

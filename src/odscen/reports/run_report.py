@@ -35,7 +35,14 @@ from odscen.reports.charts import Series, line_chart
 from odscen.reports.page_templates import render_page
 from odscen.reports.report_cards import Card, figure_cards, named_cards
 from odscen.reports.report_demand import assignment_values
-from odscen.reports.report_maps import CATEGORIES, run_map, service_map, worst_incidents
+from odscen.reports.report_maps import (
+    CATEGORIES,
+    MOSTLY_SPREAD,
+    WHOLE_LANE,
+    run_map,
+    service_map,
+    worst_incidents,
+)
 from odscen.reports.report_sections import (
     corridor_values,
     diagram_values,
@@ -306,6 +313,7 @@ def _place_findings(figures: TrafficFigures) -> Iterator[str]:
             f"segment {row['segment']}, the one with most time lost, has level of service "
             f"{row['level']}: "
             f"{number(row['speed'] * 3.6, 0)} km/h for {row['vehicles']:,} vehicles"
+            + (f" ({WHOLE_LANE})" if (row["spread"] or 0.0) > MOSTLY_SPREAD else "")
         )
 
 

@@ -32,6 +32,8 @@ def found_files(folder: Path) -> dict[str, str]:
         "trajectory_parts": layout.TRAJECTORIES_FOLDER,
         "lanes": layout.LANES_FILE,
         "lane_parts": layout.LANES_FOLDER,
+        "lane_segments": layout.LANE_SEGMENTS_FILE,
+        "lane_segment_parts": layout.LANE_SEGMENTS_FOLDER,
         "trips": layout.TRIPS_FILE,
         "trip_parts": layout.TRIPS_FOLDER,
         "conflicts": layout.CONFLICTS_FILE,

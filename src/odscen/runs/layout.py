@@ -36,6 +36,10 @@ TRAJECTORIES_FOLDER = "trajectories"
 """Of a run in slices: ``part-0001.parquet`` and so on, which read as one table."""
 LANES_FILE = "lanes.parquet"
 LANES_FOLDER = "lanes"
+POSITIONS_FILE = "positions.parquet"
+"""SUMO's own, where no trajectories are recorded; what is in it goes into the parts of lanes."""
+LANE_SEGMENTS_FILE = "lane_segments.parquet"
+LANE_SEGMENTS_FOLDER = "lane_segments"
 EMISSIONS_FILE = "emissions.parquet"
 """SUMO's own; what is in it goes into the lanes."""
 TRIPS_FILE = "trips.parquet"
@@ -63,6 +67,7 @@ LIGHTS_FILE = "signals.json"
 RECORDED = {
     TRAJECTORIES_FILE: TRAJECTORIES_FOLDER,
     LANES_FILE: LANES_FOLDER,
+    LANE_SEGMENTS_FILE: LANE_SEGMENTS_FOLDER,
     TRIPS_FILE: TRIPS_FOLDER,
     CONFLICTS_FILE: CONFLICTS_FOLDER,
     LIGHT_STATES_FILE: LIGHT_STATES_FOLDER,

@@ -17,11 +17,14 @@ from odscen.figures.by_place.facilities import (
     passage_sums,
 )
 from odscen.figures.by_place.group_figures import group_sums
+from odscen.figures.by_place.lane_parts import lane_parts, part_sums, parts_on_clock
 from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.figures.by_place.parking_use import ParkingUse
+from odscen.figures.by_place.queue_metres import positions
 from odscen.figures.by_place.queues import queue_lengths
 from odscen.figures.by_place.station_figures import station_figures
 from odscen.figures.by_place.traffic import traffic_figures
+from odscen.figures.by_place.traffic_sums import summable
 from odscen.figures.measures.figure import RunData
 from odscen.figures.measures.signal_use import signal_use, write_signal_use
 from odscen.figures.measures.traffic_files import figures_json, write_stations, write_tables
@@ -32,6 +35,7 @@ from odscen.runs import layout
 from odscen.runs.net_facts import read_net_facts
 from odscen.runs.recorded import (
     read_conflicts,
+    read_lane_segments,
     read_lanes,
     read_light_states,
     read_stays,
@@ -117,25 +121,93 @@ class _Records:
         return programs_from_json(file.read_text(encoding="utf-8", errors="replace")), states
 
 
-def _figures(records: _Records, *, end: float, times: AnalysisTimes) -> TrafficFigures | None:
-    lanes, places, rows = records.lanes, records.places, records.rows
+def read_parts(run: Path, *, end: float, meso: bool = False) -> pl.DataFrame | None:
+    """Read what was driven on parts of lanes, over the intervals that lanes were measured over.
+
+    Returns
+    -------
+    As :func:`odscen.figures.by_place.lane_parts.part_sums`; ``None`` if it is not known.
+
+    Raises
+    ------
+    InputError
+        If the places of lanes cannot be read.
+    """
+    records = _Records(run, meso=meso)
+    if records.lanes is None or records.places is None:
+        return None
+    return _part_sums(records, records.places, WHOLE_RUN.clock(records.lanes, end=end))
+
+
+def _part_sums(records: _Records, places: LanePlaces, clock: pl.DataFrame) -> pl.DataFrame | None:
+    """Parts of lanes from what the run has summed up itself, or from its trajectories."""
+    measured = read_lane_segments(records.run)
+    if measured is not None:
+        return parts_on_clock(measured, clock)
+    rows, facts = records.rows, records.facts
+    if rows is None:
+        return None
+    if facts is None:
+        return part_sums(rows, places, clock)
+    return part_sums(
+        rows,
+        places,
+        clock,
+        positions=lambda some: positions(some, facts),
+        drivers=facts.drivers,
+    )
+
+
+def read_lane_figures(
+    run: Path, *, end: float, meso: bool = False, times: AnalysisTimes = WHOLE_RUN
+) -> TrafficFigures | None:
+    """Figures by place as of :func:`read_figures`, without queues, control delay and lane groups.
+
+    Raises
+    ------
+    InputError
+        If the places of lanes cannot be read, or times do not fit what was measured.
+    """
+    records = _Records(run, meso=meso)
+    measured = _measured(records, end=end, times=times)
+    if measured is None:
+        return None
+    places, clock, lanes, parts = measured
+    return traffic_figures(lanes, places, end=end, times=times, clock=clock, parts=parts)
+
+
+def _measured(
+    records: _Records, *, end: float, times: AnalysisTimes
+) -> tuple[LanePlaces, pl.DataFrame, pl.DataFrame, pl.DataFrame] | None:
+    """Places of lanes, intervals, what lanes had in them, and parts of lanes."""
+    lanes, places = records.lanes, records.places
     if lanes is None or places is None:
         return None
     clock = times.clock(lanes, end=end)
     lanes = on_clock(lanes, clock)
+    parts = lane_parts(summable(lanes), places, _part_sums(records, places, clock))
+    return places, clock, lanes, parts
+
+
+def _figures(records: _Records, *, end: float, times: AnalysisTimes) -> TrafficFigures | None:
+    measured, rows = _measured(records, end=end, times=times), records.rows
+    if measured is None:
+        return None
+    places, clock, lanes, parts = measured
     return traffic_figures(
         lanes,
         places,
         end=end,
         queues=None if rows is None else queue_lengths(rows, places, clock),
-        facilities=_facilities(records, lanes, places, clock),
+        facilities=_facilities(records, parts, places, clock),
         times=times,
         clock=clock,
+        parts=parts,
     )
 
 
 def _facilities(
-    records: _Records, lanes: pl.DataFrame, places: LanePlaces, clock: pl.DataFrame
+    records: _Records, parts: pl.DataFrame, places: LanePlaces, clock: pl.DataFrame
 ) -> FacilityData | None:
     """Kinds of facilities, control delay and density; ``None`` without the run's SUMO files."""
     facts, rows = records.facts, records.rows
@@ -154,7 +226,7 @@ def _facilities(
     )
     graded = rows is not None and has_highways(places, facts)
     heavy = heavy_share(rows, facts, clock) if rows is not None and graded else None
-    density = highway_density(lanes, places, facts, heavy)
+    density = highway_density(parts, places, facts, heavy)
     return FacilityData(movements, by_junction, by_movement, density, groups, group_of)
 
 

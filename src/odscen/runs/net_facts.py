@@ -161,6 +161,14 @@ def _giving_way(net: NetConnections) -> dict[str, list[str]]:
     return found
 
 
+def _metres(text: str | None) -> float | None:
+    """A place along a lane, if it is a number and not one of SUMO's words."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return None
+
+
 def _drivers(routes: Path) -> pl.DataFrame:
     import polars as pl
 
@@ -178,7 +186,17 @@ def _drivers(routes: Path) -> pl.DataFrame:
             factor = float(found.get("speedFactor", "1"))
             serves = found.find("stop") is not None
             top = min(speed, desired * factor)
-            rows.append((found.get("id"), factor, top, length, heavy, serves))
+            rows.append(
+                (
+                    found.get("id"),
+                    factor,
+                    top,
+                    length,
+                    heavy,
+                    serves,
+                    _metres(found.get("arrivalPos")),
+                )
+            )
     schema = {
         "id": pl.String,
         "factor": pl.Float64,
@@ -186,5 +204,6 @@ def _drivers(routes: Path) -> pl.DataFrame:
         "length": pl.Float64,
         "heavy": pl.Boolean,
         "serves": pl.Boolean,
+        "arrival_pos": pl.Float64,
     }
     return pl.DataFrame(rows, schema=schema, orient="row")

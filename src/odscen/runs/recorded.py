@@ -10,6 +10,7 @@ from odscen.records.row_text import with_numbered_names
 from odscen.runs.layout import (
     CALLS_FILE,
     CONFLICTS_FILE,
+    LANE_SEGMENTS_FILE,
     LANES_FILE,
     LIGHT_STATES_FILE,
     RECORDED,
@@ -125,6 +126,18 @@ def read_lanes(run: Path) -> pl.DataFrame | None:
     ``None`` if nothing was recorded, or no vehicle was there.
     """
     return _read(run, LANES_FILE)
+
+
+def read_lane_segments(run: Path) -> pl.DataFrame | None:
+    """Read what a run without trajectories has summed up on parts of lanes.
+
+    Columns as of :func:`odscen.figures.by_place.lane_parts.part_sums`.
+
+    Returns
+    -------
+    ``None`` if that was not recorded.
+    """
+    return _read(run, LANE_SEGMENTS_FILE)
 
 
 def read_trips(run: Path) -> pl.DataFrame | None:

@@ -15,11 +15,19 @@ from odscen.figures.by_place.facilities import (
     movement_facilities,
     passage_sums,
 )
+from odscen.figures.by_place.lane_parts import lane_parts
 from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.figures.by_place.level_of_service import highway_level
 from odscen.figures.by_place.traffic import over_run, traffic_figures
+from odscen.figures.by_place.traffic_sums import summable
 
 col = pl.col
+
+
+def density_of(lanes: pl.DataFrame, heavy: pl.DataFrame | None) -> pl.DataFrame:
+    return highway_density(lane_parts(summable(lanes), PLACES, None), PLACES, STOP, heavy)
+
+
 PLACES = LanePlaces.of(
     lanes=[
         ("m_0", 500.0, True, "r1", 1.0, True),
@@ -107,7 +115,10 @@ def test_at_a_two_way_stop_only_the_minor_movements_are_graded() -> None:
         PLACES,
         end=3600.0,
         facilities=FacilityData(
-            movements, by_junction, by_movement, highway_density(lanes, PLACES, STOP, None)
+            movements,
+            by_junction,
+            by_movement,
+            density_of(lanes, None),
         ),
     )
     row = over_run(found.junctions).row(0, named=True)
@@ -148,7 +159,7 @@ def test_density_of_a_highway_is_passenger_cars_per_km_and_lane() -> None:
     )
     movements = movement_facilities(PLACES, STOP)
     for heavy, density, level in ((shares, 10.0, "B"), (None, 15.0, "C")):
-        data = FacilityData(movements, None, None, highway_density(lanes, PLACES, STOP, heavy))
+        data = FacilityData(movements, None, None, density_of(lanes, heavy))
         segments = over_run(traffic_figures(lanes, PLACES, end=3600.0, facilities=data).segments)
         main, side = segments.rows(named=True)
         assert (main["facility"], main["lane_density"]) == ("highway", pytest.approx(density))

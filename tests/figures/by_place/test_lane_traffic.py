@@ -25,7 +25,7 @@ def test_sums_of_each_lane_are_those_measured_and_empty_intervals_stay_in_time()
     course = ((50, 5.0), (0, 0.0), (20, 30.0))
     found = lane_traffic(measured(course), PLACES, end=3 * INTERVAL)
     assert found.times == [0.0, INTERVAL, 2 * INTERVAL, 3 * INTERVAL]
-    assert (found.names, found.lengths) == (["a_0", "b_0"], [100.0, 200.0])
+    assert (found.names, found.lengths) == ([("a_0", "r1"), ("b_0", "r2")], [100.0, 200.0])
     assert found.sums.rows() == [
         (0, 0, 5000.0, 50 * 15.0, 250.0),
         (0, 1, 10000.0, 50 * 25.0, 250.0),
@@ -36,7 +36,7 @@ def test_sums_of_each_lane_are_those_measured_and_empty_intervals_stay_in_time()
 
 def test_lanes_that_no_map_has_are_left_out():
     lanes = measured(((5, 1.0),)).with_columns(pl.col("lane").replace({"b_0": "walk_0"}))
-    assert lane_traffic(lanes, PLACES, end=INTERVAL).names == ["a_0"]
+    assert lane_traffic(lanes, PLACES, end=INTERVAL).names == [("a_0", "r1")]
 
 
 @pytest.mark.parametrize(("most", "intervals"), [(10, 5), (9, 3), (5, 2), (3, 1), (1, 1)])

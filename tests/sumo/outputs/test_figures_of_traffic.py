@@ -27,11 +27,12 @@ from odscen.figures.by_place.facilities import (
     passage_sums,
 )
 from odscen.figures.by_place.lane_groups import LaneGroups, lane_groups
+from odscen.figures.by_place.lane_parts import lane_parts
 from odscen.figures.by_place.queue_metres import GAP, QUEUED, queue_backs, queue_sums
 from odscen.figures.by_place.queues import queue_lengths
 from odscen.figures.by_place.station_figures import station_figures
 from odscen.figures.by_place.traffic import TrafficFigures, over_run, traffic_figures
-from odscen.figures.by_place.traffic_sums import intervals
+from odscen.figures.by_place.traffic_sums import intervals, summable
 from odscen.figures.measures.figure import RunData
 from odscen.figures.measures.registry import figure_values
 from odscen.records.run_plan import PlannedStation, StationKind
@@ -158,8 +159,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     assert passed is not None
     kinds = movement_facilities(places, facts)
     clock = intervals(table, UNTIL)
+    parts = lane_parts(summable(table), places, None)
     facilities = FacilityData(
-        kinds, *passage_sums(passed, kinds, clock), highway_density(table, places, facts, None)
+        kinds, *passage_sums(passed, kinds, clock), highway_density(parts, places, facts, None)
     )
     figures = traffic_figures(table, places, end=UNTIL, queues=queues, facilities=facilities)
     groups = lane_groups(places, facts)

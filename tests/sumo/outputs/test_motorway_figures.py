@@ -1,8 +1,8 @@
 """Density, speed and level of a motorway against Edie's definitions on the trajectories alone.
 
 Edie (1963): in ``T`` seconds on ``L`` metres, ``density = seconds / (T L)`` and
-``speed = metres / seconds``, of all vehicles there. A record stands for the step that ends with it;
-in the middle of a step, on average, vehicles come onto the road and leave it.
+``speed = metres / seconds``, of all vehicles there. Each step is cut into parts, and each part
+counts for the segment that its middle lies in.
 """
 
 from __future__ import annotations
@@ -12,7 +12,13 @@ from typing import NamedTuple
 import polars as pl
 import pytest
 
+from odscen.figures.by_place.analysis_times import WHOLE_RUN
+from odscen.figures.by_place.lane_parts import part_sums
+from odscen.figures.by_place.queue_metres import positions
 from odscen.runs.finished_run import Run
+from odscen.runs.net_facts import read_net_facts
+from odscen.runs.recorded import read_lanes
+from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario import edits
 from odscen.scenario.edits.demand_edits import set_input
@@ -26,6 +32,8 @@ MAP = "motorway_weave"
 STEP, WARM_UP, UNTIL = 0.2, 120.0, 420.0
 CLOSE = 0.01
 MILE = 1.609344
+PARTS = 4
+"""Of a step."""
 LEVELS = ((11.0, "A"), (18.0, "B"), (26.0, "C"), (35.0, "D"), (45.0, "E"))
 """HCM Exhibit 12-15: passenger cars per mile and lane up to which a segment has the level."""
 
@@ -35,6 +43,7 @@ class Motorway(NamedTuple):
 
     figures: pl.DataFrame
     edie: pl.DataFrame
+    run: Run
 
 
 @pytest.fixture(scope="module")
@@ -49,35 +58,57 @@ def motorway(tmp_path_factory: pytest.TempPathFactory) -> Motorway:
             to=(("r5-2", 1),),
         )  # fmt: skip
     scenario = edits.set_simulation(scenario, duration=UNTIL, step_length=STEP)
-    settings = RunSettings(warm_up=WARM_UP, interval=300.0)
+    recording = Recording(columns=("lane", "pos"))
+    settings = RunSettings(warm_up=WARM_UP, interval=300.0, recording=recording)
     prepared = prepare(scenario, sumo_map, net_file(MAP, folder), settings=settings)
     run = run_prepared(prepared, folder / "run")
     lanes = run.lane_places().lanes.filter("motor")
     figures = run.figures_by("segment", over_time=True).filter(col("facility") == "highway")
-    return Motorway(figures, edie(run, lanes))
+    return Motorway(figures, edie(run, lanes), run)
 
 
 def edie(run: Run, lanes: pl.DataFrame) -> pl.DataFrame:
     """Vehicle-seconds and metres of each segment, with passenger cars and metres of lane."""
-    rows = run.trajectories().sort("id", "time").with_columns(
-        first=col("time") == col("time").min().over("id"),
-        last=(col("time") == col("time").max().over("id")) & (col("time") < UNTIL - STEP),
-        cars=pl.when(col("category") == "truck").then(2.0).otherwise(1.0),
+    rows = (
+        pl.read_parquet(run.folder / "trajectories.parquet")
+        .select(
+            id="vehicle_id", time="timestep_time", lane="vehicle_lane", pos="vehicle_pos",
+            speed="vehicle_speed",
+        )
+        .sort("id", "time")
+        .with_columns(old=col("lane").shift().over("id"), was=col("pos").shift().over("id"))
+        .drop_nulls("old")
+        .filter(col("time") >= WARM_UP)
     )  # fmt: skip
-    part = pl.when("first").then(0.5).when("last").then(1.5).otherwise(1.0) * STEP
+    trucks = run.actors().filter(col("category") == "truck")["id"].implode()
+    shares = pl.DataFrame({"share": [(k + 0.5) / PARTS for k in range(PARTS)]})
+    back = col("pos") - col("speed") * STEP * (1.0 - col("share"))
+    beside = col("lane").str.head(-1) == col("old").str.head(-1)
+    on_old = (col("lane") != col("old")) & ((back < 0.0) | beside)
+    steps = rows.join(shares, how="cross").select(
+        lane=pl.when(on_old).then("old").otherwise("lane"),
+        pos=pl.when(on_old).then(col("was") + col("speed") * STEP * col("share")).otherwise(back),
+        metres=col("speed") * STEP / PARTS,
+        cars=pl.when(col("id").is_in(trucks)).then(2.0).otherwise(1.0) * STEP / PARTS,
+    )
+    own = lanes.with_columns(
+        begin=(col("share").cum_sum().over("lane") - col("share")) * col("length")
+    )
     metres = lanes.group_by("segment").agg(lane_metres=(col("length") * col("share")).sum())
     return (
-        rows.filter(col("time") > WARM_UP)
-        .join(lanes, on="lane")
-        .with_columns(seconds=part * col("share"))
+        steps.sort("pos")
+        .join_asof(
+            own.select("lane", "segment", "begin").sort("begin"),
+            left_on="pos", right_on="begin", by="lane", check_sortedness=False,
+        )
         .group_by("segment")
         .agg(
-            seconds=col("seconds").sum(),
-            metres=(col("seconds") * col("speed")).sum(),
-            cars=(col("seconds") * col("cars")).sum(),
+            seconds=pl.len() * (STEP / PARTS),
+            metres=col("metres").sum(),
+            cars=col("cars").sum(),
         )
         .join(metres, on="segment")
-    )
+    )  # fmt: skip
 
 
 def test_density_speed_and_level_of_each_segment_are_edies_and_hcms(motorway: Motorway) -> None:
@@ -98,3 +129,25 @@ def test_density_speed_and_level_of_each_segment_are_edies_and_hcms(motorway: Mo
         level = next((level for most, level in LEVELS if cars * MILE <= most), "F")
         assert row["level"] == level, name
     assert busy["level"].n_unique() >= 2, "the same level everywhere would show nothing"
+
+
+def test_places_along_curved_lanes_are_found_from_x_and_y(motorway: Motorway) -> None:
+    run, facts = motorway.run, read_net_facts(motorway.run.folder)
+    lanes = read_lanes(run.folder)
+    assert facts is not None
+    assert lanes is not None
+    clock = WHOLE_RUN.clock(lanes, end=UNTIL)
+    rows = pl.read_parquet(run.folder / "trajectories.parquet").lazy()
+    recorded = part_sums(rows, run.lane_places(), clock)
+    found = part_sums(
+        rows.drop("vehicle_pos"),
+        run.lane_places(),
+        clock,
+        positions=lambda some: positions(some, facts),
+    )
+    assert recorded is not None
+    assert found is not None
+    both = recorded.join(found, on=("lane", "part", "begin"), suffix="_found")
+    assert both.height > 100
+    for name in ("seconds", "distance"):
+        assert (both[name] - both[f"{name}_found"]).abs().max() < 0.01 * both[name].max()

@@ -13,6 +13,7 @@ from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.figures.by_place.lane_traffic import LaneTraffic, lane_traffic
 from odscen.runs.ended import read_summary
 from odscen.runs.layout import LANE_PLACES_FILE, SCENARIO_FILE
+from odscen.runs.measured import read_parts
 from odscen.runs.recorded import read_lanes
 
 if TYPE_CHECKING:
@@ -52,19 +53,30 @@ def traffic_on_map(workspace: Workspace, run: Path) -> TrafficOnMap:
             "the run has no lane data: nothing was measured, or no vehicle departed", file=str(run)
         )
     places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
-    end = float(read_summary(run)["sim_seconds"])
-    found = lane_traffic(lanes, places, end=end)
+    summary = read_summary(run)
+    end = float(summary["sim_seconds"])
+    measured = read_parts(run, end=end, meso=bool(summary.get("meso")))
+    found = lane_traffic(lanes, places, end=end, measured=measured)
     scenario = read_scenario(run / SCENARIO_FILE)
     return TrafficOnMap(found, _stretches(map_of(workspace, scenario).sumo, found.names))
 
 
-def _stretches(sumo: SumoMap, names: list[str]) -> NodeStretches:
-    """Stretches of lanes of the map whose nodes lie on one of these SUMO lanes."""
-    rows = {name: row for row, name in enumerate(names)}
-    places = sumo.lane_places
+def _stretches(sumo: SumoMap, names: list[tuple[str, str]]) -> NodeStretches:
+    """Stretches of lanes of the map whose nodes lie on one of these SUMO lanes and segments."""
+    rows: dict[str, list[int]] = {}
+    for row, (lane, _) in enumerate(names):
+        rows.setdefault(lane, []).append(row)
+    places, own = sumo.lane_places, sumo.graph.lanes.lane
     # The last entry is of nodes that lie on no SUMO lane, whose row is -1.
-    of_lane = np.array([*(rows.get(name, -1) for name in places.lanes), -1], dtype=np.int32)
-    wanted, own = of_lane[places.lane], sumo.graph.lanes.lane
+    only = (some[0] if len(some := rows.get(name, [-1])) == 1 else -1 for name in places.lanes)
+    wanted = np.array([*only, -1], dtype=np.int32)[places.lane]
+    ids = np.asarray(sumo.graph.segments.ids)
+    for number, lane in enumerate(places.lanes):
+        if len(rows.get(lane, ())) > 1:
+            nodes = np.flatnonzero(places.lane == number)
+            of_segment = {names[row][1]: row for row in rows[lane]}
+            segments = ids[sumo.graph.lanes.segment[nodes]]
+            wanted[nodes] = [of_segment.get(str(one), -1) for one in segments]
     changes = (np.diff(wanted) != 0) | (np.diff(own) != 0)
     first = np.concatenate([[0], np.flatnonzero(changes) + 1]).astype(np.int32)
     end = np.append(first[1:], len(wanted)).astype(np.int32)

@@ -9,12 +9,12 @@ import numpy as np
 from odscen.base.ids import LaneKey
 from odscen.base.shown import shown_id
 from odscen.convert.lane_table.coverage import covered_metres, kept_lanes, lane_lengths
-from odscen.convert.model.access import is_used
+from odscen.convert.model.access import allowed, has_class, is_used, vehicle_classes
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
-from odscen.convert.model.edge_plan import LEAST_WIDTH
+from odscen.convert.model.edge_plan import LEAST_WIDTH, NO_WIDTH
 from odscen.convert.model.net import CROSSING
 from odscen.opendrive.objects import is_crosswalk, signal_kind
-from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
+from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES, lane_use
 from odscen.opendrive.topology import dead_ends
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
     from odscen.convert.signals.map_signals import SignalControl
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.road_model import OpenDrive, Signal
+    from odscen.opendrive.road_model import Lane, LaneAccess, OpenDrive, Signal
 
 
 def one_way_ends(
@@ -71,6 +71,9 @@ BOTH_WAYS = "bidirectional"
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
 
+WIDTH_PLACES = 9
+"""Places along a lane at which its width is looked at."""
+
 AREA = 1.5
 """Metres of a walk that walking areas, which are no lanes, may take without an entry."""
 
@@ -102,6 +105,7 @@ def findings(
     entries = [
         *_lanes(odr, table, lanes),
         *_varying(table, lanes),
+        *_access(odr),
         *(ReportEntry(ElementOutcome.LOST, _place(*lost.lane), lost.reason) for lost in found.lost),
         *nowhere,
         *one_way_ends(odr, table, found),
@@ -151,9 +155,8 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
             gap = length - covered.get(key, 0.0)
             if gap > (AREA if kind in WALKABLE_TYPES and gap < length else WORTH_TELLING):
                 where = "" if odr.roads[key.road].junction is None else " of a connecting road"
-                reason = (
-                    f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: nothing leads there"
-                )
+                why = _why_uncovered(odr, table, row)
+                reason = f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: {why}"
                 yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
             if odr.roads[key.road].sections[key.section].lanes[key.lane].direction == "both":
                 reason = "open both ways; SUMO has it in one direction only, that of its side"
@@ -163,6 +166,51 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(key.road)}", reason)
+
+
+def _why_uncovered(odr: OpenDrive, table: RoadTable, row: int) -> str:
+    """Why a lane, or a part of it, has no SUMO lane."""
+    key = table.lane_keys[row]
+    lane = odr.roads[key.road].sections[key.section].lanes[key.lane]
+    middle = 0.5 * float(table.lane_s0[row] + table.lane_s1[row])
+    if lane.access and not vehicle_classes(lane, middle) and lane.type not in WALKABLE_TYPES:
+        return "by its access no vehicle may use it"
+    s = np.linspace(table.lane_s0[row], table.lane_s1[row], WIDTH_PLACES)
+    widths = table.lane_width(np.full(WIDTH_PLACES, row), s)
+    if float(widths.max()) < LEAST_WIDTH:
+        return f"it is {float(widths.max()):.2f} m wide at most"
+    if float(widths.min()) < NO_WIDTH:
+        return "its width falls to zero"
+    if odr.roads[key.road].junction is not None:
+        return "no shortest connection between two lanes runs over it"
+    return "nothing leads there"
+
+
+def _access(odr: OpenDrive) -> Iterator[ReportEntry]:
+    """What became of ``<access>`` of lanes."""
+    for road in odr.roads.values():
+        for number, section in enumerate(road.sections):
+            for lane in section.lanes.values():
+                for record in lane.access:
+                    yield _access_entry(_place(road.id, number, lane.id), lane, record)
+
+
+def _access_entry(element: str, lane: Lane, record: LaneAccess) -> ReportEntry:
+    rule, name = record.rule, record.restriction
+    if not rule:
+        reason = f"access of {name or 'nobody'} without a rule: it may allow or deny; left out"
+        return ReportEntry(ElementOutcome.LOST, element, reason)
+    if not has_class(record):
+        reason = f"access: {rule} {name} has no vehicle class in SUMO; left out"
+        return ReportEntry(ElementOutcome.LOST, element, reason)
+    if not allowed(lane_use(lane)):
+        reason = f"access: {rule} {name} on a lane that no vehicle of SUMO uses; left out"
+        outcome = ElementOutcome.LOST
+        if lane_use(lane) in WALKABLE_TYPES and (rule, name) == ("allow", "pedestrian"):
+            outcome, reason = ElementOutcome.KEPT, "access: open to pedestrians"
+        return ReportEntry(outcome, element, reason)
+    classes = ", ".join(sorted(vehicle_classes(lane, record.s))) or "no vehicle"
+    return ReportEntry(ElementOutcome.KEPT, element, f"access from s={record.s:g}: {classes}")
 
 
 def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:

@@ -29,7 +29,8 @@ from odscen.convert.lane_table.table import (
     simplified,
 )
 from odscen.convert.model.access import speed as lane_speed
-from odscen.convert.model.connections import find_connections
+from odscen.convert.model.access import vehicle_classes
+from odscen.convert.model.connections import LostConnection, find_connections
 from odscen.convert.model.conversion_report import ConversionReport, parser_entries
 from odscen.convert.model.edge_plan import merge_gaps, plan_edges, side_gaps
 from odscen.convert.model.lane_alignment import divided, evaluate
@@ -244,7 +245,7 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     crosswalks, under = place_crosswalks(odr, table)
     gaps = merge_gaps(odr, under, side_gaps(sides))
     plans = plan_edges(odr, table, successors, gaps, lefthand=lefthand)
-    found = find_connections(table, successors, plans, sides)
+    found = _open_connections(odr, table, find_connections(table, successors, plans, sides))
     nodes = find_nodes(odr, table, found, gaps, crosswalks, sides)
     on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
     builder = _NetworkBuilder(odr, table, found, nodes, on_foot, lefthand=lefthand)
@@ -253,6 +254,35 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     entries, figures = findings(odr, table, net, lanes, found, builder.control, crosswalks)
     report = ConversionReport.of([*parser_entries(odr.notes), *entries], figures)
     return SumoNetwork(net_xml(net), lanes, report)
+
+
+def shared_classes(
+    odr: OpenDrive, table: RoadTable, edges: Sequence[EdgePlan], connection: PlannedConnection
+) -> frozenset[str]:
+    """Vehicle classes that may use both lanes of a connection, and by access all lanes between."""
+    source = edges[connection.source].lanes[connection.source_lane]
+    classes = source.allowed & edges[connection.target].lanes[connection.target_lane].allowed
+    for stretch in connection.alignment:
+        key = table.lane_keys[stretch.row]
+        lane = odr.roads[key.road].sections[key.section].lanes[key.lane]
+        if lane.access:
+            classes &= vehicle_classes(lane, 0.5 * (stretch.start + stretch.end))
+    return classes
+
+
+def _open_connections(
+    odr: OpenDrive, table: RoadTable, found: PlannedConnections
+) -> PlannedConnections:
+    """Leave out connections that no vehicle may use: for SUMO no permission is every permission."""
+    kept, lost = [], []
+    for connection in found.connections:
+        if shared_classes(odr, table, found.edges, connection):
+            kept.append(connection)
+            continue
+        last = found.edges[connection.source].lanes[connection.source_lane].alignment[-1]
+        reason = "no vehicle class may use this lane and the one that it leads to"
+        lost.append(LostConnection(table.lane_keys[last.row], reason))
+    return replace(found, connections=tuple(kept), lost=(*found.lost, *lost)) if lost else found
 
 
 def _keeps_left(table: RoadTable) -> bool:
@@ -432,7 +462,7 @@ class _NetworkBuilder:
             movement,
             line.length,
             self._speed(connection, line, movement.turn, around=min(source.speed, target.speed)),
-            source.allowed & target.allowed,
+            shared_classes(self._odr, self._table, self._edges, connection),
             source.type,
             self._origins(connection.alignment),
             self.control.lights[number],

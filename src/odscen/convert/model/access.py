@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
+from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES, access_at, lane_use
+
+if TYPE_CHECKING:
+    from odscen.opendrive.road_model import Lane, LaneAccess
 
 BICYCLE_TYPES = frozenset({"biking"})
 
@@ -58,6 +62,60 @@ def allowed(lane_type: str) -> frozenset[str]:
     if lane_type in DRIVABLE_TYPES:
         return _MOTOR if lane_type in _RAMP_TYPES else _MOTOR | _SLOW
     return frozenset()
+
+
+_BY_RESTRICTION = {
+    "passengercar": frozenset({"private", "passenger", "evehicle", "hov", "vip"}),
+    "bus": frozenset({"bus", "coach"}),
+    "delivery": frozenset({"delivery"}),
+    "emergency": frozenset({"emergency", "authority"}),
+    "taxi": frozenset({"taxi"}),
+    "truck": frozenset({"truck", "trailer"}),
+    "trucks": frozenset({"truck", "trailer"}),
+    "bicycle": frozenset({"bicycle"}),
+    "motorcycle": frozenset({"motorcycle", "moped"}),
+    "hov": frozenset({"hov"}),
+    "pedestrian": PEDESTRIAN,
+}
+"""SUMO's classes by the standard's names of road users (``e_accessRestrictionType``), lower case.
+
+``simulator``, ``autonomousTraffic`` and ``throughTraffic`` tell vehicles of one class apart by who
+drives them and where to, which no lane of SUMO does.
+"""
+_RIGHT_OF_WAY = frozenset({"emergency", "authority"})
+"""Who may use every lane for vehicles that is reserved for some."""
+
+
+def has_class(access: LaneAccess) -> bool:
+    """Whether SUMO can have an access record: it has a rule and names a class, or nobody."""
+    name = access.restriction.lower()
+    return access.rule in ("allow", "deny") and (name in _BY_RESTRICTION or name == "none")
+
+
+def vehicle_classes(lane: Lane, s: float) -> frozenset[str]:
+    """Vehicle classes on a lane at s of its road, by its type and by ``<access>``.
+
+    Of the records that hold there those that allow name all who may use the lane, and those that
+    deny take classes from them. ``none`` restricts nobody. On a lane whose type is reserved, those
+    whom access allows are added.
+    """
+    kind = lane_use(lane)
+    base = allowed(kind)
+    if not lane.access or not base:
+        return base
+    records = [one for one in access_at(lane, s) if has_class(one) and one.restriction != "none"]
+    granted = [_BY_RESTRICTION[one.restriction.lower()] for one in records if one.rule == "allow"]
+    denied = [_BY_RESTRICTION[one.restriction.lower()] for one in records if one.rule == "deny"]
+    classes = base
+    if granted:
+        named = frozenset[str]().union(*granted) - PEDESTRIAN
+        if kind in _RESERVED or kind in BICYCLE_TYPES:
+            classes = base | named
+        elif named and named != BICYCLE:
+            classes = named | _RIGHT_OF_WAY
+        else:
+            classes = named
+    return classes - frozenset[str]().union(*denied)
 
 
 def is_used(lane_type: str) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.convert.model.access import allowed, speed
+from odscen.convert.model.access import allowed, speed, vehicle_classes
 from odscen.convert.model.lane_alignment import LaneAlignment, Stretch
 from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
 
@@ -235,6 +235,7 @@ class _Planner:
             for lane in section.lanes.values():
                 others |= {speed.s for speed in lane.speeds}
                 others |= {mark.s for mark in lane.road_marks}
+                others |= {record.s for record in lane.access}
         kept = sorted(s for s in borders if 0.0 <= s <= road.length)
         for place in sorted(others):
             if 0.0 < place < road.length and all(abs(place - s) >= LEAST_CUT for s in kept):
@@ -255,7 +256,7 @@ class _Planner:
         rows = [
             int(r)
             for r in table.lanes_at(row, middle)
-            if allowed(table.lane_type[r])
+            if self._classes(int(r), middle)
             and float(table.lane_s1[r] - table.lane_s0[r]) >= LEAST_EDGE
             and self._widest(int(r), start, end) >= LEAST_WIDTH
         ]
@@ -276,7 +277,7 @@ class _Planner:
             states[forward].append(
                 _LaneState(
                     lane,
-                    allowed(kind),
+                    self._classes(lane, middle),
                     round(speed(float(limits[index]), kind, road_type), 2),
                     up if forward else down,
                     down if forward else up,
@@ -287,6 +288,11 @@ class _Planner:
         if self._lefthand:
             right_first = (right_first[0][::-1], right_first[1][::-1])
         return _RoadPart(start, end, *right_first)
+
+    def _classes(self, row: int, s: float) -> frozenset[str]:
+        """Vehicle classes that may use a lane at s."""
+        key = self._table.lane_keys[row]
+        return vehicle_classes(self._odr.roads[key.road].sections[key.section].lanes[key.lane], s)
 
     def _narrow_ends(self, road: Road) -> set[float]:
         """Where lanes become too narrow to be one, or wide enough."""

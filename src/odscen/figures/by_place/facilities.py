@@ -90,7 +90,8 @@ class NetFacts:
         it gives way to, and its ``turn``: SUMO's letter, mirrored where one drives on the left.
     drivers
         ``id``, ``factor`` on limits, ``max_speed`` (m/s), ``length`` (m), whether a vehicle is
-        ``heavy``, and whether it ``serves`` stops.
+        ``heavy``, whether it ``serves`` stops, and its ``arrival_pos`` (m along its last lane, null
+        if not known).
     follows
         ``lane`` and ``following``: lanes, those in junctions included, by which one drives on.
     shapes
@@ -236,17 +237,18 @@ def passage_sums(
 
 
 def highway_density(
-    lanes: pl.DataFrame, places: LanePlaces, facts: NetFacts, heavy: pl.DataFrame | None
+    parts: pl.DataFrame, places: LanePlaces, facts: NetFacts, heavy: pl.DataFrame | None
 ) -> pl.DataFrame:
     """Passenger-car seconds and metres of lane of the freeways and multilane highways.
 
     Parameters
     ----------
-    lanes
-        Per lane and interval, as SUMO measures them.
+    parts
+        From :func:`odscen.figures.by_place.lane_parts.lane_parts`.
     heavy
         ``lane``, ``begin`` and ``share``: of the vehicle-seconds there, those of heavy vehicles;
-        ``None`` without trajectories, which takes their share of all vehicles.
+        ``None`` without trajectories, which takes their share of all vehicles. Where ``parts``
+        have it, theirs counts.
 
     Returns
     -------
@@ -256,19 +258,20 @@ def highway_density(
     import polars as pl
 
     col = pl.col
-    motor, known = facts.once("highways", places, lambda: _highways(places, facts))
+    known = facts.once("highways", places, lambda: _highways(places, facts))
     # A map without any has no row, and most maps are such.
     if known.is_empty():
         return _no_density()
     share = float(facts.drivers["heavy"].mean() or 0.0)  # type: ignore[arg-type]
-    rows = lanes.select("lane", "begin", "seconds").join(
-        motor.select("lane", "edge", "segment", part="share"), on="lane"
+    rows = parts.filter("motor").select(
+        "lane", "edge", "segment", "begin", "seconds", "heavy_seconds"
     )
     if heavy is None:
         rows = rows.with_columns(share=pl.lit(share))
     else:
         rows = rows.join(heavy, on=("lane", "begin"), how="left")
-    cars = col("seconds") * col("part") * (1.0 + col("share").fill_null(0.0) * (HEAVY_AS_CARS - 1))
+    own = pl.coalesce("heavy_seconds", col("seconds") * col("share").fill_null(0.0))
+    cars = col("seconds") + own * (HEAVY_AS_CARS - 1)
     return (
         rows.with_columns(cars=cars)
         .join(known.select("segment", "edge", "edge_of", "metres"), on=("segment", "edge"))
@@ -293,14 +296,14 @@ def _no_density() -> pl.DataFrame:
     )  # fmt: skip
 
 
-def _highways(places: LanePlaces, facts: NetFacts) -> tuple[pl.DataFrame, pl.DataFrame]:
-    """Lanes for motor vehicles, and the edges of freeways and multilane highways."""
+def _highways(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
+    """Edges of freeways and multilane highways."""
     import polars as pl
 
     col = pl.col
     motor = places.lanes.filter("motor").join(facts.limits, on="lane")
     one_way = places.segments.rename({"length": "road"})
-    known = (
+    return (
         motor.with_columns(own=col("length") * col("share"))
         .group_by("segment", "edge")
         .agg(
@@ -316,12 +319,11 @@ def _highways(places: LanePlaces, facts: NetFacts) -> tuple[pl.DataFrame, pl.Dat
         .filter((col("wide") & col("fast")).all().over("segment", "edge_of"))
         .with_columns(metres=col("metres").sum().over("segment", "edge_of"))
     )
-    return motor, known
 
 
 def has_highways(places: LanePlaces, facts: NetFacts) -> bool:
     """Whether the map has freeways or multilane highways, of which density is a figure."""
-    return not facts.once("highways", places, lambda: _highways(places, facts))[1].is_empty()
+    return not facts.once("highways", places, lambda: _highways(places, facts)).is_empty()
 
 
 def heavy_share(

@@ -17,6 +17,7 @@ from odscen.figures.by_place.level_of_service import (
     junction_level,
     street_level,
 )
+from odscen.figures.by_place.traffic_sums import SPREAD
 
 if TYPE_CHECKING:
     import polars as pl
@@ -38,7 +39,7 @@ def with_missing(table: pl.DataFrame) -> pl.DataFrame:
     types |= {"lane_group": pl.String, "demand": pl.Int64}
     names: tuple[str, ...] = ()
     if "segment" in table.columns:
-        names = ("facility", "lane_density", "car_seconds", "lane_metres")
+        names = ("facility", "lane_density", "car_seconds", "lane_metres", SPREAD, "spread")
     elif "junction" in table.columns:
         names = ("facility", "control_delay", *CONTROL)
         if "movement" in table.columns:
@@ -124,7 +125,10 @@ def place_level(*, capacity: bool = False) -> pl.Expr:
 
 
 def segment_level(free_seconds: pl.Expr) -> pl.Expr:
-    """Level of a segment: of highways by density, of others by speed over free-flow speed."""
+    """Level of a segment: of highways by density, of others by speed over free-flow speed.
+
+    F also where vehicles stand and hardly any gets in.
+    """
     import polars as pl
 
     col = pl.col
@@ -134,4 +138,5 @@ def segment_level(free_seconds: pl.Expr) -> pl.Expr:
         .then(highway_level(col("lane_density")))
         .otherwise(street_level(share))
     )
-    return pl.when(col("vehicles") >= FEWEST).then(of_kind)
+    blocked = (col("standing") >= 1.0) & (of_kind == "F")
+    return pl.when((col("vehicles") >= FEWEST) | blocked).then(of_kind)

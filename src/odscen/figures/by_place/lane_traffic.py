@@ -1,14 +1,17 @@
 """What was driven, spent and lost on each lane in each interval, as columns for a map in colours.
 
 Speed, density, flow and delay per km are quotients of these sums, of one interval or of several:
-Edie's definitions of :mod:`odscen.figures.by_place.traffic`, with the lane as the place.
+Edie's definitions of :mod:`odscen.figures.by_place.traffic`, with the lane as the place, or each of
+its parts where it lies in several segments.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.figures.by_place.analysis_times import WHOLE_RUN, on_clock
+from odscen.figures.by_place.analysis_times import WHOLE_RUN, begins_at
+from odscen.figures.by_place.lane_parts import lane_parts
+from odscen.figures.by_place.traffic_sums import summable
 
 if TYPE_CHECKING:
     import polars as pl
@@ -20,14 +23,14 @@ MOST_SUMS = 30_000
 
 
 class LaneTraffic(NamedTuple):
-    """Sums of the lanes that vehicles were on.
+    """Sums of the lanes, and parts of lanes, that vehicles were on.
 
     Attributes
     ----------
     times
         Seconds at which intervals begin, and the end of the last.
     names
-        SUMO lanes.
+        SUMO lanes, each with the segment that it, or the part of it, lies in.
     lengths
         Of each of them, metres.
     sums
@@ -37,13 +40,18 @@ class LaneTraffic(NamedTuple):
     """
 
     times: list[float]
-    names: list[str]
+    names: list[tuple[str, str]]
     lengths: list[float]
     sums: pl.DataFrame
 
 
 def lane_traffic(
-    lanes: pl.DataFrame, places: LanePlaces, *, end: float, most: int = MOST_SUMS
+    lanes: pl.DataFrame,
+    places: LanePlaces,
+    *,
+    end: float,
+    most: int = MOST_SUMS,
+    measured: pl.DataFrame | None = None,
 ) -> LaneTraffic:
     """Sum up what was measured on lanes over the intervals of a run.
 
@@ -55,25 +63,41 @@ def lane_traffic(
         When the run ended, s.
     most
         Rows from which on longer intervals are used.
+    measured
+        From :func:`odscen.figures.by_place.lane_parts.part_sums`, if there are positions.
     """
     import polars as pl
 
-    known = places.lanes.unique("lane").select("lane", "length").sort("lane")
-    used = lanes.filter(pl.col("seconds") > 0).join(known, on="lane", how="semi")
+    keys = ("lane", "segment")
     clock = WHOLE_RUN.clock(lanes, end=end)
+    used = (
+        lane_parts(summable(lanes), places, measured)
+        .filter(pl.col("seconds") > 0)
+        .group_by("begin", *keys)
+        .agg(pl.col("distance", "seconds", "time_loss").sum())
+    )
+    known = (
+        places.lanes.group_by(keys)
+        .agg(length=(pl.col("length") * pl.col("share")).sum())
+        .sort(keys)
+    )
     found = used
     while found.height > most and clock.height > 1:
         clock = _by_twos(clock)
-        found = on_clock(used, clock)
-    named = known.join(found, on="lane", how="semi").with_row_index("row")
+        found = (
+            used.with_columns(begins_at(used["begin"], clock))
+            .group_by("begin", *keys)
+            .agg(pl.col("distance", "seconds", "time_loss").sum())
+        )
+    named = known.join(found, on=keys, how="semi", maintain_order="left").with_row_index("row")
     sums = (
         found.join(clock.select("begin").with_row_index("interval"), on="begin")
-        .join(named.select("lane", "row"), on="lane")
+        .join(named.select(*keys, "row"), on=keys)
         .sort("interval", "row")
         .select("interval", pl.col("row").alias("lane"), "distance", "seconds", "time_loss")
     )
     times = [*clock["begin"].to_list(), float(clock["end"][-1])]
-    return LaneTraffic(times, named["lane"].to_list(), named["length"].to_list(), sums)
+    return LaneTraffic(times, named.select(keys).rows(), named["length"].to_list(), sums)
 
 
 def _by_twos(clock: pl.DataFrame) -> pl.DataFrame:

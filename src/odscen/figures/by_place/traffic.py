@@ -8,6 +8,9 @@ flow, density, speed
     hours on a place of ``L`` km: ``flow = distance / (L T)``, ``density = seconds / (L T)``,
     ``speed = distance / seconds``, with what all vehicles drove and the time that they spent there.
     ``speed`` is the space mean, and ``flow = density * speed``.
+place
+    Segments have what happened in them, also where a SUMO lane reaches over several:
+    :mod:`odscen.figures.by_place.lane_parts`.
 L
     Segment: its length along the road, so that flow is that of all lanes and directions together.
     Junction, movement: mean length of the connections. Network: sum over the lanes, so that flow
@@ -58,8 +61,10 @@ from odscen.figures.by_place.group_figures import (
     no_groups,
     with_groups,
 )
+from odscen.figures.by_place.lane_parts import lane_parts
 from odscen.figures.by_place.traffic_sums import (
     INTERVAL,
+    SPREAD,
     SUMS,
     junction_sums,
     movement_sums,
@@ -109,7 +114,8 @@ class TrafficFigures:
     segments
         Also ``segment``, ``travel_time`` and ``free_flow_time`` (s, along the whole segment; null
         without vehicles), ``facility``, ``lane_density`` (of highways: passenger cars per km and
-        lane of the densest direction), ``level``.
+        lane of the densest direction), ``level``; ``spread``: of ``seconds``, the share that is
+        known of whole SUMO lanes only, which reach further, and is shared out by length.
     junctions
         Also ``junction``, ``control``, ``facility``, ``control_delay`` (s per vehicle; at a two-way
         stop of the minor movements), ``passages`` that it is the mean of, ``level``, ``queue_max``
@@ -149,6 +155,7 @@ def traffic_figures(
     facilities: FacilityData | None = None,
     times: AnalysisTimes = WHOLE_RUN,
     clock: pl.DataFrame | None = None,
+    parts: pl.DataFrame | None = None,
 ) -> TrafficFigures:
     """Figures of one run.
 
@@ -167,6 +174,9 @@ def traffic_figures(
         What is analysed; queues and facilities are of the same intervals.
     clock
         Intervals that ``lanes`` have been summed up over; made of ``times`` if not given.
+    parts
+        From :func:`odscen.figures.by_place.lane_parts.lane_parts`; without them a lane that lies
+        in several segments is shared out by length.
 
     Raises
     ------
@@ -177,7 +187,9 @@ def traffic_figures(
         clock = times.clock(lanes, end=end)
         lanes = on_clock(lanes, clock)
     lanes = summable(lanes)
-    segments = segment_sums(lanes, clock, places)
+    if parts is None:
+        parts = lane_parts(lanes, places, None)
+    segments = segment_sums(parts, clock, places)
     junctions = _with_queues(junction_sums(lanes, clock, places), queues)
     movements = movement_sums(lanes, clock, places)
     found = facilities
@@ -209,7 +221,7 @@ def _over_run(columns: tuple[str, ...]) -> tuple[list[str], list[pl.Expr]]:
     import polars as pl
 
     keys = [key for key in _KEYS if key in columns]
-    summed = (*SUMS, "departed", "arrived", *CONTROL, "car_seconds", *GROUP_SUMS)
+    summed = (*SUMS, SPREAD, "departed", "arrived", *CONTROL, "car_seconds", *GROUP_SUMS)
     sums = [name for name in summed if name in columns]
     added = [
         pl.when(pl.col(name).count() > 0).then(pl.col(name).sum()).alias(name) for name in sums
@@ -271,6 +283,7 @@ def _rates(columns: tuple[str, ...]) -> tuple[list[pl.Expr], list[pl.Expr], list
         rates["free_flow_time"] = driving.then(metres * free_seconds / col("distance"))
         hours = seconds / 3600.0
         rates["lane_density"] = col("car_seconds") / 3.6 / hours / col("lane_metres")
+        rates["spread"] = pl.when(col("seconds") > 0).then(col(SPREAD) / col("seconds"))
         more["level"] = segment_level(free_seconds)
     else:
         rates["running"] = col("seconds") / seconds

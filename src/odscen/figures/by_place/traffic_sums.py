@@ -21,6 +21,8 @@ TRAFFIC = ("seconds", "distance", *EMISSIONS)
 LOST = ("time_loss", "standing_seconds")
 SUMS = ("vehicles", *TRAFFIC, *LOST)
 """Columns that are sums over time."""
+SPREAD = "spread_seconds"
+"""Column of segments: of ``seconds``, those known of whole lanes only, and shared by length."""
 
 
 def intervals(lanes: pl.DataFrame, end: float) -> pl.DataFrame:
@@ -59,18 +61,15 @@ def network_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -
     )
 
 
-def segment_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -> pl.DataFrame:
-    """Sums per segment; what happened on a lane that lies in several is shared by length."""
-    import polars as pl
+def segment_sums(parts: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -> pl.DataFrame:
+    """Sums per segment, of the parts of lanes in it.
 
-    entered = pl.when("entry").then("entered").otherwise(0) + pl.col("departed")
-    shared = [pl.col(name) * pl.col("share") for name in (*TRAFFIC, *LOST)]
-    found = (
-        lanes.join(places.lanes, on="lane")
-        .with_columns(entered.alias("vehicles"), *shared)
-        .group_by("segment", *INTERVAL)
-        .agg(_sum(*SUMS))
-    )
+    Parameters
+    ----------
+    parts
+        From :func:`odscen.figures.by_place.lane_parts.lane_parts`.
+    """
+    found = parts.group_by("segment", *INTERVAL).agg(_sum(*SUMS, SPREAD))
     return _filled(found, clock, places.segments)
 
 

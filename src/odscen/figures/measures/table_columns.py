@@ -41,6 +41,14 @@ COLUMNS = (
     _column("waiting", "s", f"stopped delay: time {_STOPPED} per vehicle; places as for `delay`"),
     _column("travel_time", "s", "segment: along all of it, at the mean speed"),
     _column("free_flow_time", "s", "segment: along all of it, at the speeds that drivers desired"),
+    _column(
+        "spread",
+        "",
+        "segment: share of the time spent there that is known of whole SUMO lanes only, which "
+        "reach further, and is shared out by length: 0 where positions were recorded. See "
+        "[figures of a segment](figures.md#figures-of-a-segment)",
+    ),
+    _column("spread_seconds", "veh*s", f"that time; {_SUM}"),
     _column("seconds", "veh*s", f"time that vehicles spent there; {_SUM}"),
     _column("time_loss", "veh*s", f"time that they lost; {_SUM}"),
     _column("standing_seconds", "veh*s", f"time that they were {_STOPPED}; {_SUM}"),

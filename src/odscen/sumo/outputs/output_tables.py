@@ -9,13 +9,19 @@ import os
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import SimulationError
+from odscen.figures.by_place.lane_parts import part_sums
+from odscen.figures.by_place.lane_places import LanePlaces
+from odscen.figures.by_place.traffic_sums import INTERVAL
 from odscen.figures.measures.summary import Trip, actor_outcomes, actors_text, outcome_row
 from odscen.records.run_events import event_line, events_text
 from odscen.runs.layout import (
     ACTORS_FILE,
     EMISSIONS_FILE,
     EVENTS_FILE,
+    LANE_PLACES_FILE,
+    LANE_SEGMENTS_FILE,
     LANES_FILE,
+    POSITIONS_FILE,
     STAYS_FILE,
     STOPINFO_FILE,
     TRAJECTORIES_FILE,
@@ -134,6 +140,7 @@ def make_tables(
     """
     tidy_part(folder / TRAJECTORIES_FILE)
     trips = tidy_outputs(folder, lengths, plan, present={}, last=True)
+    tidy_positions(folder, folder)
     tidy_conflicts(folder, plan)
     tidy_signals(folder)
     return trips
@@ -151,6 +158,42 @@ def make_results(
     """
     outcomes = actor_outcomes(plan, events, make_tables(folder, plan, lengths))
     write_results(folder, map(event_line, events), map(outcome_row, outcomes))
+
+
+def tidy_positions(folder: Path, run: Path) -> None:
+    """Replace positions of a run without trajectories by what was driven on parts of lanes.
+
+    Parameters
+    ----------
+    folder
+        Where SUMO has written, and its lane data has been made a table.
+    run
+        Has the places of lanes.
+
+    Raises
+    ------
+    SimulationError
+        If SUMO has not written them to their end.
+    """
+    import polars as pl
+
+    positions, lanes = folder / POSITIONS_FILE, folder / LANES_FILE
+    if not positions.is_file():
+        return
+    tidy_part(positions)
+    places = run / LANE_PLACES_FILE
+    if positions.is_file() and lanes.is_file() and places.is_file():
+        try:
+            found = part_sums(
+                pl.scan_parquet(positions),
+                LanePlaces.from_json(places.read_text(encoding="utf-8")),
+                pl.read_parquet(lanes, columns=list(INTERVAL)).unique().sort("begin"),
+            )
+        except pl.exceptions.PolarsError as error:
+            raise _torn(error) from error
+        if found is not None and found.height:
+            found.write_parquet(folder / LANE_SEGMENTS_FILE)
+    positions.unlink(missing_ok=True)
 
 
 def are_small(folder: Path) -> bool:

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.walk_planner import Walk
 
 
+FAR = 1000.0
+"""Metres of a lane from which the mean speed on it says nothing of its beginning."""
+
+
 @dataclass(frozen=True, slots=True)
 class HeldActor:
     """A road user that is not inserted before a rule says so: SUMO's words for its departure.
@@ -74,6 +78,7 @@ class RoutesFile:
         bays: Collection[str] = (),
         speed: float = 0.0,
         most: float = math.inf,
+        stretch: float = 0.0,
         looks_every: float | None = None,
     ) -> None:
         """Add a vehicle that drives ``route``.
@@ -86,11 +91,15 @@ class RoutesFile:
             At departure, m/s, of one that does not enter from outside.
         most
             Highest speed at which SUMO lets it depart, m/s.
+        stretch
+            Length of the lane that it departs on, m.
         looks_every
             Seconds after which the driver looks for a quicker route again; ``None`` is never.
         """
         appears, held = appears_at(user), self.holds_back(user)
         begin = speed if held else min(speed, most)
+        # A queue far ahead, on the same lane, slows nobody down where they drive in.
+        entry = "max" if stretch > FAR and not held else "avg"
         attributes = [
             ("id", user.id),
             ("type", self._type(user.category.value, driver)),
@@ -99,7 +108,7 @@ class RoutesFile:
             ("departPos", "stop" if user.begins else number(route.depart_pos, digits=4)),
             # That of the vehicles ahead: a free lane then takes what HCM gives it. With "max" a
             # lane of a motorway takes a tenth less at steps of 1 s.
-            ("departSpeed", "avg" if user.entering else number(_bounded(begin), digits=4)),
+            ("departSpeed", entry if user.entering else number(_bounded(begin), digits=4)),
             ("departPosLat", number(route.depart_pos_lat, digits=4)),
             ("arrivalLane", "current" if route.arrival_lane is None else str(route.arrival_lane)),
             ("arrivalPos", number(route.arrival_pos, digits=4)),

@@ -14,6 +14,7 @@ from odscen.runs.layout import (
     MEASURES_FILE,
     NET_FILE,
     PARKING_FILE,
+    POSITIONS_FILE,
     REGION_FILE,
     ROUTES_FILE,
     SIGNALS_FILE,
@@ -24,6 +25,9 @@ from odscen.runs.layout import (
     TRIPINFO_FILE,
 )
 from odscen.runs.recording import REGION_ID, Recording
+
+POSITIONS_EVERY = 5.0
+"""Seconds between the positions of a run without trajectories, which are not kept."""
 
 SQUEEZE = 120.0
 """Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.
@@ -193,7 +197,7 @@ def _outputs(settings: SumocfgSettings) -> dict[str, str]:
         unended = {"stop-output.write-unfinished": "true"} if settings.parking else {}
         trips = {"stop-output": STOPINFO_FILE, **unended, **trips}
     if not recording.trajectories:
-        return trips
+        return {**(_positions() if settings.measures and not settings.meso else {}), **trips}
     outputs = {
         "fcd-output": TRAJECTORIES_FILE,
         "fcd-output.attributes": ",".join(recording.attributes(elevation=settings.elevation)),
@@ -204,3 +208,13 @@ def _outputs(settings: SumocfgSettings) -> dict[str, str]:
     if recording.region is not None:
         outputs["fcd-output.filter-shapes"] = REGION_ID
     return {**outputs, **trips}
+
+
+def _positions() -> dict[str, str]:
+    """Positions now and then, from which the parts of lanes have their shares."""
+    return {
+        "fcd-output": POSITIONS_FILE,
+        "fcd-output.attributes": "id,lane,pos,speed",
+        "fcd-output.skip-empty": "true",
+        "device.fcd.period": f"{POSITIONS_EVERY:g}",
+    }

@@ -35,7 +35,7 @@ from odscen.runs.checkpoint import (
 from odscen.runs.parts import tidy_part
 from odscen.runs.run_status import write_status
 from odscen.sumo.outputs.conflict_files import tidy_conflicts
-from odscen.sumo.outputs.output_tables import tidy_outputs, trips_in, write_results
+from odscen.sumo.outputs.output_tables import tidy_outputs, tidy_positions, trips_in, write_results
 from odscen.sumo.outputs.signal_log import tidy_signals
 
 if TYPE_CHECKING:
@@ -80,6 +80,7 @@ class Written:
             check_state(part / STATE_FILE)
         tidy_part(part / layout.TRAJECTORIES_FILE)
         tidy_outputs(part, self.lengths, plan, present=self.lanes, parked=self.parked, last=last)
+        tidy_positions(part, run)
         tidy_conflicts(part, plan)
         tidy_signals(part)
         checkpoint = replace(self.checkpoint, files=fingerprints(part, _CONTENTS))

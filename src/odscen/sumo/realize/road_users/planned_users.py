@@ -190,6 +190,9 @@ class RoadUserWriter:
                     bays=self._bays,
                     speed=speed,
                     most=most,
+                    stretch=self._net.edge_lanes[planned.route.edges[0]][
+                        planned.route.depart_lane
+                    ].length,
                     looks_every=self._period if self._ways.informed(user) else None,
                 )
             self.notes += [f"{user.id}: {repair.words}" for repair in planned.route.repairs]

@@ -1,0 +1,186 @@
+"""Who may use a lane: by its type and by ``<access>``, in both forms of the standard."""
+
+from __future__ import annotations
+
+import pytest
+
+from odscen.base.ids import LaneKey, RoadId
+from odscen.convert.building.network import build_network
+from odscen.convert.lane_table.sumo_network import SumoNetwork
+from odscen.convert.model.access import allowed
+from odscen.lanegraph.build_graphs import build_map_graph
+from odscen.lanegraph.graphs import MapGraph
+from odscen.opendrive.lanes import RoadTable
+from odscen.opendrive.parse import parse
+from odscen.opendrive.road_model import OpenDrive
+from tests.opendrive.snippets import document, lane, road, section
+
+
+def access(rule: str, *names: str, new: bool = False, s: float = 0.0) -> str:
+    """``<access>`` in the form of 1.4 to 1.7, or in that of 1.8."""
+    start = f'<access sOffset="{s}" rule="{rule}"'
+    if new:
+        inside = "".join(f'<restriction type="{name}"/>' for name in names)
+        return f"{start}>{inside}</access>"
+    return "".join(f'{start} restriction="{name}"/>' for name in names)
+
+
+def one_lane(inside: str, kind: str = "driving") -> OpenDrive:
+    return parse(document(road(lanes=section(lane(-1, inside=inside, kind=kind)))))
+
+
+def built(odr: OpenDrive) -> tuple[SumoNetwork, MapGraph]:
+    table = RoadTable.of(odr)
+    graph = build_map_graph(odr, name="m", sha256="0", table=table)
+    return build_network(odr, table, graph.walks), graph
+
+
+def permissions(odr: OpenDrive) -> list[frozenset[str]]:
+    """Classes of the lanes for vehicles, in the order of the network."""
+    network, _ = built(odr)
+    return [
+        one.allowed
+        for one in network.table.lanes.values()
+        if one.allowed != frozenset({"pedestrian"})
+    ]
+
+
+@pytest.mark.parametrize("new", [False, True])
+@pytest.mark.parametrize(
+    ("rule", "names", "classes"),
+    [
+        ("allow", ("bus",), allowed("bus")),
+        ("allow", ("bus", "taxi"), allowed("bus") | {"taxi"}),
+        ("allow", ("taxi",), allowed("taxi")),
+        ("allow", ("bicycle",), frozenset({"bicycle"})),
+        ("deny", ("bicycle",), allowed("driving") - {"bicycle"}),
+        ("deny", ("truck",), allowed("driving") - {"truck", "trailer"}),
+        ("deny", ("trucks", "bus"), allowed("driving") - {"truck", "trailer", "bus", "coach"}),
+        (
+            "deny",
+            ("passengerCar",),
+            allowed("driving") - {"passenger", "private", "evehicle", "hov", "vip"},
+        ),
+        (
+            "allow",
+            ("delivery", "truck"),
+            {"delivery", "truck", "trailer", "emergency", "authority"},
+        ),
+        ("allow", ("none",), allowed("driving")),
+        ("deny", ("none",), allowed("driving")),
+        ("allow", ("simulator",), allowed("driving")),
+        ("deny", ("throughTraffic",), allowed("driving")),
+        ("deny", ("pedestrian",), allowed("driving")),
+    ],
+)
+def test_access_of_both_forms_is_the_permission_of_the_sumo_lane(
+    rule: str, names: tuple[str, ...], classes: frozenset[str], new: bool
+) -> None:
+    assert permissions(one_lane(access(rule, *names, new=new))) == [frozenset(classes)]
+
+
+def test_a_lane_is_what_access_makes_of_it_in_the_lane_graph_too() -> None:
+    for name, kind in (("bus", "bus"), ("taxi", "taxi"), ("HOV", "HOV")):
+        assert built(one_lane(access("allow", name)))[1].lanes.lanes.types == (kind,)
+    assert built(one_lane(access("allow", "bicycle")))[1].lanes.lanes.types == ()
+    assert built(one_lane(access("deny", "truck")))[1].lanes.lanes.types == ("driving",)
+
+
+def test_a_bus_lane_is_one_by_its_type_and_by_access_alike() -> None:
+    by_type, by_access = one_lane("", kind="bus"), one_lane(access("allow", "bus"))
+    assert built(by_type)[0].net_xml == built(by_access)[0].net_xml
+
+
+def test_access_that_begins_on_the_way_cuts_the_edge_there() -> None:
+    odr = one_lane(access("deny", "truck", s=40.0) + access("deny", "none", s=70.0))
+    network, _ = built(odr)
+    lanes = [network.table.lanes[one] for one in sorted(network.table.lanes) if ".f_" in one]
+    assert ["truck" in one.allowed for one in lanes] == [True, False, True]
+    assert [round(one.length) for one in lanes] == [40, 30, 30]
+
+
+def test_access_of_a_connecting_lane_is_the_permission_of_the_internal_lane() -> None:
+    link = '<{} elementType="{}" elementId="{}" {}/>'
+    on = '<link><predecessor id="-1"/><successor id="-1"/></link>'
+    plan = '<geometry s="0" x="{}" y="0" hdg="0" length="{}"><line/></geometry>'
+    inner = road(
+        "7",
+        length=20.0,
+        plan=plan.format(100, 20),
+        junction="5",
+        lanes=section(lane(-1, inside=on + access("deny", "truck"))),
+        link=link.format("predecessor", "road", "1", 'contactPoint="end"')
+        + link.format("successor", "road", "2", 'contactPoint="start"'),
+    )
+    odr = parse(
+        document(
+            road("1", lanes=section(lane(-1)), link=link.format("successor", "junction", "5", "")),
+            inner,
+            road(
+                "2",
+                plan=plan.format(120, 100),
+                lanes=section(lane(-1)),
+                link=link.format("predecessor", "junction", "5", ""),
+            ),
+            '<junction id="5"><connection id="0" incomingRoad="1" connectingRoad="7" '
+            'contactPoint="start"><laneLink from="-1" to="-1"/></connection></junction>',
+        )
+    )
+    network, _ = built(odr)
+    inside = [one for one in network.table.lanes.values() if one.id.startswith(":")]
+    assert [one.allowed for one in inside if "bus" in one.allowed] == [
+        allowed("driving") - {"truck", "trailer"}
+    ]
+
+
+def test_a_connection_that_no_class_may_use_is_none() -> None:
+    link = '<{} elementType="road" elementId="{}" contactPoint="{}"/>'
+    on = '<link><successor id="-1"/></link>'
+    odr = parse(
+        document(
+            road(
+                "1",
+                lanes=section(lane(-1, inside=on + access("allow", "delivery"))),
+                link=link.format("successor", "2", "start"),
+            ),
+            road(
+                "2",
+                plan='<geometry s="0" x="100" y="0" hdg="0" length="100"><line/></geometry>',
+                lanes=section(
+                    lane(-1, inside=access("allow", "motorcycle") + access("deny", "emergency"))
+                ),
+                link=link.format("predecessor", "1", "end"),
+            ),
+        )
+    )
+    network, _ = built(odr)
+    assert network.report.figures["connections"] == 0.0
+    assert any("no vehicle class may use" in entry.reason for entry in network.report.entries)
+
+
+def test_the_report_says_what_became_of_access() -> None:
+    network, _ = built(one_lane(access("allow", "bus")))
+    place = "road 1 > laneSection 0 > lane -1"
+    told = [(e.outcome, e.reason) for e in network.report.entries if e.element == place]
+    assert ("kept", "access from s=0: authority, bus, coach, emergency") in told
+    for inside, reason in (
+        (
+            access("allow", "simulator"),
+            "access: allow simulator has no vehicle class in SUMO; left out",
+        ),
+        (
+            '<access sOffset="0" restriction="bus"/>',
+            "access of bus without a rule: it may allow or deny; left out",
+        ),
+    ):
+        network, _ = built(one_lane(inside))
+        told = [(e.outcome, e.reason) for e in network.report.entries if e.element == place]
+        assert ("lost", reason) in told
+
+
+def test_a_lane_that_is_open_to_no_vehicle_has_that_as_its_reason() -> None:
+    closed = access("allow", "delivery") + access("deny", "delivery") + access("deny", "emergency")
+    network, _ = built(one_lane(closed))
+    reasons = [e.reason for e in network.report.entries if e.element.endswith("lane -1")]
+    assert any(one.endswith("no SUMO lane: by its access no vehicle may use it") for one in reasons)
+    assert LaneKey(RoadId("1"), 0, -1) not in network.table.lane_keys
