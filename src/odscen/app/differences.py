@@ -38,7 +38,7 @@ class ComparedMaps:
         return {
             "before": self.names[0],
             "after": self.names[1],
-            "changes": [one.to_dict() for one in self.changes],
+            "changes": [change.to_dict() for change in self.changes],
         }
 
     def to_svg(self) -> str:
@@ -64,11 +64,11 @@ def compare_maps(workspace: Workspace, before: str, after: str) -> ComparedMaps:
     InputError
         If a file is no map.
     """
-    old, new = _map(workspace, before), _map(workspace, after)
+    old, new = _read_opendrive_of(workspace, before), _read_opendrive_of(workspace, after)
     return ComparedMaps((before, after), old, new, map_differences(old, new))
 
 
-def _map(workspace: Workspace, name: str) -> OpenDrive:
+def _read_opendrive_of(workspace: Workspace, name: str) -> OpenDrive:
     path = Path(name)
     if path.suffix.lower() != ".xodr":
         path = workspace.map(name).path("xodr")

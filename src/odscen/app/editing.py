@@ -274,7 +274,7 @@ class Editing:
         """
         edit = read_edit({"kind": kind, **arguments})
         made = apply_edit(edit, self.scenario, map_of(self._workspace, self.scenario))
-        return self._add(made, edit.label, (edit.data,))
+        return self._append_edits(made, edit.label, (edit.data,))
 
     def apply_all(
         self, edits: Iterable[Mapping[str, Any]], *, label: str | None = None
@@ -306,7 +306,9 @@ class Editing:
         if not read:
             raise InputError("there are no edits to make")
         made = edited(self.scenario, read, map_of(self._workspace, self.scenario))
-        return self._add(made, label or edits_label(read), tuple(edit.data for edit in read))
+        return self._append_edits(
+            made, label or edits_label(read), tuple(edit.data for edit in read)
+        )
 
     def change(self, label: str, function: Callable[[Scenario], Scenario]) -> Scenario:
         """Make a step of a function, such as one that imports demand or times lights.
@@ -323,7 +325,7 @@ class Editing:
         Scenario
             The scenario now.
         """
-        return self._add(function(self.scenario), label, ())
+        return self._append_edits(function(self.scenario), label, ())
 
     def undo(self) -> Scenario:
         """Take the last step back.
@@ -335,7 +337,7 @@ class Editing:
         """
         if self._history.undo is None:
             raise ConflictError("there is nothing to undo")
-        return self._move(-1)
+        return self._move_in_history(-1)
 
     def redo(self) -> Scenario:
         """Make the step again that was taken back last.
@@ -347,7 +349,7 @@ class Editing:
         """
         if self._history.redo is None:
             raise ConflictError("there is nothing to redo")
-        return self._move(+1)
+        return self._move_in_history(+1)
 
     def save(self, path: Path | None = None) -> Path:
         """Write the scenario, and its history if it is among the scenarios of the workspace.
@@ -409,14 +411,16 @@ class Editing:
         folder.write_index(self._history, self._kept)
         self._kept, self._documents, self._edits = self._history, {}, {}
 
-    def _add(self, scenario: Scenario, label: str, edits: tuple[dict[str, Any], ...]) -> Scenario:
+    def _append_edits(
+        self, scenario: Scenario, label: str, edits: tuple[dict[str, Any], ...]
+    ) -> Scenario:
         self.scenario, text = written_document(scenario)
         self._history = self._history.add(text, label=label)
         self._documents[self._history.current] = text
         self._edits[self._history.current] = edits
         return self.scenario
 
-    def _move(self, step: int) -> Scenario:
+    def _move_in_history(self, step: int) -> Scenario:
         text = self._document_of(self._history.entries[self._history.position + step])
         self.scenario = loads(text)
         self._history = self._history.move(step, text)

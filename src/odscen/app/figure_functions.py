@@ -36,11 +36,11 @@ class InstalledFigure(NamedTuple):
 
 def installed_figures() -> tuple[InstalledFigure, ...]:
     """Figures of installed packages by name, with the first line of what each says of itself."""
-    names = {one.name for one in entry_points(group=GROUP)} - {*names_of("run")}
+    names = {entry_point.name for entry_point in entry_points(group=GROUP)} - {*names_of("run")}
     found = []
     for name in sorted(names):
         try:
-            said = inspect.getdoc(_function(name)) or ""
+            said = inspect.getdoc(_import_function(name)) or ""
             found.append(InstalledFigure(name, said.partition("\n")[0]))
         except InputError as error:
             found.append(InstalledFigure(name, "", error.problem))
@@ -60,7 +60,7 @@ def installed_value(name: str, run: Run) -> float | None:
     InputError
         If it cannot be imported, raises, or returns anything but a number or ``None``.
     """
-    return value_of(_function(name), run, source=name, element="figures")
+    return value_of(_import_function(name), run, source=name, element="figures")
 
 
 def value_of(
@@ -82,7 +82,7 @@ def value_of(
     return None if value is None else float(value)
 
 
-def _function(name: str) -> Callable[[Run], object]:
+def _import_function(name: str) -> Callable[[Run], object]:
     (point, *_) = entry_points(group=GROUP, name=name)
     try:
         found = point.load()

@@ -87,9 +87,9 @@ def open_generator(door: GeneratorDoor) -> Generator:
                 "options are for classes; those of another program go into its command",
                 element="generator",
             )
-        return _Command(_words(door.command), door.time_limit)
+        return _Command(_split_command(door.command), door.time_limit)
     name = door.name or ""
-    found = _found(name)
+    found = _find_generator(name)
     values = values_for(found, door.options, name=name)
     try:
         made = found(**values) if isinstance(found, type) else found
@@ -102,7 +102,7 @@ def open_generator(door: GeneratorDoor) -> Generator:
 
 def installed_generators() -> tuple[OfferedModel, ...]:
     """The generator that ships and those of installed packages, by name, with their options."""
-    return offered_models(_installed(), _found)
+    return offered_models(_list_installed(), _find_generator)
 
 
 def placer_of(loaded: LoadedMap) -> NamedPlacer:
@@ -116,7 +116,7 @@ def placer_of(loaded: LoadedMap) -> NamedPlacer:
     ) -> Callable[[Region, Crew], tuple[Actor, ...]]:
         from odscen.sumo.realize.signals_ahead import lights_at_start
 
-        known = _installed()
+        known = _list_installed()
         if name not in known:
             raise NotFoundError("generator", name, known)
         placer = Placer(open_generator(GeneratorDoor(name, options=options)))
@@ -126,7 +126,7 @@ def placer_of(loaded: LoadedMap) -> NamedPlacer:
     return place_by
 
 
-def _installed() -> list[str]:
+def _list_installed() -> list[str]:
     return installed_names(GROUP, [REFERENCE])
 
 
@@ -193,7 +193,7 @@ class _Guarded:
         try:
             given = self.generator.fill(graph, request, rng)
             arrays = (
-                {one: getattr(given, one) for one in Fill.__slots__}
+                {name: getattr(given, name) for name in Fill.__slots__}
                 if isinstance(given, Fill)
                 else dict(given)
             )
@@ -220,7 +220,9 @@ class _Command:
         with scratch_folder() as folder:
             given, made = folder / "request", folder / "fill"
             given.with_suffix(".npz").write_bytes(request_bytes(request))
-            self._run([word.format_map(_names(given, made)) for word in self.words])
+            self._run_command(
+                [word.format_map(_file_arguments(given, made)) for word in self.words]
+            )
             out = made.with_suffix(".npz")
             if not out.is_file():
                 raise InputError(
@@ -233,7 +235,7 @@ class _Command:
                 )
             return fill_from_bytes(out.read_bytes(), file=f"fill of {self.words[0]}")
 
-    def _run(self, words: list[str]) -> None:
+    def _run_command(self, words: list[str]) -> None:
         try:
             done = subprocess.run(
                 words,
@@ -256,11 +258,11 @@ class _Command:
             raise InputError(f"it ended with exit code {done.returncode}{said}", element=words[0])
 
 
-def _names(given: Path, made: Path) -> dict[str, str]:
+def _file_arguments(given: Path, made: Path) -> dict[str, str]:
     return {"in": str(given), "out": str(made)}
 
 
-def _words(command: str) -> tuple[str, ...]:
+def _split_command(command: str) -> tuple[str, ...]:
     try:
         words = tuple(shlex.split(command))
         filled = "".join(words).format_map({"in": "\0", "out": "\1"})
@@ -274,7 +276,7 @@ def _words(command: str) -> tuple[str, ...]:
     return words
 
 
-def _found(name: str) -> Any:
+def _find_generator(name: str) -> Any:
     if name == REFERENCE:
         from odscen.learning.reference.reference_generator import ReferenceGenerator
 

@@ -128,7 +128,7 @@ class MapComparison:
         return {
             "name": self.name,
             "kilometres": round(self.kilometres, 3),
-            "networks": [_network_dict(one) for one in self.networks],
+            "networks": [_network_dict(network) for network in self.networks],
             "capacity": [
                 {
                     "level": row.level,
@@ -139,15 +139,15 @@ class MapComparison:
         }
 
 
-def _network_dict(one: ConvertedMap) -> dict[str, Any]:
-    if one.entry is None or one.fidelity is None:
-        return {"converter": one.converter, "refused": one.refused}
-    report = one.entry.info["report"]
+def _network_dict(converted_map: ConvertedMap) -> dict[str, Any]:
+    if converted_map.entry is None or converted_map.fidelity is None:
+        return {"converter": converted_map.converter, "refused": converted_map.refused}
+    report = converted_map.entry.info["report"]
     return {
-        "converter": one.converter,
+        "converter": converted_map.converter,
         "refused": None,
-        "sumo": one.entry.info["sumo"],
-        "fidelity": one.fidelity.to_dict()["verdicts"],
+        "sumo": converted_map.entry.info["sumo"],
+        "fidelity": converted_map.fidelity.to_dict()["verdicts"],
         "report_counts": report["counts"],
         "lost": [entry for entry in report["entries"] if entry["fate"] == "lost"],
     }
@@ -181,20 +181,26 @@ def compare_converters(
     tell = progress or (lambda _what, _share: None)
     with scratch_folder() as folder:
         place = Workspace.open(folder)
-        networks = tuple(_networks(place, entry, tell))
-        entries = {one.converter: one.entry for one in networks if one.entry is not None}
+        networks = tuple(_convert_by_each(place, entry, tell))
+        entries = {
+            network.converter: network.entry for network in networks if network.entry is not None
+        }
         figures = entries["odscen"].info["report"]["figures"]
         kilometres = figures.get("driving_road_length", 0.0) / 1000.0
         rows = []
         for number, level in enumerate(settings.levels):
             tell(f"{level:g} trips per hour and km", _HALF * (1 + number / len(settings.levels)))
-            scenario = _trips(entries, level * kilometres, settings)
-            rows.append(CapacityRow(level, _carried(place, scenario, entries, settings, processes)))
+            scenario = _draw_flows(entries, level * kilometres, settings)
+            rows.append(
+                CapacityRow(
+                    level, _run_on_each_network(place, scenario, entries, settings, processes)
+                )
+            )
         tell("done", 1.0)
         return MapComparison(name, kilometres, networks, tuple(rows))
 
 
-def _networks(
+def _convert_by_each(
     place: Workspace, entry: MapEntry, tell: Callable[[str, float], None]
 ) -> Iterator[ConvertedMap]:
     """Convert the map by each converter, in a workspace of its own."""
@@ -215,7 +221,7 @@ def _networks(
         yield ConvertedMap("file", made, made.fidelity())
 
 
-def _trips(
+def _draw_flows(
     entries: Mapping[ConverterName, MapEntry], per_hour: float, settings: ComparisonSettings
 ) -> Scenario:
     """Flows between places that all networks have, with routes on all of them."""
@@ -232,7 +238,7 @@ def _trips(
     count = max(1, round(per_hour / PER_FLOW))
     kept: dict[int, Flow] = {}
     for _ in range(_TRIES):
-        pairs = _pairs(
+        pairs = _draw_start_goal_pairs(
             random,
             np.flatnonzero(usable & (ahead >= FROM_ENDS)),
             np.flatnonzero(usable & (graph.lanes.offset >= FROM_ENDS)),
@@ -256,7 +262,7 @@ def _trips(
             roi=everywhere.segments,
             simulation=Simulation(duration=2.0 * settings.duration),
         )
-        routed = _routed(scenario, flows, loaded)
+        routed = _keep_routed_flows(scenario, flows, loaded)
         kept |= dict(list(routed.items())[: count - len(kept)])
         if len(kept) == count:
             return scenario.model_copy(update={"flows": tuple(kept.values())})
@@ -265,7 +271,7 @@ def _trips(
     )
 
 
-def _pairs(
+def _draw_start_goal_pairs(
     random: np.random.Generator,
     starts: IntArray,
     goals: IntArray,
@@ -286,7 +292,7 @@ def _pairs(
     return list(zip(starts[led].tolist(), goals[led].tolist(), strict=True))
 
 
-def _routed(
+def _keep_routed_flows(
     scenario: Scenario, flows: Mapping[int, Flow], loaded: Sequence[LoadedMap]
 ) -> dict[int, Flow]:
     """Flows whose vehicles have a route on every network."""
@@ -301,7 +307,7 @@ def _routed(
     return {spawn: flow for spawn, flow in flows.items() if (flow.spawn,) not in without}
 
 
-def _carried(
+def _run_on_each_network(
     place: Workspace,
     scenario: Scenario,
     entries: Mapping[ConverterName, MapEntry],

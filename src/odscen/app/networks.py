@@ -50,10 +50,10 @@ def bring_in(
     InputError
         If the file cannot be read, is no network, or none of this map; the map stays as it is.
     """
-    before = _state(workspace.map(name))
+    before = _read_network_state(workspace.map(name))
     entry = workspace.set_network(name, source, limits=limits, progress=progress)
-    return BroughtIn(entry, network_changes(before, _state(entry)))
+    return BroughtIn(entry, network_changes(before, _read_network_state(entry)))
 
 
-def _state(entry: MapEntry) -> NetworkState:
+def _read_network_state(entry: MapEntry) -> NetworkState:
     return NetworkState(entry.lane_table(), entry.fidelity())

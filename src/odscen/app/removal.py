@@ -64,7 +64,7 @@ class RemovalFacts:
 def known_runs(workspace: Workspace) -> list[KnownRun]:
     """Runs in the workspace's folder, those that go on in slices included."""
     folders = sorted(workspace.runs.iterdir()) if workspace.runs.is_dir() else ()
-    return [known for folder in folders if (known := _known(folder)) is not None]
+    return [known for folder in folders if (known := _read_known_run(folder)) is not None]
 
 
 def removal_facts(
@@ -99,9 +99,11 @@ def removal_facts(
     names = workspace.map_names()
     if name not in names:
         raise NotFoundError(kind, name, names)
-    keys = _texts(name, _json(workspace.root / "maps" / name / "map.json").get("sha256"))
-    on_it = [one for one in map(_map_of, _scenario_files(workspace).values()) if keys & one]
-    found = [run for run in runs if keys & _texts(run.map, run.map_sha256)]
+    keys = _texts_within(
+        name, _read_json_object(workspace.root / "maps" / name / "map.json").get("sha256")
+    )
+    on_it = [group for group in map(_map_of, _scenario_files(workspace).values()) if keys & group]
+    found = [run for run in runs if keys & _texts_within(run.map, run.map_sha256)]
     return RemovalFacts(kind, name, len(on_it), len(found), sum(run.live for run in found))
 
 
@@ -129,19 +131,19 @@ def removed_map(workspace: Workspace, sha256: str) -> MapEntry | None:
     """Map of that content in the wastebasket; ``None`` if there is none that can be read."""
     for item in Wastebasket(workspace).items():
         if item.kind == "map":
-            info = _json(item.content / "map.json")
+            info = _read_json_object(item.content / "map.json")
             if info.get("sha256") == sha256:
                 return MapEntry(item.name, item.content, info)
     return None
 
 
-def _known(folder: Path) -> KnownRun | None:
+def _read_known_run(folder: Path) -> KnownRun | None:
     """What the folder of a run says of itself; ``None`` if it is none."""
     state = going(folder)
     if state is not None:
         said = about(folder)
     elif (folder / layout.SUMMARY_FILE).is_file() and not folder.name.startswith("."):
-        said = _json(folder / layout.SUMMARY_FILE)
+        said = _read_json_object(folder / layout.SUMMARY_FILE)
     else:
         return None
     return KnownRun(folder.name, said.get("map"), said.get("map_sha256"), state == "running")
@@ -154,11 +156,13 @@ def _scenario_files(workspace: Workspace) -> dict[str, Path]:
 
 def _map_of(scenario: Path) -> set[str]:
     """Name and hash of the map that a scenario's file names."""
-    found = _early(scenario, "map") or _json(scenario).get("map")
-    return _texts(found.get("name"), found.get("sha256")) if isinstance(found, dict) else set()
+    found = _read_early_field(scenario, "map") or _read_json_object(scenario).get("map")
+    return (
+        _texts_within(found.get("name"), found.get("sha256")) if isinstance(found, dict) else set()
+    )
 
 
-def _after(sign: re.Pattern[str], text: str, place: int) -> int:
+def _skip_sign(sign: re.Pattern[str], text: str, place: int) -> int:
     """Where a sign that is at a place ends; ``ValueError`` if it is not there."""
     found = sign.match(text, place)
     if found is None:
@@ -166,27 +170,27 @@ def _after(sign: re.Pattern[str], text: str, place: int) -> int:
     return found.end()
 
 
-def _early(path: Path, key: str) -> object:
+def _read_early_field(path: Path, key: str) -> object:
     """A field of an object that comes early in a large file; ``None`` if it does not."""
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
             text = file.read(_EARLY)
-        place = _after(_FIRST, text, 0)
+        place = _skip_sign(_FIRST, text, 0)
         while True:
             name, place = _DECODER.raw_decode(text, place)
-            value, place = _DECODER.raw_decode(text, _after(_COLON, text, place))
+            value, place = _DECODER.raw_decode(text, _skip_sign(_COLON, text, place))
             if name == key:
                 return value
-            place = _after(_COMMA, text, place)
+            place = _skip_sign(_COMMA, text, place)
     except (OSError, ValueError, RecursionError):
         return None
 
 
-def _texts(*values: object) -> set[str]:
+def _texts_within(*values: object) -> set[str]:
     return {value for value in values if isinstance(value, str)}
 
 
-def _json(path: Path) -> dict[str, Any]:
+def _read_json_object(path: Path) -> dict[str, Any]:
     """An object in a file; empty if there is none that can be read."""
     try:
         found = json.loads(path.read_bytes())

@@ -229,7 +229,7 @@ def generate(
     if map_name is not None:
         workspace.map(map_name)
     else:
-        statistics = _statistics(workspace, config.maps)
+        statistics = _map_statistics_by_name(workspace, config.maps)
         if not statistics:
             raise InputError(
                 f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
@@ -260,7 +260,7 @@ def generate(
     return paths
 
 
-def _statistics(workspace: Workspace, maps: MapFilter) -> dict[str, dict[str, Any]]:
+def _map_statistics_by_name(workspace: Workspace, maps: MapFilter) -> dict[str, dict[str, Any]]:
     """Statistics of all maps, by name; those that decide what is drawn are up to date.
 
     Only maps whose statistics decide are opened: what an older odscen has built is then rebuilt.
@@ -269,8 +269,10 @@ def _statistics(workspace: Workspace, maps: MapFilter) -> dict[str, dict[str, An
 
     by_statistics = bool(maps.where) or maps.weight_by is not None
     return {
-        one.name: (
-            workspace.map(one.name) if by_statistics and passes_by_name(maps, one.name) else one
+        map_entry.name: (
+            workspace.map(map_entry.name)
+            if by_statistics and passes_by_name(maps, map_entry.name)
+            else map_entry
         ).info["statistics"]
-        for one in workspace.maps()
+        for map_entry in workspace.maps()
     }

@@ -63,7 +63,7 @@ def read_edits(path: Path) -> list[EditBase]:
         raise InputError(f"this is not JSON: {error}", file=str(path)) from error
     with in_file(str(path)):
         ones = data if isinstance(data, list) else [data]
-        return [_read(one, place=f"edits[{index}]") for index, one in enumerate(ones)]
+        return [_read_edit(one, place=f"edits[{index}]") for index, one in enumerate(ones)]
 
 
 def edits_of_settings(settings: Iterable[str]) -> list[EditBase]:
@@ -88,8 +88,8 @@ def edits_of_settings(settings: Iterable[str]) -> list[EditBase]:
             )
         if not found or found[-1]["kind"] != kind or field in found[-1]:
             found.append({"kind": kind})
-        found[-1][field] = _value(text)
-    return [_read(one, place=f"--set {one['kind']}") for one in found]
+        found[-1][field] = _read_value(text)
+    return [_read_edit(row, place=f"--set {row['kind']}") for row in found]
 
 
 def make_variant(
@@ -127,7 +127,7 @@ def make_variant(
         parent=scenario_name(parent),
         parent_sha256=content_sha256(old),
         sha256=content_sha256(new),
-        edits=tuple(one.data for one in ones),
+        edits=tuple(base.data for base in ones),
     )
     return new.model_copy(update={"variant": variant})
 
@@ -148,7 +148,7 @@ def edited(scenario: Scenario, edits: Iterable[EditBase], loaded: LoadedMap) -> 
     return scenario
 
 
-def _read(data: Any, *, place: str) -> EditBase:
+def _read_edit(data: Any, *, place: str) -> EditBase:
     if not isinstance(data, dict):
         raise ScenarioError(
             f"{place}: an edit is an object with its kind, such as {json.dumps(_EXAMPLE)}"
@@ -162,7 +162,7 @@ def _read(data: Any, *, place: str) -> EditBase:
 _EXAMPLE = {"kind": "set_seed", "seed": 3}
 
 
-def _value(text: str) -> Any:
+def _read_value(text: str) -> Any:
     try:
         return from_json(text)
     except ValueError:

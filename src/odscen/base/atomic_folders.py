@@ -36,11 +36,11 @@ def new_folder(final: Path) -> Iterator[Path]:
     folder and ``final`` is untouched.
     """
     final.parent.mkdir(parents=True, exist_ok=True)
-    with _temporary(final.parent, _BUILDING) as folder:
+    with _temporary_folder(final.parent, _BUILDING) as folder:
         folder.chmod(0o755)  # mkdtemp makes it private, which a finished map or run need not be
         yield folder
         all_to_disk(folder)
-        _put(folder, final)
+        _put_in_place(folder, final)
         to_disk(final.parent)
 
 
@@ -61,7 +61,7 @@ def passing_folder(parent: Path) -> Iterator[Path]:
 
     That of a process that was killed is removed by :func:`clear_leftovers` of ``parent``.
     """
-    with _temporary(parent, _BUILDING) as folder:
+    with _temporary_folder(parent, _BUILDING) as folder:
         yield folder
 
 
@@ -111,7 +111,7 @@ def _remove_if_empty(folder: Path) -> None:
 
 def discard(folder: Path) -> None:
     """Take a folder out of sight in one step, then delete it."""
-    with _temporary(folder.parent, _REMOVED) as grave:
+    with _temporary_folder(folder.parent, _REMOVED) as grave:
         folder.rename(grave / folder.name)
 
 
@@ -134,18 +134,18 @@ def clear_leftovers(parent: Path) -> list[str]:
     cleared = []
     for path in found:
         is_lock = path.name.endswith(".lock")
-        if (is_lock or path.name.startswith(kinds)) and _clear(path):
+        if (is_lock or path.name.startswith(kinds)) and _clear_path(path):
             cleared.append(path.name)
     return cleared
 
 
 @contextmanager
-def _temporary(parent: Path, prefix: str) -> Iterator[Path]:
+def _temporary_folder(parent: Path, prefix: str) -> Iterator[Path]:
     """Yield a new folder whose lock is held, and delete what is left of it."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
         with suppress(FileNotFoundError):  # cleared away before we had the lock
-            descriptor = _held(folder)
+            descriptor = _hold_folder(folder)
             if same_file(descriptor, folder):
                 break
             os.close(descriptor)
@@ -168,7 +168,7 @@ def _delete_with_one_handle(folder: Path) -> None:
                 path.unlink(missing_ok=True)
 
 
-def _held(folder: Path) -> int:
+def _hold_folder(folder: Path) -> int:
     """Take the lock of a folder that has just been made; it does not stay without one."""
     try:
         descriptor = os.open(folder, os.O_RDONLY)
@@ -181,10 +181,10 @@ def _held(folder: Path) -> int:
     return descriptor
 
 
-def _put(folder: Path, final: Path) -> None:
+def _put_in_place(folder: Path, final: Path) -> None:
     """Rename ``folder`` to ``final``; the last of several processes that do so at a time wins."""
     for _ in range(_ATTEMPTS):
-        with _temporary(final.parent, _REPLACED) as grave:
+        with _temporary_folder(final.parent, _REPLACED) as grave:
             with suppress(FileNotFoundError):
                 final.rename(grave / final.name)
             try:
@@ -199,7 +199,7 @@ def _put(folder: Path, final: Path) -> None:
     raise WorkspaceError(f"{final} is written by other processes all the time")
 
 
-def _clear(path: Path) -> bool:
+def _clear_path(path: Path) -> bool:
     try:
         descriptor = os.open(path, os.O_RDONLY)
     except OSError:

@@ -106,10 +106,10 @@ def read_sums(folder: Path) -> dict[str, str] | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise _damaged(folder / SUMS_FILE, "a list that can be read", str(error)) from error
+        raise _describe_damage(folder / SUMS_FILE, "a list that can be read", str(error)) from error
     lines, mark, own = content.rpartition(b"# ")
     if not mark or own != f"{digest(lines)}\n".encode():
-        raise _damaged(folder / SUMS_FILE, _expected(own.strip()), digest(lines))
+        raise _describe_damage(folder / SUMS_FILE, _read_own_checksum(own.strip()), digest(lines))
     found = (_LINE.fullmatch(line) for line in lines.decode().splitlines())
     return {line[2]: line[1] for line in found if line}
 
@@ -226,22 +226,22 @@ def unsealed(path: Path) -> dict[str, Any]:
     head, mark, own = content.rpartition(_SEAL.encode())
     found = digest(head + mark)
     if mark and own != f'{found}"\n}}\n'.encode():
-        raise _damaged(path, _expected(own[:64]), found)
+        raise _describe_damage(path, _read_own_checksum(own[:64]), found)
     try:
         data = json.loads(content)
     except (ValueError, RecursionError) as error:
-        raise _damaged(path, _OWN, "something that is no JSON") from error
+        raise _describe_damage(path, _OWN, "something that is no JSON") from error
     if not isinstance(data, dict) or (not mark and data.get("version") != 1):
-        raise _damaged(path, _OWN, "none")
+        raise _describe_damage(path, _OWN, "none")
     data.pop("sha256", None)
     return data
 
 
-def _expected(own: bytes) -> str:
+def _read_own_checksum(own: bytes) -> str:
     """The checksum that a file says of itself, if it is one."""
     said = own.decode("ascii", "replace")
     return said if _DIGEST.fullmatch(said) else _OWN
 
 
-def _damaged(path: Path, expected: str, found: str) -> DamagedError:
+def _describe_damage(path: Path, expected: str, found: str) -> DamagedError:
     return DamagedError(str(path.parent), [DamagedFile(path.name, expected, found)])

@@ -17,7 +17,7 @@ def error_to_data(error: OdscenError) -> dict[str, Any]:
 
 def error_from_data(data: Mapping[str, Any]) -> OdscenError:
     """The same error again: inverse of :func:`error_to_data`, after JSON too."""
-    kind = next(one for one in _tree(OdscenError) if one.__name__ == data["type"])
+    kind = next(kind for kind in _subclass_tree(OdscenError) if kind.__name__ == data["type"])
     # Not by its constructor, whose parameters are not what it keeps.
     error = kind.__new__(kind, *data["args"])
     for name, value in data["fields"].items():
@@ -25,7 +25,7 @@ def error_from_data(data: Mapping[str, Any]) -> OdscenError:
     return error
 
 
-def _tree(root: type[OdscenError]) -> Iterator[type[OdscenError]]:
+def _subclass_tree(root: type[OdscenError]) -> Iterator[type[OdscenError]]:
     yield root
-    for one in root.__subclasses__():
-        yield from _tree(one)
+    for kind in root.__subclasses__():
+        yield from _subclass_tree(kind)

@@ -163,7 +163,7 @@ class DamagedFile(NamedTuple):
     found: str
 
     def __str__(self) -> str:
-        return f"{self.file}: expected {_short(self.expected)}, found {_short(self.found)}"
+        return f"{self.file}: expected {_shorten_digest(self.expected)}, found {_shorten_digest(self.found)}"
 
 
 class DamagedError(InputError):
@@ -183,7 +183,7 @@ class DamagedError(InputError):
         self.files = tuple(files)
         self.advice = advice
         many = f"{len(files)} files are" if len(files) > 1 else "a file is"
-        listed = "".join(f"\n  - {one}" for one in files)
+        listed = "".join(f"\n  - {file}" for file in files)
         more = f"; {advice}" if advice else ""
         super().__init__(f"{many} not as written{more}{listed}", file=folder)
 
@@ -234,7 +234,7 @@ class CarlaReleaseError(CarlaError):
     """A CARLA server of another release than the client that is installed."""
 
 
-def _short(digest: str) -> str:
+def _shorten_digest(digest: str) -> str:
     return f"sha256 {digest[:12]}..." if len(digest) == 64 else digest
 
 

@@ -64,7 +64,7 @@ def locked(folder: Path, *, what: str, patience: float = 0.0) -> Iterator[int]:
         raise NotADirectoryError(
             errno.ENOTDIR, os.strerror(errno.ENOTDIR), error.filename
         ) from error
-    descriptor = _taken(folder, what, patience)
+    descriptor = _take_lock(folder, what, patience)
     try:
         yield descriptor
     finally:
@@ -114,35 +114,37 @@ def same_file(descriptor: int, path: Path) -> bool:
         return False
 
 
-def _taken(folder: Path, what: str, patience: float) -> int:
+def _take_lock(folder: Path, what: str, patience: float) -> int:
     path, start = lock_file(folder), time.monotonic()
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if same_file(descriptor, path):
-                _sign(descriptor)
+                _write_holder(descriptor)
                 return descriptor
             os.close(descriptor)  # its holder has just removed it
         except BlockingIOError:
-            holder = _holder(descriptor)
+            holder = _read_holder(descriptor)
             os.close(descriptor)
-            if time.monotonic() - start >= (patience if _lives(holder) else GRACE):
-                raise ConflictError(f"{what} is in the hands of {_words(holder)}") from None
+            if time.monotonic() - start >= (patience if _holder_lives(holder) else GRACE):
+                raise ConflictError(
+                    f"{what} is in the hands of {_describe_holder(holder)}"
+                ) from None
             time.sleep(_LISTEN)
         except BaseException:
             os.close(descriptor)
             raise
 
 
-def _sign(descriptor: int) -> None:
+def _write_holder(descriptor: int) -> None:
     since = time.strftime("%Y-%m-%d %H:%M:%S")
     holder = {"pid": os.getpid(), "host": socket.gethostname(), "since": since}
     os.ftruncate(descriptor, 0)
     os.pwrite(descriptor, json.dumps(holder).encode(), 0)
 
 
-def _holder(descriptor: int) -> dict[str, Any]:
+def _read_holder(descriptor: int) -> dict[str, Any]:
     """What the holder has said of itself; empty if it has not yet."""
     try:
         holder = json.loads(os.pread(descriptor, 1000, 0))
@@ -151,7 +153,7 @@ def _holder(descriptor: int) -> dict[str, Any]:
     return holder if isinstance(holder, dict) else {}
 
 
-def _lives(holder: dict[str, Any]) -> bool:
+def _holder_lives(holder: dict[str, Any]) -> bool:
     """Whether the process that took the lock is there; what it has started may outlive it."""
     if not holder or holder.get("host") != socket.gethostname():
         return bool(holder)
@@ -164,7 +166,7 @@ def _lives(holder: dict[str, Any]) -> bool:
     return True
 
 
-def _words(holder: dict[str, Any]) -> str:
+def _describe_holder(holder: dict[str, Any]) -> str:
     if not holder:
         return "another process"
     host = holder.get("host")

@@ -52,15 +52,15 @@ def arrays_from_npz(
         raise InputError("it is a single array, not an .npz file with named ones", file=file)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            return _arrays(archive, file, only)
+            return _read_arrays(archive, file, only)
     except (zipfile.BadZipFile, EOFError, OSError, RuntimeError) as error:
         raise InputError("it cannot be read as an .npz file", file=file) from error
 
 
-def _arrays(
+def _read_arrays(
     archive: zipfile.ZipFile, file: str | None, only: Collection[str] | None
 ) -> dict[str, Array]:
-    members = {one.filename.removesuffix(".npy"): one for one in archive.infolist()}
+    members = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
     if len(members) > MOST_ARRAYS:
         raise InputError(f"it has {len(members)} arrays; {MOST_ARRAYS} are the most", file=file)
     wanted = [name for name in members if only is None or name in only]
@@ -73,7 +73,7 @@ def _arrays(
     for name in wanted:
         try:
             with archive.open(members[name]) as stream:
-                found[name] = _read(stream, members[name].file_size)
+                found[name] = _read_array(stream, members[name].file_size)
         except (ValueError, zlib.error, zipfile.BadZipFile, NotImplementedError) as error:
             raise InputError(
                 f"it is malformed: {error}", file=file, element=f"array {name}"
@@ -81,7 +81,7 @@ def _arrays(
     return found
 
 
-def _read(stream: IO[bytes], size: int) -> Array:
+def _read_array(stream: IO[bytes], size: int) -> Array:
     """One array; ``ValueError`` says what is wrong with it."""
     version = np.lib.format.read_magic(stream)
     readers = {

@@ -51,10 +51,10 @@ def number(value: float, digits: int = 2) -> str:
 
 def escaped(content: object) -> Markup:
     """``content`` as text, escaped for elements and attributes, without control characters."""
-    return Markup(_escaped(content))
+    return Markup(_escape_content(content))
 
 
-def _escaped(content: object) -> str:
+def _escape_content(content: object) -> str:
     if isinstance(content, markupsafe.Markup):
         return content
     text = str(content)
@@ -67,7 +67,7 @@ def _escaped(content: object) -> str:
 
 
 @cache
-def _attribute(key: str) -> str:
+def _attribute_name(key: str) -> str:
     return key.rstrip("_").replace("_", "-")
 
 
@@ -91,12 +91,12 @@ def element(name: str, /, *children: object, **attributes: Attribute) -> Markup:
         if isinstance(value, float):
             text = number(value)
         else:
-            text = str(value) if isinstance(value, int) else _escaped(str(value))
-        opened.append(f'{_attribute(key)}="{text}"')
+            text = str(value) if isinstance(value, int) else _escape_content(str(value))
+        opened.append(f'{_attribute_name(key)}="{text}"')
     head = " ".join(opened)
     if name in _VOID:
         return Markup(f"<{head}>")
-    inner = "".join(_escaped(child) for child in children if child is not None)
+    inner = "".join(_escape_content(child) for child in children if child is not None)
     return Markup(f"<{head}>{inner}</{name}>" if inner else f"<{head}></{name}>")
 
 

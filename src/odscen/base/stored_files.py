@@ -128,7 +128,7 @@ def typed_rows(kind: Callable[..., _Row]) -> Callable[[Mapping[str, Any]], _Row]
 
     What it gives raises ``TypeError`` or ``ValueError`` that name the field.
     """
-    enums, known = _fields(kind)
+    enums, known = _field_types(kind)
 
     def make(row: Mapping[str, Any]) -> _Row:
         for name, value in row.items():
@@ -140,21 +140,23 @@ def typed_rows(kind: Callable[..., _Row]) -> Callable[[Mapping[str, Any]], _Row]
 
 
 @lru_cache(maxsize=64)
-def _fields(kind: Callable[..., Any]) -> tuple[dict[str, type], dict[str, frozenset[type]]]:
+def _field_types(kind: Callable[..., Any]) -> tuple[dict[str, type], dict[str, frozenset[type]]]:
     """Enumerations among the fields, and the types that the value of each may have."""
-    hints = {name: _types(hint) for name, hint in get_type_hints(kind).items()}
+    hints = {name: _types_of_hint(hint) for name, hint in get_type_hints(kind).items()}
     enums = {name: types[0] for name, types in hints.items() if issubclass(types[0], Enum)}
-    return enums, {name: _accepted(types) for name, types in hints.items()}
+    return enums, {name: _accepted_json_types(types) for name, types in hints.items()}
 
 
-def _types(hint: Any) -> tuple[type, ...]:
+def _types_of_hint(hint: Any) -> tuple[type, ...]:
     """Types of a hint: those of a union; of a tuple or an object that itself, not what is in it."""
     if get_origin(hint) in (tuple, dict):
         return (get_origin(hint),)
-    return tuple(get_origin(one) or one for one in get_args(hint)) or (hint,)
+    return tuple(get_origin(get_argument) or get_argument for get_argument in get_args(hint)) or (
+        hint,
+    )
 
 
-def _accepted(types: tuple[type, ...]) -> frozenset[type]:
+def _accepted_json_types(types: tuple[type, ...]) -> frozenset[type]:
     """Types of JSON values: a whole number may stand for any, a text for an enumeration."""
-    found = {str if issubclass(one, str) else one for one in types}
+    found = {str if issubclass(kind, str) else kind for kind in types}
     return frozenset(found | {int} if float in found else found) | (found & {NoneType})

@@ -41,21 +41,21 @@ def acting_differences(
         Where the centres of actors are placed, by id: x and y (m) and heading (rad). An actor that
         appears ``at`` that place appears where it is placed.
     """
-    at = {name: _rounded(list(pose)) for name, pose in (placed or {}).items()}
-    old, new = (_plain(one, at) for one in (before, after))
-    old["rules"] = {rule["id"]: _rule(rule, old, {}) for rule in old["rules"]}
-    new["rules"] = _renamed(new, old["rules"])
+    at = {name: _round_values(list(pose)) for name, pose in (placed or {}).items()}
+    old, new = (_plain_document(one, at) for one in (before, after))
+    old["rules"] = {rule["id"]: _plain_rule(rule, old, {}) for rule in old["rules"]}
+    new["rules"] = _rules_by_name(new, old["rules"])
     return tuple(field_differences(old, new))
 
 
-def _plain(scenario: Scenario, placed: Mapping[str, Pose]) -> Parts:
-    data: Parts = _rounded(scenario.model_dump(mode="json", exclude={"name", "formulas"}))
+def _plain_document(scenario: Scenario, placed: Mapping[str, Pose]) -> Parts:
+    data: Parts = _round_values(scenario.model_dump(mode="json", exclude={"name", "formulas"}))
     data["roi"] = sorted(data["roi"])
     for name in ("actors", "flows", "measures"):
         data[name] = {one["id"]: one for one in data[name]}
     for rule in data["rules"]:
         own = data["actors"].get(rule["actor"], {}).get("initial_speed")
-        for part in _parts(rule["then"]):
+        for part in _action_parts(rule["then"]):
             if part.get("appear") and part["appear"].get("speed") is None:
                 part["appear"]["speed"] = own or 0.0
             if part.get("appear") and part["appear"]["at"] == placed.get(rule["actor"], 0):
@@ -63,53 +63,53 @@ def _plain(scenario: Scenario, placed: Mapping[str, Pose]) -> Parts:
     return data
 
 
-def _parts(then: list[Parts]) -> Iterator[Parts]:
+def _action_parts(then: list[Parts]) -> Iterator[Parts]:
     """Actions of a rule, those that run together one by one."""
     for item in then:
         yield item
-        yield from _parts(item.get("together") or [])
+        yield from _action_parts(item.get("together") or [])
 
 
-def _rounded(value: Any) -> Any:
+def _round_values(value: Any) -> Any:
     if isinstance(value, float):
         return round(value, _DIGITS) + 0.0
     if isinstance(value, list):
-        return [_rounded(one) for one in value]
+        return [_round_values(one) for one in value]
     if isinstance(value, dict):
-        return {key: _rounded(one) for key, one in value.items()}
+        return {key: _round_values(one) for key, one in value.items()}
     return value
 
 
-def _renamed(new: Parts, old: Mapping[str, Parts]) -> Parts:
+def _rules_by_name(new: Parts, old: Mapping[str, Parts]) -> Parts:
     """Rules by name, those with a new name by that of a rule with the same content in ``old``."""
     there = {rule["id"] for rule in new["rules"]}
-    free = {_text(rule): name for name, rule in old.items() if name not in there}
+    free = {_sorted_text(rule): name for name, rule in old.items() if name not in there}
     names: dict[str, str] = {}
     for _ in new["rules"]:  # those that wait for others are found after them
         before = len(names)
         for rule in new["rules"]:
             if rule["id"] not in old and rule["id"] not in names:
-                known = free.pop(_text(_rule(rule, new, names)), None)
+                known = free.pop(_sorted_text(_plain_rule(rule, new, names)), None)
                 names |= {} if known is None else {rule["id"]: known}
         if len(names) == before:
             break
-    return {names.get(one["id"], one["id"]): _rule(one, new, names) for one in new["rules"]}
+    return {names.get(one["id"], one["id"]): _plain_rule(one, new, names) for one in new["rules"]}
 
 
-def _text(part: Parts) -> str:
+def _sorted_text(part: Parts) -> str:
     return json.dumps(part, sort_keys=True)
 
 
-def _rule(rule: Parts, scenario: Parts, names: Mapping[str, str]) -> Parts:
+def _plain_rule(rule: Parts, scenario: Parts, names: Mapping[str, str]) -> Parts:
     actor = scenario["actors"].get(rule["actor"], {})
     walks = actor.get("category") == Category.PEDESTRIAN
-    groups = _groups(rule["when"], rule["actor"], names, negated=False, delay=0.0)
+    groups = _condition_groups(rule["when"], rule["actor"], names, negated=False, delay=0.0)
     when = sorted({json.dumps(sorted(group)) for group in groups})
-    then = {str(n): _action(one, walks=walks) for n, one in enumerate(rule["then"])}
+    then = {str(n): _plain_action(one, walks=walks) for n, one in enumerate(rule["then"])}
     return {"actor": rule["actor"], "when": when, "then": then, "times": rule["times"]}
 
 
-def _groups(
+def _condition_groups(
     when: Parts, actor: str, names: Mapping[str, str], *, negated: bool, delay: float
 ) -> list[set[str]]:
     """Groups of conditions, any of which is enough; conditions as texts."""
@@ -118,8 +118,10 @@ def _groups(
     rising = when["edge"] == "rising"
     if kind in ("all", "any", "not") and not rising:
         if kind == "not":
-            return _groups(when["not"], actor, names, negated=not negated, delay=delay)
-        parts = [_groups(one, actor, names, negated=negated, delay=delay) for one in when[kind]]
+            return _condition_groups(when["not"], actor, names, negated=not negated, delay=delay)
+        parts = [
+            _condition_groups(one, actor, names, negated=negated, delay=delay) for one in when[kind]
+        ]
         if (kind == "any") != negated:
             return [group for part in parts for group in part]
         if len(list(product(*parts))) <= _MOST_GROUPS:
@@ -128,12 +130,12 @@ def _groups(
     if isinstance(part, dict):
         part = part | ({"of": actor} if part.get("of", "") is None else {})
         part |= {"id": names.get(part["id"], part["id"])} if kind == "rule" else {}
-        part, negated = _bounded(part, negated=negated)
+        part, negated = _split_bound(part, negated=negated)
     said = {kind: part, "delay": delay, "negated": negated, "rising": rising}
     return [{json.dumps(said, sort_keys=True)}]
 
 
-def _bounded(part: Parts, *, negated: bool) -> tuple[Parts, bool]:
+def _split_bound(part: Parts, *, negated: bool) -> tuple[Parts, bool]:
     """A bound that does not hold is the other one."""
     if not negated or "below" not in part or "above" not in part:
         return part, negated
@@ -145,9 +147,9 @@ def _without_always(group: set[str]) -> set[str]:
     return group - {said} or group
 
 
-def _action(action: Parts, *, walks: bool) -> Parts:
+def _plain_action(action: Parts, *, walks: bool) -> Parts:
     if action["together"] is not None:
-        return {"together": [_action(one, walks=walks) for one in action["together"]]}
+        return {"together": [_plain_action(one, walks=walks) for one in action["together"]]}
     (kind,) = (key for key in action if action[key] is not None)
     part: Parts = action[kind]
     if not walks and kind == "brake" and part["hold"] is None:

@@ -55,12 +55,12 @@ def lane_differences(pair: RoadPair) -> Iterator[MapChange]:
         found += _lanes_of(stretch)
         for old, new in stretch.pairs:
             if old is not None and new is not None:
-                found += _properties(old, new, stretch)
+                found += _compare_properties(old, new, stretch)
                 if old.id:
-                    found += _width(pair, stretch, (old, new))
-    found += _limits(pair)
-    for one in _joined(found):
-        yield _change(pair, one)
+                    found += _compare_widths(pair, stretch, (old, new))
+    found += _compare_limits(pair)
+    for join_piece in _join_pieces(found):
+        yield _lane_change(pair, join_piece)
 
 
 def _lanes_of(stretch: PairedStretch) -> Iterator[_Found]:
@@ -72,7 +72,7 @@ def _lanes_of(stretch: PairedStretch) -> Iterator[_Found]:
 
 
 # ------------------------------------------------------------------------- what holds from s on
-def _mark(mark: RoadMark | None) -> str:
+def _describe_mark(mark: RoadMark | None) -> str:
     if mark is None:
         return "none"
     change = "" if mark.lane_change == "both" else f", lane change {mark.lane_change}"
@@ -80,38 +80,40 @@ def _mark(mark: RoadMark | None) -> str:
     return f"{mark.type} {mark.color}{weight}{change}"
 
 
-def _holding(records: Sequence[Any], s: float) -> list[Any]:
+def _records_holding_at(records: Sequence[Any], s: float) -> list[Any]:
     """Records that hold at s: those with the last start before it."""
-    started = [one for one in records if one.s <= s + SAME]
+    started = [record for record in records if record.s <= s + SAME]
     return [one for one in started if one.s == started[-1].s]
 
 
-def _last(records: Sequence[Any], s: float) -> Any:
-    holding = _holding(records, s)
+def _last_record_at(records: Sequence[Any], s: float) -> Any:
+    holding = _records_holding_at(records, s)
     return holding[-1] if holding else None
 
 
-def _height(lane: Lane, s: float) -> str:
-    height = _last(lane.heights, s)
+def _describe_height(lane: Lane, s: float) -> str:
+    height = _last_record_at(lane.heights, s)
     if height is None:
         return "0 m"
     return f"{metres(height.inner)} m inside, {metres(height.outer)} m outside"
 
 
-def _access(lane: Lane, s: float) -> str:
-    return ", ".join(sorted(f"{one.rule} {one.restriction}" for one in _holding(lane.access, s)))
+def _describe_access(lane: Lane, s: float) -> str:
+    return ", ".join(
+        sorted(f"{one.rule} {one.restriction}" for one in _records_holding_at(lane.access, s))
+    )
 
 
 _PROPERTIES: tuple[tuple[ChangedThing, Callable[[Lane, float], str]], ...] = (
     ("lane type", lambda lane, _: lane.type),
     ("lane direction", lambda lane, _: lane.direction),
-    ("lane height", _height),
-    ("permission", lambda lane, s: _access(lane, s) or "as the lane's type"),
-    ("road mark", lambda lane, s: _mark(_last(lane.road_marks, s))),
+    ("lane height", _describe_height),
+    ("permission", lambda lane, s: _describe_access(lane, s) or "as the lane's type"),
+    ("road mark", lambda lane, s: _describe_mark(_last_record_at(lane.road_marks, s))),
 )
 
 
-def _properties(old: Lane, new: Lane, stretch: PairedStretch) -> Iterator[_Found]:
+def _compare_properties(old: Lane, new: Lane, stretch: PairedStretch) -> Iterator[_Found]:
     if old == new:
         return
     starts = (
@@ -131,7 +133,9 @@ def _properties(old: Lane, new: Lane, stretch: PairedStretch) -> Iterator[_Found
 
 
 # ------------------------------------------------------------------------- widths and limits
-def _width(pair: RoadPair, stretch: PairedStretch, lanes: tuple[Lane, Lane]) -> Iterator[_Found]:
+def _compare_widths(
+    pair: RoadPair, stretch: PairedStretch, lanes: tuple[Lane, Lane]
+) -> Iterator[_Found]:
     """Pieces on which the widths differ, with those at the place where they differ most."""
     if lanes[0].widths == lanes[1].widths and lanes[0].borders == lanes[1].borders == ():
         return
@@ -159,7 +163,7 @@ def _widths_at(table: RoadTable, key: LaneKey, s: FloatArray) -> FloatArray:
     return table.lane_width(np.full(s.size, table.lane_index[key]), s)
 
 
-def _limits(pair: RoadPair) -> list[_Found]:
+def _compare_limits(pair: RoadPair) -> list[_Found]:
     """Limits as they act, of lanes for motor vehicles: one of the road where all change alike."""
     found: list[_Found] = []
     for stretch in pair.stretches:
@@ -171,7 +175,7 @@ def _limits(pair: RoadPair) -> list[_Found]:
         starts = [
             record.s - stretch.s0
             for road in (pair.before, pair.after)
-            for record in (*road.types, *_speeds(road))
+            for record in (*road.types, *_speeds_of_road(road))
             if record.s > stretch.s0
         ]
         length = stretch.s1 - stretch.s0
@@ -181,7 +185,7 @@ def _limits(pair: RoadPair) -> list[_Found]:
     return found
 
 
-def _speeds(road: Road) -> Iterable[Any]:
+def _speeds_of_road(road: Road) -> Iterable[Any]:
     return (
         speed
         for section in road.sections
@@ -207,21 +211,21 @@ def _limits_of(
                 pair.tables, (pair.before, pair.after), stretch.sections, both, strict=True
             )
         )
-        values.append((both[0].id, (_limit(old), _limit(new))))
+        values.append((both[0].id, (_describe_limit(old), _describe_limit(new))))
     changed = [(lane, said) for lane, said in values if said[0] != said[1]]
     if changed and len(changed) == len(values) and len({said for _, said in changed}) == 1:
         return [_Found("limit", None, changed[0][1], *between)]
     return [_Found("limit", lane, said, *between) for lane, said in changed]
 
 
-def _limit(value: float) -> str:
+def _describe_limit(value: float) -> str:
     if math.isnan(value):
         return "none given"
     return "no limit" if math.isinf(value) else f"{metres(round(value * _KMH, 2))} km/h"
 
 
 # ------------------------------------------------------------------------- one line each
-def _joined(found: Iterable[_Found]) -> list[_Found]:
+def _join_pieces(found: Iterable[_Found]) -> list[_Found]:
     """Pieces of a lane that follow each other and say the same, as one.
 
     Widths are one from end to end, with the values where they differ most.
@@ -241,16 +245,16 @@ def _joined(found: Iterable[_Found]) -> list[_Found]:
     return kept
 
 
-def _change(pair: RoadPair, one: _Found) -> MapChange:
-    road = pair.after.id if one.added else pair.before.id
-    of = of_road(road) if one.lane is None else of_lane(road, one.lane)
+def _lane_change(pair: RoadPair, found: _Found) -> MapChange:
+    road = pair.after.id if found.added else pair.before.id
+    of = of_road(road) if found.lane is None else of_lane(road, found.lane)
     kind: ChangeKind = "changed"
-    if one.what == "lane":
-        kind = "added" if one.added else "removed"
+    if found.what == "lane":
+        kind = "added" if found.added else "removed"
     return MapChange(
         kind,
-        one.what,
-        of if one.what == "lane" else f"{one.what} of {of}",
-        *one.values,
-        place=ChangePlace(road, one.s0, one.s1, one.lane),
+        found.what,
+        of if found.what == "lane" else f"{found.what} of {of}",
+        *found.values,
+        place=ChangePlace(road, found.s0, found.s1, found.lane),
     )

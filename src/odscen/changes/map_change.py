@@ -73,9 +73,9 @@ class MapChange:
     @property
     def words(self) -> str:
         """One line for people: ``width of lane -1 of road 5, s 0 to 120 m: 4 m -> 2.4 m``."""
-        return f"{self.subject}{self._where()}: {self._values()}"
+        return f"{self.subject}{self._describe_place()}: {self._describe_values()}"
 
-    def _where(self) -> str:
+    def _describe_place(self) -> str:
         """Part of the road, of what may hold on a part of it."""
         place = self.place
         if place is None or place.s0 == place.s1:
@@ -84,7 +84,7 @@ class MapChange:
             return ""
         return f", s {metres(place.s0)} to {metres(place.s1)} m"
 
-    def _values(self) -> str:
+    def _describe_values(self) -> str:
         if self.before is not None and self.after is not None:
             return f"{self.before} -> {self.after}"
         value = self.after or self.before

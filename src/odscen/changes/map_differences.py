@@ -55,8 +55,8 @@ def lane_link_differences(
 
     What a lane that came or went takes with it is not told: the lane is.
     """
-    old = set(_links(before, roads.by_before, 0))
-    new = set(_links(after, roads.by_after, 1))
+    old = set(_list_links(before, roads.by_before, 0))
+    new = set(_list_links(after, roads.by_after, 1))
     kinds: tuple[tuple[ChangeKind, set[_Link]], ...] = (
         ("removed", old - new),
         ("added", new - old),
@@ -65,38 +65,38 @@ def lane_link_differences(
         for here, there in sorted(links):
             within = here.road == there.road
             what: ChangedThing = "lane link" if within else "connection"
-            junction = None if within else _junction(roads, here.road, there.road)
+            junction = None if within else _common_junction(roads, here.road, there.road)
             through = f" (junction {shown_id(junction)})" if junction else ""
             subject = f"from {of_lane(here.road, here.lane)} to {of_lane(there.road, there.lane)}"
             place = ChangePlace(here.road, here.s, here.s, here.lane)
             yield MapChange(kind, what, f"{what} {subject}{through}", place=place)
 
 
-def _junction(roads: PairedRoads, *names: str) -> str | None:
+def _common_junction(roads: PairedRoads, *names: str) -> str | None:
     found = [roads.by_before[name].before.junction for name in names]
-    return next((str(one) for one in found if one), None)
+    return next((str(junction_id) for junction_id in found if junction_id), None)
 
 
-def _links(odr: OpenDrive, pairs: Mapping[str, RoadPair], side: int) -> Iterator[_Link]:
+def _list_links(odr: OpenDrive, pairs: Mapping[str, RoadPair], side: int) -> Iterator[_Link]:
     """Links of a map between lanes that both maps have, named as before."""
     for key, followers in lane_successors(odr).items():
         for follower in followers:
             if key.road == follower.road and key.section != follower.section:
-                link = _within(pairs, key, follower, side)
+                link = _link_within_road(pairs, key, follower, side)
             else:
-                link = _between(odr, pairs, (key, follower), side)
+                link = _link_between_roads(odr, pairs, (key, follower), side)
             if link is not None:
                 yield link
 
 
-def _within(
+def _link_within_road(
     pairs: Mapping[str, RoadPair], key: LaneKey, follower: LaneKey, side: int
 ) -> _Link | None:
     """Link over the border of two sections that both maps have there."""
     pair = pairs.get(key.road)
     if pair is None:
         return None
-    later = max(key, follower, key=lambda one: one.section)
+    later = max(key, follower, key=lambda lane_key: lane_key.section)
     at = [
         number
         for number, stretch in enumerate(pair.stretches)
@@ -108,13 +108,13 @@ def _within(
     if low.sections[1 - side] == high.sections[1 - side]:
         return None  # the other map has one section here: its lanes go on
     ends = []
-    for one in (key, follower):
-        number = at[0] if one.section == later.section else at[0] - 1
-        ends.append(_named(pair, number, one.lane, side, high.s0))
+    for lane_key in (key, follower):
+        number = at[0] if lane_key.section == later.section else at[0] - 1
+        ends.append(_name_as_before(pair, number, lane_key.lane, side, high.s0))
     return (ends[0], ends[1]) if ends[0] and ends[1] else None
 
 
-def _between(
+def _link_between_roads(
     odr: OpenDrive, pairs: Mapping[str, RoadPair], link: tuple[LaneKey, LaneKey], side: int
 ) -> _Link | None:
     ends = []
@@ -127,20 +127,20 @@ def _between(
         forward = is_forward(road, lane)
         number = len(pair.stretches) - 1 if forward == leaves else 0
         at = pair.before.length if forward == leaves else 0.0
-        ends.append(_named(pair, number, key.lane, side, at))
+        ends.append(_name_as_before(pair, number, key.lane, side, at))
     return (ends[0], ends[1]) if ends[0] and ends[1] else None
 
 
-def _named(pair: RoadPair, number: int, lane: int, side: int, s: float) -> _LinkEnd | None:
+def _name_as_before(pair: RoadPair, number: int, lane: int, side: int, s: float) -> _LinkEnd | None:
     """Lane of one map by its name in the map before; none if only one map has it."""
     for both in pair.stretches[number].pairs:
         one = both[side]
         if one is not None and one.id == lane:
-            return None if both[0] is None or both[1] is None else _end(pair, both[0].id, s)
+            return None if both[0] is None or both[1] is None else _link_end(pair, both[0].id, s)
     return None
 
 
-def _end(pair: RoadPair, lane: int, s: float) -> _LinkEnd:
+def _link_end(pair: RoadPair, lane: int, s: float) -> _LinkEnd:
     at = pair.before.length if abs(s - pair.before.length) <= SAME else s
     return _LinkEnd(pair.before.id, lane, round(at, 3))
 
@@ -152,10 +152,10 @@ def junction_differences(
     """Junctions that came, went or have other priorities, controllers, types or roads."""
     names = {str(pair.after.id): str(pair.before.id) for pair in roads.by_before.values()}
     old, new = before.junctions, after.junctions
-    for one in _only(old, new):
-        yield MapChange("removed", "junction", f"junction {shown_id(one)}")
-    for one in _only(new, old):
-        yield MapChange("added", "junction", f"junction {shown_id(one)}")
+    for name in _keys_only_in(old, new):
+        yield MapChange("removed", "junction", f"junction {shown_id(name)}")
+    for name in _keys_only_in(new, old):
+        yield MapChange("added", "junction", f"junction {shown_id(name)}")
     for key, junction in old.items():
         if key in new:
             yield from _junction_values(junction, new[key], names)
@@ -167,16 +167,16 @@ def junction_differences(
             yield MapChange("changed", "junction", subject, old_one, new_one, place)
 
 
-def _only(these: Iterable[str], others: Container[str]) -> list[str]:
+def _keys_only_in(these: Iterable[str], others: Container[str]) -> list[str]:
     return [str(key) for key in these if key not in others]
 
 
 def _junction_values(old: Junction, new: Junction, names: Mapping[str, str]) -> Iterator[MapChange]:
     name = f"junction {shown_id(old.id)}"
-    ways = {f"road {one.high} over road {one.low}" for one in old.priorities}
+    ways = {f"road {priority.high} over road {priority.low}" for priority in old.priorities}
     others = {
-        f"road {names.get(one.high, one.high)} over road {names.get(one.low, one.low)}"
-        for one in new.priorities
+        f"road {names.get(priority.high, priority.high)} over road {names.get(priority.low, priority.low)}"
+        for priority in new.priorities
     }
     for said in sorted(ways - others):
         yield MapChange("removed", "priority", f"priority of {said} at {name}")
@@ -185,7 +185,7 @@ def _junction_values(old: Junction, new: Junction, names: Mapping[str, str]) -> 
     for what, before, after in (
         ("type", old.type, new.type),
         ("name", old.name, new.name),
-        ("controllers", _list(old.controllers), _list(new.controllers)),
+        ("controllers", _join_sorted(old.controllers), _join_sorted(new.controllers)),
         ("main road", old.main_road, new.main_road),
     ):
         if before != after:
@@ -193,7 +193,7 @@ def _junction_values(old: Junction, new: Junction, names: Mapping[str, str]) -> 
             yield MapChange("changed", "junction", f"{what} of {name}", *said_both)
 
 
-def _list(items: Iterable[str]) -> str:
+def _join_sorted(items: Iterable[str]) -> str:
     return ", ".join(sorted(items))
 
 
@@ -201,22 +201,22 @@ def controller_differences(
     before: Mapping[str, Controller], after: Mapping[str, Controller]
 ) -> Iterator[MapChange]:
     """Controllers that came, went, or control other signals."""
-    for key in _only(before, after):
+    for key in _keys_only_in(before, after):
         yield MapChange("removed", "controller", f"controller {shown_id(key)}")
-    for key in _only(after, before):
+    for key in _keys_only_in(after, before):
         yield MapChange("added", "controller", f"controller {shown_id(key)}")
     for key, old in before.items():
         new = after.get(key)
         if new is None:
             continue
-        said = _controlled(old.controls), _controlled(new.controls)
+        said = _list_controlled(old.controls), _list_controlled(new.controls)
         if said[0] != said[1]:
             subject = f"signals of controller {shown_id(key)}"
             yield MapChange("changed", "controller", subject, *said)
 
 
-def _controlled(controls: Sequence[tuple[str, str]]) -> str:
-    return _list(signal for signal, _ in controls) or "none"
+def _list_controlled(controls: Sequence[tuple[str, str]]) -> str:
+    return _join_sorted(signal for signal, _ in controls) or "none"
 
 
 _STEP = 2.0
@@ -235,16 +235,16 @@ def road_differences(pair: RoadPair, roads: Mapping[str, str]) -> Iterator[MapCh
         Id before by id after, of each road that is in both maps.
     """
     old, new = pair.before, pair.after
-    yield from _values(old, new)
+    yield from _compare_attributes(old, new)
     if old == new:
         return
-    yield from _line(pair)
-    yield from _types(old, new)
+    yield from _compare_reference_lines(pair)
+    yield from _compare_road_types(old, new)
     for end in ("predecessor", "successor"):
-        yield from _link(old, new, end, roads)
+        yield from _compare_road_link(old, new, end, roads)
 
 
-def _values(old: Road, new: Road) -> Iterator[MapChange]:
+def _compare_attributes(old: Road, new: Road) -> Iterator[MapChange]:
     place = ChangePlace(old.id, 0.0, old.length)
     for name, before, after in (
         ("id", old.id, new.id),
@@ -261,12 +261,12 @@ def _values(old: Road, new: Road) -> Iterator[MapChange]:
         yield MapChange("changed", "geometry", f"length of {of_road(old.id)}", *said, place=place)
 
 
-def _line(pair: RoadPair) -> Iterator[MapChange]:
+def _compare_reference_lines(pair: RoadPair) -> Iterator[MapChange]:
     """Reference line, height, roll and lane offset, each with its greatest difference."""
     end = min(pair.before.length, pair.after.length)
     s = np.linspace(0.0, end, max(2, int(end / _STEP) + 1))
     old, new = (
-        _evaluated(table, road, s)
+        _evaluate_road(table, road, s)
         for table, road in zip(pair.tables, (pair.before, pair.after), strict=True)
     )
     moved = np.hypot(old["x"] - new["x"], old["y"] - new["y"])
@@ -277,7 +277,7 @@ def _line(pair: RoadPair) -> Iterator[MapChange]:
             f"line of {of_road(pair.before.id)}",
             None,
             f"by up to {metres(float(moved.max()))} m",
-            place=_where(pair, s, moved, _LINE),
+            place=_place_of_difference(pair, s, moved, _LINE),
         )
     things: tuple[tuple[ChangedThing, str, float], ...] = (
         ("elevation", "m", SAME),
@@ -289,12 +289,12 @@ def _line(pair: RoadPair) -> Iterator[MapChange]:
         at = int(np.argmax(apart))
         if apart[at] > same:
             subject = f"{what} of {of_road(pair.before.id)} at s {metres(float(s[at]))} m"
-            before, after = (f"{metres(float(one[what][at]))} {unit}" for one in (old, new))
-            place = _where(pair, s, apart, same)
+            before, after = (f"{metres(float(row[what][at]))} {unit}" for row in (old, new))
+            place = _place_of_difference(pair, s, apart, same)
             yield MapChange("changed", what, subject, before, after, place)
 
 
-def _evaluated(table: RoadTable, road: Road, s: FloatArray) -> dict[str, FloatArray]:
+def _evaluate_road(table: RoadTable, road: Road, s: FloatArray) -> dict[str, FloatArray]:
     row = np.full(s.size, table.road_index[road.id])
     line = table.reference(row, s)
     return {
@@ -306,16 +306,18 @@ def _evaluated(table: RoadTable, road: Road, s: FloatArray) -> dict[str, FloatAr
     }
 
 
-def _where(pair: RoadPair, s: FloatArray, apart: FloatArray, same: float) -> ChangePlace:
+def _place_of_difference(
+    pair: RoadPair, s: FloatArray, apart: FloatArray, same: float
+) -> ChangePlace:
     at = np.flatnonzero(apart > same)
     return ChangePlace(pair.before.id, float(s[at[0]]), float(s[at[-1]]))
 
 
-def _types(old: Road, new: Road) -> Iterator[MapChange]:
+def _compare_road_types(old: Road, new: Road) -> Iterator[MapChange]:
     if old.types == new.types:
         return
     end = min(old.length, new.length)
-    starts = merged((one.s for road in (old, new) for one in road.types), end=end)
+    starts = merged((road_type.s for road in (old, new) for road_type in road.types), end=end)
     before = None
     for s0, s1 in zip(starts, [*starts[1:], end], strict=True):
         said = _type_at(old, 0.5 * (s0 + s1)), _type_at(new, 0.5 * (s0 + s1))
@@ -327,11 +329,13 @@ def _types(old: Road, new: Road) -> Iterator[MapChange]:
 
 
 def _type_at(road: Road, s: float) -> str:
-    holding = [one.type for one in road.types if one.s <= s]
+    holding = [road_type.type for road_type in road.types if road_type.s <= s]
     return holding[-1] if holding else "none"
 
 
-def _link(old: Road, new: Road, end: str, roads: Mapping[str, str]) -> Iterator[MapChange]:
+def _compare_road_link(
+    old: Road, new: Road, end: str, roads: Mapping[str, str]
+) -> Iterator[MapChange]:
     before: RoadLink | None = getattr(old, end)
     after: RoadLink | None = getattr(new, end)
     said = _link_words(before, None), _link_words(after, roads)
@@ -359,9 +363,11 @@ _MS_UNITS = ("m/s", "km/h", "mph")
 
 def furniture_differences(old: Road, new: Road) -> Iterator[MapChange]:
     """Differences of signals, references of signals, and objects of a road."""
-    yield from _things(old, new, old.signals, new.signals, _signal_name)
-    yield from _things(old, new, old.signal_references, new.signal_references, _reference_name)
-    yield from _things(old, new, old.objects, new.objects, _object_name)
+    yield from _compare_things(old, new, old.signals, new.signals, _signal_name)
+    yield from _compare_things(
+        old, new, old.signal_references, new.signal_references, _reference_name
+    )
+    yield from _compare_things(old, new, old.objects, new.objects, _object_name)
 
 
 def _signal_name(one: Any) -> tuple[ChangedThing, str]:
@@ -378,7 +384,7 @@ def _object_name(one: Any) -> tuple[ChangedThing, str]:
     return "object", f"object {shown_id(one.id)} ({one.type or 'no type'})"
 
 
-def _things(
+def _compare_things(
     old: Road,
     new: Road,
     before: Sequence[Any],
@@ -387,22 +393,26 @@ def _things(
 ) -> Iterator[MapChange]:
     if before == after:
         return
-    pairs, gone, came = _paired(before, after)
+    pairs, gone, came = _pair_things(before, after)
     for one in gone:
         what, subject = name(one)
-        yield MapChange("removed", what, f"{subject} of {of_road(old.id)}", place=_place(old, one))
+        yield MapChange(
+            "removed", what, f"{subject} of {of_road(old.id)}", place=_place_of_thing(old, one)
+        )
     for one in came:
         what, subject = name(one)
-        yield MapChange("added", what, f"{subject} of {of_road(new.id)}", place=_place(new, one))
+        yield MapChange(
+            "added", what, f"{subject} of {of_road(new.id)}", place=_place_of_thing(new, one)
+        )
     for first, second in pairs:
-        yield from _differences(old, first, second, name)
+        yield from _compare_fields(old, first, second, name)
 
 
-def _place(road: Road, one: Any) -> ChangePlace:
+def _place_of_thing(road: Road, one: Any) -> ChangePlace:
     return ChangePlace(road.id, one.s, one.s, None, one.t)
 
 
-def _paired(
+def _pair_things(
     before: Sequence[Any], after: Sequence[Any]
 ) -> tuple[list[tuple[Any, Any]], list[Any], list[Any]]:
     """Pair by id, the nearest first where an id is not unique; then by type and place."""
@@ -410,12 +420,12 @@ def _paired(
     gone = _take_pairs(before, list(after), pairs, key=lambda one: one.id, within=float("inf"))
     taken = {id(second) for _, second in pairs}
     rest = [one for one in after if id(one) not in taken]
-    gone = _take_pairs(gone, rest, pairs, key=_kind, within=_NEAR)
+    gone = _take_pairs(gone, rest, pairs, key=_type_and_subtype, within=_NEAR)
     taken = {id(second) for _, second in pairs}
     return pairs, gone, [one for one in after if id(one) not in taken]
 
 
-def _kind(one: Any) -> tuple[str, str]:
+def _type_and_subtype(one: Any) -> tuple[str, str]:
     return getattr(one, "type", one.id), getattr(one, "subtype", "")
 
 
@@ -433,8 +443,8 @@ def _take_pairs(
         free[key(one)].append(one)
     alone = []
     for one in before:
-        near = min(free[key(one)], key=lambda other: _apart(one, other), default=None)
-        if near is None or _apart(one, near) > within:
+        near = min(free[key(one)], key=lambda other: _distance_apart(one, other), default=None)
+        if near is None or _distance_apart(one, near) > within:
             alone.append(one)
             continue
         free[key(one)] = [other for other in free[key(one)] if other is not near]
@@ -442,43 +452,43 @@ def _take_pairs(
     return alone
 
 
-def _apart(one: Any, other: Any) -> float:
+def _distance_apart(one: Any, other: Any) -> float:
     return hypot(one.s - other.s, one.t - other.t)
 
 
-def _differences(
+def _compare_fields(
     road: Road, old: Any, new: Any, name: Callable[[Any], tuple[ChangedThing, str]]
 ) -> Iterator[MapChange]:
     what, subject = name(old)
     of = f"{subject} of {of_road(road.id)}"
-    place = _place(road, old)
-    if _apart(old, new) > _MOVED:
+    place = _place_of_thing(road, old)
+    if _distance_apart(old, new) > _MOVED:
         before, after = (f"s {metres(one.s)} m, t {metres(one.t)} m" for one in (old, new))
         yield MapChange("moved", what, of, before, after, place)
     if old.id != new.id:
         yield MapChange("changed", what, f"id of {of}", old.id, new.id, place=place)
-    for field in _fields(old):
+    for field in _field_names(old):
         before, after = getattr(old, field), getattr(new, field)
-        if field not in _PLACE and not _equal(before, after):
+        if field not in _PLACE and not _values_equal(before, after):
             label = field.replace("_", " ")
-            values = _said(old, field), _said(new, field)
+            values = _describe_field(old, field), _describe_field(new, field)
             if values[0] == values[1]:
                 values = "as it was", "another"
             yield MapChange("changed", what, f"{label} of {of}", *values, place=place)
 
 
-def _fields(one: Any) -> Sequence[str]:
+def _field_names(one: Any) -> Sequence[str]:
     names: Sequence[str] = getattr(one, "_fields", ())
     return names or [field.name for field in fields(one)]
 
 
-def _equal(before: Any, after: Any) -> bool:
+def _values_equal(before: Any, after: Any) -> bool:
     if isinstance(before, float) and isinstance(after, float):
         return abs(before - after) <= SAME
     return bool(before == after)
 
 
-def _said(one: Any, field: str) -> str:
+def _describe_field(one: Any, field: str) -> str:
     value = getattr(one, field)
     if field == "value" and value is not None and one.unit in _MS_UNITS:
         return f"{metres(round(value * 3.6, 2))} km/h"
@@ -505,7 +515,7 @@ def map_differences(before: OpenDrive, after: OpenDrive) -> tuple[MapChange, ...
         The maps as read.
     """
     tables = RoadTable.of(before), RoadTable.of(after)
-    partners = _partners(before, after, tables)
+    partners = _find_partner_roads(before, after, tables)
     pairs = [
         RoadPair(
             before.roads[old],
@@ -519,8 +529,8 @@ def map_differences(before: OpenDrive, after: OpenDrive) -> tuple[MapChange, ...
         {str(pair.before.id): pair for pair in pairs}, {str(pair.after.id): pair for pair in pairs}
     )
     return (
-        *_header(before, after),
-        *_roads(before, after, partners),
+        *_compare_headers(before, after),
+        *_compare_roads(before, after, partners),
         *_within_roads(pairs, {str(new): str(old) for old, new in partners.items()}),
         *lane_link_differences(before, after, roads),
         *junction_differences(before, after, roads),
@@ -528,7 +538,7 @@ def map_differences(before: OpenDrive, after: OpenDrive) -> tuple[MapChange, ...
     )
 
 
-def _header(before: OpenDrive, after: OpenDrive) -> Iterator[MapChange]:
+def _compare_headers(before: OpenDrive, after: OpenDrive) -> Iterator[MapChange]:
     old, new = before.header, after.header
     for name, was, now in (
         ("geographic reference", old.geo_reference, new.geo_reference),
@@ -539,7 +549,7 @@ def _header(before: OpenDrive, after: OpenDrive) -> Iterator[MapChange]:
             yield MapChange("changed", "header", subject, was or "none", now or "none")
 
 
-def _partners(
+def _find_partner_roads(
     before: OpenDrive, after: OpenDrive, tables: tuple[RoadTable, RoadTable]
 ) -> dict[RoadId, RoadId]:
     """Id after of each road that both maps have."""
@@ -547,9 +557,11 @@ def _partners(
     alone = [road for road in before.roads if road not in partners]
     rest = [road for road in after.roads if road not in partners]
     if alone and rest:
-        places = _places(tables[1], [after.roads[road] for road in rest])
+        places = _road_places(tables[1], [after.roads[road] for road in rest])
         for road, place in zip(
-            alone, _places(tables[0], [before.roads[one] for one in alone]), strict=True
+            alone,
+            _road_places(tables[0], [before.roads[road_id] for road_id in alone]),
+            strict=True,
         ):
             apart = np.abs(places - place).max(axis=1)
             nearest = int(np.argmin(apart))
@@ -559,7 +571,7 @@ def _partners(
     return {road: partners[road] for road in before.roads if road in partners}
 
 
-def _places(
+def _road_places(
     table: RoadTable, roads: list[Road]
 ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """Where roads begin, have their middle and end, shape ``(roads, 6)``, metres."""
@@ -569,19 +581,19 @@ def _places(
     return np.stack([value for point in points for value in (point.x, point.y)], axis=1)
 
 
-def _roads(
+def _compare_roads(
     before: OpenDrive, after: OpenDrive, partners: Mapping[RoadId, RoadId]
 ) -> Iterator[MapChange]:
     for road in before.roads.values():
         if road.id not in partners:
-            yield _whole(road, "removed")
+            yield _whole_road_change(road, "removed")
     known = set(partners.values())
     for road in after.roads.values():
         if road.id not in known:
-            yield _whole(road, "added")
+            yield _whole_road_change(road, "added")
 
 
-def _whole(road: Road, kind: str) -> MapChange:
+def _whole_road_change(road: Road, kind: str) -> MapChange:
     of = f" of junction {road.junction}" if road.junction else ""
     said = f"{metres(road.length)} m{of}"
     place = ChangePlace(road.id, 0.0, road.length)

@@ -42,11 +42,11 @@ def paired_stretches(before: Road, after: Road) -> list[PairedStretch]:
         The same road in two maps. Their sections need not begin at the same places.
     """
     end = min(before.length, after.length)
-    starts = merged((one.s for road in (before, after) for one in road.sections), end=end)
+    starts = merged((section.s for road in (before, after) for section in road.sections), end=end)
     found = []
     for s0, s1 in zip(starts, [*starts[1:], end], strict=True):
         middle = 0.5 * (s0 + s1)
-        sections = _section(before, middle), _section(after, middle)
+        sections = _section_at(before, middle), _section_at(after, middle)
         pairs = paired_lanes(before.sections[sections[0]], after.sections[sections[1]])
         found.append(PairedStretch(s0, s1, sections, pairs))
     return found
@@ -61,7 +61,7 @@ def merged(places: Iterable[float], *, end: float) -> list[float]:
     return kept
 
 
-def _section(road: Road, s: float) -> int:
+def _section_at(road: Road, s: float) -> int:
     starts = [index for index, one in enumerate(road.sections) if one.s <= s]
     return starts[-1] if starts else 0
 
@@ -72,20 +72,20 @@ def paired_lanes(before: LaneSection, after: LaneSection) -> tuple[LanePair, ...
     Where a lane is missing among equal ones, it is the outermost of them.
     """
     centre: LanePair = (before.lanes.get(0), after.lanes.get(0))
-    return centre, *_side(before, after, -1), *_side(before, after, 1)
+    return centre, *_pair_side(before, after, -1), *_pair_side(before, after, 1)
 
 
-def _side(before: LaneSection, after: LaneSection, sign: int) -> list[LanePair]:
+def _pair_side(before: LaneSection, after: LaneSection, sign: int) -> list[LanePair]:
     old, new = (
         [section.lanes[k] for k in sorted(section.lanes, key=abs) if k * sign > 0]
         for section in (before, after)
     )
     if len(old) == len(new):
         return list(zip(old, new, strict=True))
-    return _aligned(old, new)
+    return _align_lanes(old, new)
 
 
-def _aligned(old: Sequence[Lane], new: Sequence[Lane]) -> list[LanePair]:
+def _align_lanes(old: Sequence[Lane], new: Sequence[Lane]) -> list[LanePair]:
     """Pair two sequences at the least cost; a lane without a partner costs most."""
 
     @cache
@@ -94,7 +94,7 @@ def _aligned(old: Sequence[Lane], new: Sequence[Lane]) -> list[LanePair]:
         choices: list[tuple[float, tuple[LanePair, ...]]] = []
         if i < len(old) and j < len(new):
             cost, rest = best(i + 1, j + 1)
-            choices.append((cost + _unlike(old[i], new[j]), ((old[i], new[j]), *rest)))
+            choices.append((cost + _unlikeness(old[i], new[j]), ((old[i], new[j]), *rest)))
         if i < len(old):
             cost, rest = best(i + 1, j)
             choices.append((cost + _MISSING, ((old[i], None), *rest)))
@@ -106,15 +106,15 @@ def _aligned(old: Sequence[Lane], new: Sequence[Lane]) -> list[LanePair]:
     return list(best(0, 0)[1])
 
 
-def _unlike(old: Lane, new: Lane) -> float:
+def _unlikeness(old: Lane, new: Lane) -> float:
     details = ("direction", "level", "heights", "speeds", "access", "road_marks")
     other = sum(getattr(old, name) != getattr(new, name) for name in details)
     return float(
         _OTHER_TYPE * (old.type != new.type)
-        + min(1.0, abs(_first(old.widths) - _first(new.widths)))
+        + min(1.0, abs(_first_coefficient(old.widths) - _first_coefficient(new.widths)))
         + _OTHER_DETAIL * other
     )
 
 
-def _first(profile: Sequence[Cubic]) -> float:
+def _first_coefficient(profile: Sequence[Cubic]) -> float:
     return profile[0].a if profile else 0.0

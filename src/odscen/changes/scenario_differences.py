@@ -52,10 +52,10 @@ class ScenarioChange:
     def words(self) -> str:
         """One line for people: ``actor van-1, goal: "5.0.-1.3" -> "7.0.-1.9"``."""
         if self.before is None or self.after is None:
-            return f"{self._subject()}: {self.kind}"
-        return f"{self._subject()}: {self.before} -> {self.after}"
+            return f"{self._describe_subject()}: {self.kind}"
+        return f"{self._describe_subject()}: {self.before} -> {self.after}"
 
-    def _subject(self) -> str:
+    def _describe_subject(self) -> str:
         said: list[str] = []
         parts = iter(self.place)
         for part in parts:
@@ -87,28 +87,28 @@ def scenario_differences(before: Scenario, after: Scenario) -> tuple[ScenarioCha
 
 def field_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[ScenarioChange]:
     """Find the differences of two documents as plain data, in the order of their fields."""
-    yield from _fields(old, new, ())
+    yield from _compare_fields(old, new, ())
 
 
-def _fields(
+def _compare_fields(
     old: Mapping[str, Any], new: Mapping[str, Any], place: tuple[str, ...]
 ) -> Iterator[ScenarioChange]:
     for key in dict.fromkeys([*old, *new]):
-        yield from _value(old.get(key), new.get(key), (*place, key))
+        yield from _compare_values(old.get(key), new.get(key), (*place, key))
 
 
-def _value(old: Any, new: Any, place: tuple[str, ...]) -> Iterator[ScenarioChange]:
+def _compare_values(old: Any, new: Any, place: tuple[str, ...]) -> Iterator[ScenarioChange]:
     if old == new:
         return
     if isinstance(old, dict) and isinstance(new, dict):
-        yield from _fields(old, new, place)
+        yield from _compare_fields(old, new, place)
     elif isinstance(old, list) and isinstance(new, list):
         if all(isinstance(one, dict) and "id" in one for one in (*old, *new)):
             yield from _by_id(old, new, place)
         else:
-            yield ScenarioChange("changed", place, *_lists(old, new))
+            yield ScenarioChange("changed", place, *_shorten_lists(old, new))
     else:
-        yield ScenarioChange("changed", place, _said(old), _said(new))
+        yield ScenarioChange("changed", place, _format_value(old), _format_value(new))
 
 
 def _by_id(
@@ -118,7 +118,7 @@ def _by_id(
     now = {one["id"]: one for one in new}
     for key, one in was.items():
         if key in now:
-            yield from _fields(one, now[key], (*place, key))
+            yield from _compare_fields(one, now[key], (*place, key))
         else:
             yield ScenarioChange("removed", (*place, key))
     for key in now:
@@ -128,20 +128,20 @@ def _by_id(
         yield ScenarioChange("changed", (*place, "order"), "as it was", "another")
 
 
-def _lists(old: Sequence[Any], new: Sequence[Any]) -> tuple[str, str]:
+def _shorten_lists(old: Sequence[Any], new: Sequence[Any]) -> tuple[str, str]:
     """Short lists whole; of long ones only what is not in the other, with how many it is."""
-    said = _said(old), _said(new)
+    said = _format_value(old), _format_value(new)
     if max(map(len, said)) <= _LONGEST:
         return said
     first, second = (Counter(json.dumps(one) for one in these) for these in (old, new))
     lost, gained = first - second, second - first
-    return _count(old, lost), _count(new, gained)
+    return _describe_count(old, lost), _describe_count(new, gained)
 
 
-def _count(these: Sequence[Any], own: Counter[str]) -> str:
+def _describe_count(these: Sequence[Any], own: Counter[str]) -> str:
     return f"{len(these)} values, of them {sum(own.values())} only here"
 
 
-def _said(value: Any) -> str:
+def _format_value(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=True)
     return text if len(text) <= _LONGEST or isinstance(value, list) else text[:_LONGEST] + "..."

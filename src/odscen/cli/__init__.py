@@ -118,12 +118,12 @@ def main() -> None:
         _end_at_once_if_asked()
         sys.exit(_INTERRUPTED)
     except OdscenError as error:
-        _report(error)
+        _report_to_console(error)
         sys.exit(error.exit_code)
     except RuntimeError as error:
         if "can't start new thread" not in str(error):
             raise
-        _report(ResourceError(NO_MEMORY))
+        _report_to_console(ResourceError(NO_MEMORY))
         sys.exit(ResourceError.exit_code)
     except SystemExit as stop:
         # Typer has told people what is wrong with the call; scripts want it as JSON too.
@@ -135,7 +135,7 @@ def main() -> None:
         raise
 
 
-def _report(error: OdscenError) -> None:
+def _report_to_console(error: OdscenError) -> None:
     from odscen.cli.console import report_error
 
     report_error(error)

@@ -21,7 +21,7 @@ SAME_SIZE = 0.001
 
 
 @app.callback()
-def _assets() -> None:
+def _assets_group() -> None:
     pass
 
 
@@ -85,7 +85,7 @@ def update(
     sources = json.dumps({SOURCE: "measured on a CARLA server, one of each model"})
     text = f'{{"sources": {sources},\n"blueprints": [\n' + ",\n".join(rows) + "\n]}\n"
     path = write_text(store.assets_folder / BLUEPRINTS_FILE, text)
-    changes = _changes(old.blueprints, {model.id: model for model in models})
+    changes = _compare_models(old.blueprints, {model.id: model for model in models})
     if as_json:
         print_json({"file": str(path), "models": len(models), **changes})
         return
@@ -95,7 +95,9 @@ def update(
             log(f"{what}: {', '.join(names)}")
 
 
-def _changes(old: Mapping[str, Blueprint], new: Mapping[str, Blueprint]) -> dict[str, list[str]]:
+def _compare_models(
+    old: Mapping[str, Blueprint], new: Mapping[str, Blueprint]
+) -> dict[str, list[str]]:
     both = sorted(old.keys() & new.keys())
     resized = [
         name

@@ -85,28 +85,30 @@ def command_line(given: Sequence[str] | None = None) -> typer.Typer:
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": list(_HELP)},
     )
-    app.callback()(_options)
+    app.callback()(_common_options)
     asked = None if given is None else given[0] if given else _HELP[0]
     listed = asked in _HELP  # each command in a line, without its parameters
     known = asked in _COMMANDS or asked in _GROUPS
     for name in _GROUPS:
         if not known or name == asked:
-            app.add_typer(_named_only(_group(name)) if listed else _group(name), name=name)
+            app.add_typer(
+                _named_only(_build_group(name)) if listed else _build_group(name), name=name
+            )
     for name, place in _COMMANDS.items():
         if not known or name == asked:
-            function = _found(place)
-            kind = _found(_CLASSES[name]) if name in _CLASSES else None
+            function = _import_command(place)
+            kind = _import_command(_CLASSES[name]) if name in _CLASSES else None
             app.command(name, cls=kind)(_without_parameters(function) if listed else function)
     return app
 
 
-def _group(name: str) -> typer.Typer:
+def _build_group(name: str) -> typer.Typer:
     place, more = _GROUPS[name]
-    group: typer.Typer = _found(place)
+    group: typer.Typer = _import_command(place)
     there = {info.name for info in group.registered_commands}
     for own, other in more.items():
         if own not in there:
-            group.command(own)(_found(other))
+            group.command(own)(_import_command(other))
     return group
 
 
@@ -122,7 +124,7 @@ def _without_parameters(function: Callable[..., Any]) -> Callable[[], None]:
     return listed
 
 
-def _found(place: str) -> Any:
+def _import_command(place: str) -> Any:
     module, name = place.split(":")
     return getattr(importlib.import_module(f"odscen.cli.{module}"), name)
 
@@ -133,7 +135,7 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-def _options(
+def _common_options(
     _version: Annotated[
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),

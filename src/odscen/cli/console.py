@@ -106,7 +106,7 @@ SimulatorSettingOption = Annotated[
 _MOST_SEEDS = 1000
 
 
-def _seeds(text: str) -> tuple[int, ...]:
+def _parse_seeds(text: str) -> tuple[int, ...]:
     """Read ``10`` (1 to 10), ``1,2,7`` or ``101-150``."""
     found: list[int] = []
     for part in text.split(","):
@@ -166,7 +166,7 @@ SeedsOption = Annotated[
     Any,
     typer.Option(
         "--seeds",
-        parser=_seeds,
+        parser=_parse_seeds,
         metavar="SEEDS",
         help="Seeds: 10 for 1 to 10, or a list such as 1,2,7 or 101-150.",
     ),
@@ -244,11 +244,11 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
             overflow="fold",
         )
     for row in rows:
-        table.add_row(*(_cell(value) for value in row))
+        table.add_row(*(_format_cell(value) for value in row))
     Console(markup=False, emoji=False).print(table)  # brackets are part of what is written
 
 
-def _cell(value: object) -> str:
+def _format_cell(value: object) -> str:
     if isinstance(value, float):
         return f"{value:,.2f}"
     if isinstance(value, int) and not isinstance(value, bool):

@@ -228,7 +228,7 @@ def cosim(
         parity=parity,
         sensed_speed=sensed_speed,
         wheel_calls=wheel_calls,
-        sensors=_sensors(sensor),
+        sensors=_read_sensors(sensor),
         hook=None if hook is None else load_hook(hook),
         pictures=Wish(frames, video, picture_rate),
     )
@@ -265,11 +265,11 @@ def cosim(
             overwrite=overwrite,
             reporter=_BarReporter(step),
         )
-    _show(result, report, as_json=as_json)
+    _show_result(result, report, as_json=as_json)
     raise typer.Exit(_exit_code(result, report))
 
 
-def _sensors(file: Path | None) -> tuple[SensorWish, ...]:
+def _read_sensors(file: Path | None) -> tuple[SensorWish, ...]:
     from odscen.carla.sensors.sensor_file import parse_sensors
 
     if file is None:
@@ -353,7 +353,7 @@ def _exit_code(result: Run, report: CosimReport) -> int:
     return INTERRUPTED if report.interrupted else result.exit_code
 
 
-def _show(result: Run, report: CosimReport, *, as_json: bool) -> None:
+def _show_result(result: Run, report: CosimReport, *, as_json: bool) -> None:
     if as_json:
         print_json({**result.to_dict(), "carla": asdict(report)})
     else:

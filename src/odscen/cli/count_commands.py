@@ -193,7 +193,7 @@ def show_fit(found: CountFits, *, every: bool) -> None:
         log(f"contradictory: {message}")
     met = sum(row.met for row in found.rows)
     if found.hours_met is not None:
-        good = sum(one.met for one in found.hours)
+        good = sum(hour.met for hour in found.hours)
         log(f"{good} of {len(found.hours)} hours within GEH 5 ({found.hours_met:.1%})")
     log(
         f"{met} of {len(found.rows)} counts within GEH 5 ({found.share_met or 0:.1%}); RMSE "

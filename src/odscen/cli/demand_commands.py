@@ -102,7 +102,7 @@ def import_(
             store, document, file, kind=kind, name=name, day=day, **common
         )
     path = scenarios.write_scenario(document, out or scenario)
-    _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
+    _report_demand(document.demand.model_dump(mode="json"), path, as_json=as_json)
 
 
 @app.command()
@@ -153,7 +153,7 @@ def add(
         document, found = sized_demand.sized(store, document, only=name, tell=log)
         log(found.words)
     path = scenarios.write_scenario(document, out or scenario)
-    _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
+    _report_demand(document.demand.model_dump(mode="json"), path, as_json=as_json)
 
 
 @app.command()
@@ -201,7 +201,7 @@ def inflow(
     document = scenarios.read_scenario(scenario)
     document = demands.add_input(store, document, name=name, **fields)
     path = scenarios.write_scenario(document, out or scenario)
-    _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
+    _report_demand(document.demand.model_dump(mode="json"), path, as_json=as_json)
 
 
 @app.command("entries")
@@ -336,7 +336,7 @@ def _lane_ids(text: str) -> tuple[int, ...]:
         raise InputError(f"lanes are written as -1,-2, not {text!r}") from None
 
 
-def _report(demand: dict[str, Any], path: Path, *, as_json: bool) -> None:
+def _report_demand(demand: dict[str, Any], path: Path, *, as_json: bool) -> None:
     sizes = {
         "zones": len(demand["zones"]),
         "profiles": len(demand["profiles"]),

@@ -45,8 +45,8 @@ def diff_maps(
     if as_json:
         print_json(found.to_dict())
     else:
-        _print(found.changes)
-    _end(found.changes, exit_code=exit_code)
+        _print_differences(found.changes)
+    _exit_with_code(found.changes, exit_code=exit_code)
 
 
 def diff_scenarios(
@@ -70,16 +70,16 @@ def diff_scenarios(
             }
         )
     else:
-        _print(found)
-    _end(found, exit_code=exit_code)
+        _print_differences(found)
+    _exit_with_code(found, exit_code=exit_code)
 
 
-def _print(found: Sequence[MapChange] | Sequence[ScenarioChange]) -> None:
+def _print_differences(found: Sequence[MapChange] | Sequence[ScenarioChange]) -> None:
     for one in found:
         typer.echo(one.words)
     log(f"{len(found)} differences" if found else "No difference")
 
 
-def _end(found: Sequence[object], *, exit_code: bool) -> None:
+def _exit_with_code(found: Sequence[object], *, exit_code: bool) -> None:
     if exit_code and found:
         raise typer.Exit(1)

@@ -55,12 +55,12 @@ def doctor(
     Exit code 0: all is well, or was repaired; 2: something is missing, damaged, or was set aside.
     """
     checks = [
-        _check("python", platform.python_version(), needed=True),
-        *(_package(name, needed=True, advice=f"pip install {name}") for name in NEEDED),
-        *(_package(name, needed=False, advice=advice) for name, advice in OPTIONAL.items()),
-        _sumo(),
-        _allocator(),
-        _workspace(workspace),
+        _check_row("python", platform.python_version(), needed=True),
+        *(_check_package(name, needed=True, advice=f"pip install {name}") for name in NEEDED),
+        *(_check_package(name, needed=False, advice=advice) for name, advice in OPTIONAL.items()),
+        _check_sumo(),
+        _check_allocator(),
+        _check_workspace(workspace),
     ]
     healthy = all(check["found"] is not None for check in checks if check["needed"])
     if not as_json:
@@ -69,7 +69,11 @@ def doctor(
             for check in checks
         ]
         print_table("", ("part", "found", "how to get it"), rows)
-    steps = [] if checks[-1]["found"] is None else _steps(workspace, runs or [], repair=repair)
+    steps = (
+        []
+        if checks[-1]["found"] is None
+        else _examine_workspace(workspace, runs or [], repair=repair)
+    )
     told = []
     for step in steps:
         told.append(step.to_dict())
@@ -83,48 +87,52 @@ def doctor(
     raise typer.Exit(0 if healthy else 2)
 
 
-def _steps(workspace: Path | None, runs: list[Path], *, repair: bool) -> Iterator[RepairStep]:
+def _examine_workspace(
+    workspace: Path | None, runs: list[Path], *, repair: bool
+) -> Iterator[RepairStep]:
     from odscen.app.doctor import examine
     from odscen.maps.store import Workspace
 
     return examine(Workspace.open(workspace), runs, repair=repair)
 
 
-def _check(name: str, found: str | None, *, needed: bool, advice: str = "") -> dict[str, Any]:
+def _check_row(name: str, found: str | None, *, needed: bool, advice: str = "") -> dict[str, Any]:
     return {"name": name, "found": found, "needed": needed, "advice": advice}
 
 
-def _package(name: str, *, needed: bool, advice: str) -> dict[str, Any]:
+def _check_package(name: str, *, needed: bool, advice: str) -> dict[str, Any]:
     from importlib.metadata import PackageNotFoundError, version
 
     try:
         found = version(name)
     except PackageNotFoundError:
         found = None
-    return _check(name, found, needed=needed, advice=advice)
+    return _check_row(name, found, needed=needed, advice=advice)
 
 
-def _sumo() -> dict[str, Any]:
+def _check_sumo() -> dict[str, Any]:
     advice = "pip install 'eclipse-sumo>=1.28,<1.29'"
     try:
         import sumo
     except ImportError:
-        return _check("sumo", shutil.which("sumo"), needed=True, advice=advice)
-    return _check("sumo", str(Path(sumo.SUMO_HOME) / "bin" / "sumo"), needed=True, advice=advice)
+        return _check_row("sumo", shutil.which("sumo"), needed=True, advice=advice)
+    return _check_row(
+        "sumo", str(Path(sumo.SUMO_HOME) / "bin" / "sumo"), needed=True, advice=advice
+    )
 
 
-def _allocator() -> dict[str, Any]:
+def _check_allocator() -> dict[str, Any]:
     from odscen.sumo.runner.allocator import fast_allocator
 
     advice = "runs are a tenth faster with it: apt-get install libtcmalloc-minimal4"
-    return _check("fast allocator", fast_allocator(), needed=False, advice=advice)
+    return _check_row("fast allocator", fast_allocator(), needed=False, advice=advice)
 
 
-def _workspace(workspace: Any) -> dict[str, Any]:
+def _check_workspace(workspace: Any) -> dict[str, Any]:
     from odscen.maps.store import Workspace
 
     try:
         found, advice = str(Workspace.open(workspace).root), ""
     except OdscenError as error:
         found, advice = None, str(error)
-    return _check("workspace", found, needed=True, advice=advice)
+    return _check_row("workspace", found, needed=True, advice=advice)

@@ -114,7 +114,9 @@ def import_(
             _print_lists(error.lists)
         raise
     if as_json and read.lists:
-        problems = [{"where": one.where, "message": one.message} for one in read.problems]
+        problems = [
+            {"where": problem.where, "message": problem.message} for problem in read.problems
+        ]
         plan = None if read.plan_file is None else str(read.plan_file)
         lists = as_rows(read.lists)
         print_json({"file": str(out), "sweep": plan, **lists, "problems": problems})
@@ -128,7 +130,7 @@ def import_(
     if read.plan_file is not None:
         log(f"Wrote {read.plan_file}: odscen sweep {out} --plan {read.plan_file}")
     if as_json:
-        print_json({"file": str(out), "problems": [asdict(one) for one in read.problems]})
+        print_json({"file": str(out), "problems": [asdict(problem) for problem in read.problems]})
 
 
 def export(

@@ -123,7 +123,7 @@ def evaluate(
     chosen = shards
     if towns:
         others = model_files.kept(shards, towns)
-        chosen = [one for one in shards if one not in others]
+        chosen = [shard for shard in shards if shard not in others]
     if folder is not None:
         found = evaluation.evaluate_scenarios(store, folder, chosen, run=run)
     else:
@@ -143,7 +143,7 @@ def evaluate(
     for name in dict.fromkeys(one.map_name for one in found):
         own = [one for one in found if one.map_name == name]
         title = f"{name}: {own[0].vehicles:.0f} vehicles in {own[0].scenes} snapshots"
-        print_table(title, ["", *(one.source for one in own)], _rows(own))
+        print_table(title, ["", *(one.source for one in own)], _quality_rows(own))
 
 
 @app.command()
@@ -182,15 +182,15 @@ def driver(
     print_table("root mean square error", columns, rows)
 
 
-def _rows(found: list[TrafficQuality]) -> list[list[str]]:
+def _quality_rows(found: list[TrafficQuality]) -> list[list[str]]:
     return [
-        [column.replace("_", " "), *(_cell(one, column) for one in found)]
+        [column.replace("_", " "), *(_quality_cell(one, column) for one in found)]
         for column in _COLUMNS
         if any(column in one.values for one in found)
     ]
 
 
-def _cell(quality: TrafficQuality, column: str) -> str:
+def _quality_cell(quality: TrafficQuality, column: str) -> str:
     measured = quality.values.get(column)
     if measured is None or math.isnan(measured.value):
         return ""

@@ -118,8 +118,8 @@ def add(
             rows.append({"name": map_name, "source": str(file), "error": error_fields(error)})
             log(f"{printable(str(file))}: refused: {error}")
         else:
-            rows.append({**_row(entry), "source": str(file)})
-            log(_added(entry))
+            rows.append({**_map_row(entry), "source": str(file)})
+            log(_describe_added(entry))
     if as_json:
         print_json({"maps": rows})
     raise typer.Exit(worst)
@@ -146,7 +146,7 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
     from odscen.maps.store import Workspace, is_outdated
 
     entries, broken = Workspace.open(workspace).catalogue()
-    rows = [{**_row(entry), "outdated": is_outdated(entry)} for entry in entries]
+    rows = [{**_map_row(entry), "outdated": is_outdated(entry)} for entry in entries]
     if as_json:
         print_json({"maps": rows, "broken": [asdict(one) for one in broken]})
     elif not rows and not broken:
@@ -227,7 +227,9 @@ def show(
         values = entry.info[part]
         if part == "report":
             values = values["counts"]
-        rows = [(f"{key}{UNITS.get(key, '')}", _plain(value)) for key, value in values.items()]
+        rows = [
+            (f"{key}{UNITS.get(key, '')}", _plain_value(value)) for key, value in values.items()
+        ]
         print_table(part, (), rows)
     lights = [
         (", ".join(light["junctions"]) or light["id"], len(light["signals"]),
@@ -295,8 +297,8 @@ def _print_fidelity(name: str, fidelity: Fidelity) -> None:
     rows = [
         (
             verdict.name,
-            _figure(verdict.value),
-            f"{'at most' if verdict.at_most else 'at least'} {_figure(verdict.limit)}",
+            _format_figure(verdict.value),
+            f"{'at most' if verdict.at_most else 'at least'} {_format_figure(verdict.limit)}",
             "held" if verdict.ok else "NOT HELD",
         )
         for verdict in fidelity.verdicts
@@ -331,12 +333,12 @@ def _print_fidelity(name: str, fidelity: Fidelity) -> None:
         ("traffic lights", f"{signals.lights}; lost: {', '.join(signals.lost_lights) or 'none'}"),
     ]
     print_table("", (), counts)
-    worst = list(_worst(fidelity))
+    worst = list(_worst_findings(fidelity))
     if worst:
         print_table("worst places", ("what", "x, m", "y, m", "where"), worst)
 
 
-def _worst(fidelity: Fidelity) -> Iterator[tuple[str, float, float, str]]:
+def _worst_findings(fidelity: Fidelity) -> Iterator[tuple[str, float, float, str]]:
     """Give the first few findings of each kind, with their place."""
     for far in fidelity.far_places[:_WORST]:
         yield "lane aside", far.x, far.y, f"{far.metres:.2f} m, SUMO lane {far.lane}"
@@ -359,17 +361,17 @@ def _worst(fidelity: Fidelity) -> Iterator[tuple[str, float, float, str]]:
         yield "unsafe green", pair.x, pair.y, f"light {pair.tl}, phase {pair.phase}, {links}"
 
 
-def _figure(value: float) -> str:
+def _format_figure(value: float) -> str:
     return f"{value:,}" if isinstance(value, int) else f"{value:.4f}"
 
 
-def _row(entry: MapEntry) -> dict[str, Any]:
+def _map_row(entry: MapEntry) -> dict[str, Any]:
     keys = ("name", "sha256", "opendrive", "statistics", "graph", "build_seconds")
     network = entry.info.get("network", {"converter": entry.converter})  # maps of 0.1 have none
     return {**{key: entry.info[key] for key in keys}, "network": network}
 
 
-def _added(entry: MapEntry) -> str:
+def _describe_added(entry: MapEntry) -> str:
     graph = entry.info["graph"]
     return (
         f"{entry.name}: {graph['nodes']:,} nodes, {graph['segments']:,} segments, "
@@ -377,7 +379,7 @@ def _added(entry: MapEntry) -> str:
     )
 
 
-def _plain(value: object) -> object:
+def _plain_value(value: object) -> object:
     return value if isinstance(value, int | float | str | None) else json.dumps(value)
 
 

@@ -91,7 +91,9 @@ def _print_changes(done: BroughtIn, *, as_json: bool) -> None:
     said = ", ".join(f"{count} x {what}" for what, count in counts.items())
     log(f"{entry.name}: network {entry.info['network']['source']}; {said or 'no difference'}")
     if changes:
-        print_table("", ("what", "element", "detail"), [tuple(one) for one in changes[:_SHOWN]])
+        print_table(
+            "", ("what", "element", "detail"), [tuple(change) for change in changes[:_SHOWN]]
+        )
     if len(changes) > _SHOWN:
         log(f"and {len(changes) - _SHOWN} more; --json lists all")
 
@@ -120,8 +122,8 @@ def compare_networks(
     from odscen.maps.store import Workspace
 
     settings = ComparisonSettings(
-        levels=_numbers("levels", levels),
-        seeds=tuple(int(seed) for seed in _numbers("seeds", seeds)),
+        levels=_parse_numbers("levels", levels),
+        seeds=tuple(int(seed) for seed in _parse_numbers("seeds", seeds)),
         duration=duration,
     )
     with progress(name) as step:
@@ -134,7 +136,7 @@ def compare_networks(
         _print_comparison(found)
 
 
-def _numbers(option: str, text: str) -> tuple[float, ...]:
+def _parse_numbers(option: str, text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(",") if part.strip())
     except ValueError as error:
@@ -142,12 +144,12 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
 
 
 def _print_comparison(found: MapComparison) -> None:
-    made = [one for one in found.networks if one.entry is not None]
-    for one in found.networks:
-        if one.refused:
-            log(f"{one.converter}: {one.refused}")
+    made = [network for network in found.networks if network.entry is not None]
+    for network in found.networks:
+        if network.refused:
+            log(f"{network.converter}: {network.refused}")
     columns = ("measure", *(one.converter for one in made))
-    print_table(found.name, columns, _measures(made))
+    print_table(found.name, columns, _comparison_rows(made))
     if found.capacity:
         rows = [
             (
@@ -162,7 +164,7 @@ def _print_comparison(found: MapComparison) -> None:
         print_table(f"the same trips, {found.kilometres:.2f} km of lanes", head, rows)
 
 
-def _measures(made: list[ConvertedMap]) -> list[tuple[str, ...]]:
+def _comparison_rows(made: list[ConvertedMap]) -> list[tuple[str, ...]]:
     """Rows of the table of fidelity and sizes."""
     verdicts = [one.fidelity.verdicts for one in made if one.fidelity is not None]
     rows = [

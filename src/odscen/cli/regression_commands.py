@@ -29,7 +29,7 @@ HtmlOption = Annotated[
 ]
 
 
-def _shard(text: str) -> tuple[int, int]:
+def _parse_shard(text: str) -> tuple[int, int]:
     """Read ``2/3``."""
     match = re.fullmatch(r"([1-9]\d{0,3})/([1-9]\d{0,3})", text)
     if match is None or int(match[1]) > int(match[2]):
@@ -54,7 +54,9 @@ def gate(
     shard: Annotated[
         Any,
         typer.Option(
-            parser=_shard, metavar="K/N", help="Only the K-th of N parts, for N jobs side by side."
+            parser=_parse_shard,
+            metavar="K/N",
+            help="Only the K-th of N parts, for N jobs side by side.",
         ),
     ] = None,
     seeds: SeedsOption = None,
@@ -116,14 +118,14 @@ def gate(
             progress=step,
             parts=read_parts(merge) if merge else None,
         )
-    _write(result, store, junit=junit, html=html, summary=summary, results=results)
+    _write_results(result, store, junit=junit, html=html, summary=summary, results=results)
     if as_json:
         print_json(to_dict(result))
-    _show(result, as_json=as_json)
+    _show_result(result, as_json=as_json)
     raise typer.Exit(result.exit_code)
 
 
-def _write(
+def _write_results(
     result: SuiteResult,
     workspace: Workspace,
     *,
@@ -151,7 +153,7 @@ def _write(
         write_text(summary, before + suite_summary(result))
 
 
-def _show(result: SuiteResult, *, as_json: bool) -> None:
+def _show_result(result: SuiteResult, *, as_json: bool) -> None:
     from odscen.experiments.suite_words import lines
 
     if not as_json:

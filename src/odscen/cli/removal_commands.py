@@ -75,14 +75,14 @@ def remove_all(
 
     runs = known_runs(store)
     facts = [removal_facts(store, kind, name, runs=runs) for name in dict.fromkeys(names)]
-    for one in facts:
-        log(_words(one))
-    _ask(f"Remove {', '.join(names)}?", yes=yes)
+    for fact in facts:
+        log(_describe_dependents(fact))
+    _ask_before_removal(f"Remove {', '.join(names)}?", yes=yes)
     rows: list[dict[str, Any]] = []
-    for one in facts:
-        item = remove_one(store, kind, one.name)
-        rows.append({**_row(item), **asdict(one)})
-        log(f"Removed {one.name}; to bring it back: odscen trash restore {item.id}")
+    for fact in facts:
+        item = remove_one(store, kind, fact.name)
+        rows.append({**_wastebasket_row(item), **asdict(fact)})
+        log(f"Removed {fact.name}; to bring it back: odscen trash restore {item.id}")
     if as_json:
         print_json({"removed": rows})
 
@@ -94,7 +94,7 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
     from odscen.maps.wastebasket import Wastebasket
 
     items = Wastebasket(Workspace.open(workspace)).items()
-    rows = [{**_row(item), "size": item.size()} for item in items]
+    rows = [{**_wastebasket_row(item), "size": item.size()} for item in items]
     if as_json:
         print_json({"items": rows})
     elif not rows:
@@ -118,7 +118,7 @@ def restore(
     rows = []
     for one in [basket.item(item).id for item in items]:
         item = basket.restore(one)
-        rows.append(_row(item))
+        rows.append(_wastebasket_row(item))
         log(f"Restored {item.kind} {item.name}")
     if as_json:
         print_json({"restored": rows})
@@ -141,15 +141,15 @@ def empty(
     basket = Wastebasket(Workspace.open(workspace))
     chosen = [basket.item(item) for item in items] if items else basket.items()
     if chosen:
-        _ask(f"Delete {', '.join(one.name for one in chosen)} for good?", yes=yes)
+        _ask_before_removal(f"Delete {', '.join(one.name for one in chosen)} for good?", yes=yes)
     for one in chosen:
         basket.delete(one.id)
         log(f"Deleted {one.kind} {one.name}")
     if as_json:
-        print_json({"deleted": [_row(one) for one in chosen]})
+        print_json({"deleted": [_wastebasket_row(one) for one in chosen]})
 
 
-def _ask(question: str, *, yes: bool) -> None:
+def _ask_before_removal(question: str, *, yes: bool) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
@@ -158,24 +158,24 @@ def _ask(question: str, *, yes: bool) -> None:
         raise ConflictError("nothing was removed")
 
 
-def _words(facts: RemovalFacts) -> str:
+def _describe_dependents(facts: RemovalFacts) -> str:
     """What depends on it, in a sentence."""
     if facts.kind == "run":
         return f"Run {facts.name}" + (" is live." if facts.live else " has ended.")
-    runs = f"{_count(facts.runs, 'run')}, {facts.live} live"
+    runs = f"{_count_of(facts.runs, 'run')}, {facts.live} live"
     if facts.kind == "scenario":
         return f"Scenario {facts.name} has {runs}; they stay."
     return (
-        f"Map {facts.name} has {_count(facts.scenarios, 'scenario')}, {runs}. They stay; "
+        f"Map {facts.name} has {_count_of(facts.scenarios, 'scenario')}, {runs}. They stay; "
         "scenarios need the map to run again."
     )
 
 
-def _count(number: int, word: str) -> str:
+def _count_of(number: int, word: str) -> str:
     return f"{number} {word}{'' if number == 1 else 's'}"
 
 
-def _row(item: RemovedItem) -> dict[str, Any]:
+def _wastebasket_row(item: RemovedItem) -> dict[str, Any]:
     return {
         "id": item.id,
         "kind": item.kind,

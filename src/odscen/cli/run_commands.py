@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def _hint(folder: Path) -> Iterator[None]:
+def _hint_at_resuming(folder: Path) -> Iterator[None]:
     """Say how to resume long runs when they are interrupted."""
     from odscen.sumo.runner.long_runs import interrupted
 
@@ -235,7 +235,7 @@ def run(
             overwrite=overwrite, as_json=as_json,
         )  # fmt: skip
         return
-    with _hint(out or store.runs), progress("running") as step:
+    with _hint_at_resuming(out or store.runs), progress("running") as step:
         results = batches.run_many(
             store,
             paths,

@@ -133,7 +133,7 @@ def _fill_row(checked: CheckedFill) -> dict[str, Any]:
     return {
         "given": checked.given,
         "kept": len(checked.actors),
-        "remarks": [one._asdict() for one in checked.remarks],
+        "remarks": [remark._asdict() for remark in checked.remarks],
     }
 
 
@@ -154,7 +154,7 @@ def check(
 
     store = Workspace.open(workspace)
     if len(scenarios) == 1:  # an error of reading it is the command's own
-        files = [_checked(store, scenarios[0])]
+        files = [_check_file(store, scenarios[0])]
     else:
         files = [_checked_or_refused(store, path) for path in scenarios]
     valid = all(file["valid"] for file in files)
@@ -166,13 +166,13 @@ def check(
 def _checked_or_refused(workspace: Workspace, path: Path) -> dict[str, Any]:
     """One of several files: one that cannot be read, or has no map, is a file with an error."""
     try:
-        return _checked(workspace, path)
+        return _check_file(workspace, path)
     except InputError as error:
         log(f"error: {error}")
         return {"file": str(path), "valid": False, "error": error_fields(error)}
 
 
-def _checked(workspace: Workspace, path: Path) -> dict[str, Any]:
+def _check_file(workspace: Workspace, path: Path) -> dict[str, Any]:
     from odscen.app.scenarios import check_scenario, read_scenario
 
     with in_file(str(path)):

@@ -53,10 +53,10 @@ def show(
 
     space = Workspace.open(workspace)
     lights = chosen_lights(signal_programs(space, scenario), junction or ())
-    drawn = [] if svg is None else _draw(space, scenario, junction or (), svg)
+    drawn = [] if svg is None else _draw_sheets(space, scenario, junction or (), svg)
     if as_json:
         more = {} if svg is None else {"svg": [str(path) for path in drawn]}
-        print_json({"lights": [asdict(one) for one in lights], **more})
+        print_json({"lights": [asdict(light) for light in lights], **more})
         return
     for light in lights:
         rows = [[group.id, ", ".join(group.movements)] for group in light.groups]
@@ -64,7 +64,7 @@ def show(
         for plan in light.plans:
             title = f"{plan.id}: {plan.cycle:g} s, offset {plan.offset:g} s, {light.control}"
             rows = [
-                [phase.name, f"{phase.seconds:g}", _green(light.groups, phase.state)]
+                [phase.name, f"{phase.seconds:g}", _green_groups(light.groups, phase.state)]
                 for phase in plan.phases
             ]
             print_table(title, ["phase", "s", "green"], rows)
@@ -72,7 +72,9 @@ def show(
         log(f"wrote {path}")
 
 
-def _draw(workspace: Workspace, scenario: Path, junctions: Sequence[str], out: Path) -> list[Path]:
+def _draw_sheets(
+    workspace: Workspace, scenario: Path, junctions: Sequence[str], out: Path
+) -> list[Path]:
     """Write a sheet for each light, into ``out`` if that is a folder."""
     from odscen.app.signals.signal_views import signal_sheets
     from odscen.base.text_files import write_text
@@ -237,9 +239,9 @@ def coordinate(
     found = coordinate_signals(
         Workspace.open(workspace),
         scenario,
-        junctions=_listed(junctions),
-        along=_listed(along),
-        favoured=_direction(direction),
+        junctions=_split_list(junctions),
+        along=_split_list(along),
+        favoured=_parse_direction(direction),
         speed=None if speed is None else speed / 3.6,
         cycle=cycle,
     )
@@ -251,8 +253,8 @@ def coordinate(
         print_json({"scenario": str(path), **drawn, **found.to_dict()})
         return
     rows = [
-        (", ".join(one.junctions), round(one.metres), one.offset, one.wave.out_time)
-        for one in found.lights
+        (", ".join(light.junctions), round(light.metres), light.offset, light.wave.out_time)
+        for light in found.lights
     ]
     print_table(f"Cycle {found.cycle:g} s", ["junction", "m", "offset, s", "drive, s"], rows)
     for name, band, before in zip(
@@ -263,11 +265,11 @@ def coordinate(
     log(f"wrote {path}" + ("" if svg is None else f" and {svg}"))
 
 
-def _listed(text: str | None) -> tuple[str, ...]:
+def _split_list(text: str | None) -> tuple[str, ...]:
     return tuple(part.strip() for part in (text or "").split(",") if part.strip())
 
 
-def _direction(text: str) -> Favoured:
+def _parse_direction(text: str) -> Favoured:
     known: dict[str, Favoured] = {"both": "both", "out": "out", "back": "back"}
     if text not in known:
         raise typer.BadParameter(f"{text!r} is not both, out or back", param_hint="--direction")
@@ -285,7 +287,9 @@ def print_timed_light(light: TimedLight) -> None:
         zip(light.times.stages, before.green, light.times.green, splits.ratios, strict=True)
     )
     print_table(title, ["stage", "green before, s", "green, s", "flow ratio"], rows)
-    moved = [(one.movement, one.turn, round(one.vehicles)) for one in light.movements]
+    moved = [
+        (movement.movement, movement.turn, round(movement.vehicles)) for movement in light.movements
+    ]
     print_table("", ["movement", "turn", "vehicles/h"], moved)
     lanes = [
         (
@@ -303,7 +307,7 @@ def print_timed_light(light: TimedLight) -> None:
     print_table("", columns, lanes)
 
 
-def _green(groups: tuple[object, ...], state: str) -> str:
+def _green_groups(groups: tuple[object, ...], state: str) -> str:
     shown = []
     for group in groups:
         letters = {state[n] for n in getattr(group, "links", ())}

@@ -190,7 +190,7 @@ def report(
     file = write_study_page(study, figures, out or study / PAGE_FILE)
     if as_json:
         parts = {"means": means, "differences": differences}
-        said = {name: [one.to_dict() for one in groups] for name, groups in parts.items()}
+        said = {name: [group.to_dict() for group in groups] for name, groups in parts.items()}
         print_json({"file": str(file), **said})
         return
     _show_groups("Means", means, figures)
@@ -201,8 +201,8 @@ def report(
 
 def _show_groups(title: str, groups: Sequence[StudyGroup], figures: Sequence[str]) -> None:
     rows = [
-        (one.scenario, one.variant, one.runs, *(one.words(name) for name in figures))
-        for one in groups[:_SHOWN]
+        (group.scenario, group.variant, group.runs, *(group.words(name) for name in figures))
+        for group in groups[:_SHOWN]
     ]
     print_table(title, ("scenario", "variant", "runs", *figures), rows)
     if len(groups) > _SHOWN:

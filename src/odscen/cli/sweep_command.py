@@ -117,11 +117,11 @@ def sweep(
     from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
-    planned = _plan(document, vary, plan, samples, method, sample_seed)
+    planned = _make_plan(document, vary, plan, samples, method, sample_seed)
     if dry_run:
         _show_plan(planned, as_json=as_json)
         return
-    own, named = _figures(figure or [])
+    own, named = _parse_figures(figure or [])
     driven = behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout)
     settings = SweepSettings(tuple(safe or ()), named, own, seed, reports, openscenario, driven)
     folder = out or Path(f"{scenarios.scenario_name(scenario)}-sweep")
@@ -136,11 +136,11 @@ def sweep(
             tell=log,
             done=lambda ended, count: step(f"{ended} of {count} cases", ended / count),
         )
-    _show(found, as_json=as_json)
+    _show_sweep(found, as_json=as_json)
     raise typer.Exit(3 if "failed" in found.table["status"].to_list() else 0)
 
 
-def _plan(
+def _make_plan(
     scenario: Scenario,
     vary: Sequence[str] | None,
     file: Path | None,
@@ -156,13 +156,13 @@ def _plan(
                 "give --plan or --vary, --samples, --method and --sample-seed, not both"
             )
         with in_file(str(file)):
-            return plan_from_data(_read(file))
+            return plan_from_data(_read_plan_file(file))
     how = method or ("grid" if samples is None else "sobol")
-    axes = tuple(map(axis_from_text, vary or ())) or _bounds(scenario)
+    axes = tuple(map(axis_from_text, vary or ())) or _parameter_bounds(scenario)
     return SweepPlan(axes, how, samples, seed)
 
 
-def _bounds(scenario: Scenario) -> tuple[Any, ...]:
+def _parameter_bounds(scenario: Scenario) -> tuple[Any, ...]:
     """Each parameter between its bounds."""
     from odscen.scenario.sweeps.sweep_plan import Range
 
@@ -175,7 +175,7 @@ def _bounds(scenario: Scenario) -> tuple[Any, ...]:
     )
 
 
-def _read(file: Path) -> dict[str, Any]:
+def _read_plan_file(file: Path) -> dict[str, Any]:
     text = read_given_text(file)
     try:
         data = tomllib.loads(text) if file.suffix == ".toml" else json.loads(text)
@@ -186,7 +186,7 @@ def _read(file: Path) -> dict[str, Any]:
     return data
 
 
-def _figures(
+def _parse_figures(
     given: Sequence[str],
 ) -> tuple[dict[str, Callable[[Run], float | None]], tuple[str, ...]]:
     from odscen.experiments.own_figures import own_column
@@ -210,7 +210,7 @@ def _show_plan(plan: SweepPlan, *, as_json: bool) -> None:
         log(f"and {len(cases) - _SHOWN} more")
 
 
-def _show(found: Sweep, *, as_json: bool) -> None:
+def _show_sweep(found: Sweep, *, as_json: bool) -> None:
     table = found.table
     if as_json:
         rows = [
@@ -297,7 +297,7 @@ def search(
         found = find(
             Workspace.open(workspace),
             document,
-            tuple(map(axis_from_text, vary or ())) or _bounds(document),
+            tuple(map(axis_from_text, vary or ())) or _parameter_bounds(document),
             out or Path(f"{scenarios.scenario_name(scenario)}-search"),
             search_settings=SearchSettings(method, runs, batch, search_seed),
             settings=SweepSettings(tuple(safe or ()), seed=seed, reports=reports, behaviour=driven),
@@ -338,9 +338,9 @@ def _show_found(found: SearchResult, *, as_json: bool) -> None:
     names = [*rows[shown[0]]] if shown else []
     skipped = {"status", "safe", "detail", "collision", "max_drac", "clearance"}
     names = [name for name in names if name not in skipped]
-    print_table("", names, [[_cell(rows[case][name]) for name in names] for case in shown])
+    print_table("", names, [[_format_cell(rows[case][name]) for name in names] for case in shown])
     log(f"Page: {found.folder / 'sweep.html'}")
 
 
-def _cell(value: object) -> str:
+def _format_cell(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)

@@ -51,7 +51,7 @@ def new(
 ) -> None:
     """Make a scenario from a template, on any map that has room for it."""
     if not template:
-        _list(as_json=as_json)
+        _list_templates(as_json=as_json)
         return
     from odscen.app.template_scenarios import write_template
     from odscen.maps.store import Workspace
@@ -60,7 +60,7 @@ def new(
     find_template(template)
     if map_name is None:
         raise InputError("name the map to place it on with --map")
-    numbers = _numbers(values or ())
+    numbers = _parse_numbers(values or ())
     store = Workspace.open(workspace)
     file = write_template(store, template, map_name, values=numbers, name=name, out=out)
     log(f"Wrote {file}")
@@ -68,34 +68,34 @@ def new(
         print_json({"file": str(file), "template": template, "map": map_name})
 
 
-def _list(*, as_json: bool) -> None:
+def _list_templates(*, as_json: bool) -> None:
     from odscen.scenario.templates.template_registry import TEMPLATES
 
     for one in TEMPLATES.values():
         log(f"{one.name}: {one.summary} Needs {one.needs}.")
         for number in one.parameters:
-            log(f"    {_words(number)}")
+            log(f"    {_describe_number(number)}")
     if as_json:
-        print_json({"templates": [_fields(one) for one in TEMPLATES.values()]})
+        print_json({"templates": [_template_fields(one) for one in TEMPLATES.values()]})
 
 
-def _words(number: TemplateParameter) -> str:
+def _describe_number(number: TemplateParameter) -> str:
     usual = "" if number.default is None else f" = {number.default:.4g} {number.unit}"
     return f"{number.name}{usual}: {number.meaning}"
 
 
-def _fields(one: SceneTemplate) -> dict[str, Any]:
+def _template_fields(scene_template: SceneTemplate) -> dict[str, Any]:
     return {
-        "name": one.name,
-        "title": one.title,
-        "summary": one.summary,
-        "source": one.source,
-        "needs": one.needs,
-        "parameters": [number._asdict() for number in one.parameters],
+        "name": scene_template.name,
+        "title": scene_template.title,
+        "summary": scene_template.summary,
+        "source": scene_template.source,
+        "needs": scene_template.needs,
+        "parameters": [number._asdict() for number in scene_template.parameters],
     }
 
 
-def _numbers(given: Sequence[str]) -> dict[str, float]:
+def _parse_numbers(given: Sequence[str]) -> dict[str, float]:
     """Read ``NAME=NUMBER``.
 
     Raises

@@ -16,7 +16,7 @@ app = typer.Typer(help="Public transport of a scenario.", no_args_is_help=True)
 
 
 @app.callback()
-def _group() -> None:
+def _transit_group() -> None:
     """Public transport of a scenario."""
 
 
@@ -54,8 +54,8 @@ def import_(
         Workspace.open(workspace),
         scenarios.read_scenario(scenario),
         feed,
-        day=_day(day),
-        routes=tuple(one.strip() for one in routes.split(",")) if routes else (),
+        day=_parse_day(day),
+        routes=tuple(part.strip() for part in routes.split(",")) if routes else (),
         within=within,
     )
     trips = sum(len(line.departures) for line in placed.transit.lines)
@@ -69,7 +69,7 @@ def import_(
         print_json({"file": str(path), **counts, "trips": trips, "left_out": placed.left_out})
 
 
-def _day(text: str | None) -> date | None:
+def _parse_day(text: str | None) -> date | None:
     try:
         return None if text is None else date.fromisoformat(text)
     except ValueError:

@@ -46,8 +46,10 @@ def changed_places(
     marks = []
     for kind, name, color in _KINDS:
         table = after if kind == "added" else before
-        places = [one.place for one in changes if one.kind == kind and one.place is not None]
-        points = [_line(table, place) for place in dict.fromkeys(places)]
+        places = [
+            change.place for change in changes if change.kind == kind and change.place is not None
+        ]
+        points = [_line_of_place(table, place) for place in dict.fromkeys(places)]
         single = [xy for xy in points if len(xy) == 1]
         long = [xy for xy in points if len(xy) > 1]
         if points:
@@ -59,7 +61,7 @@ def changed_places(
     return marks
 
 
-def _line(table: RoadTable, place: ChangePlace) -> FloatArray:
+def _line_of_place(table: RoadTable, place: ChangePlace) -> FloatArray:
     """Points of a place, shape ``(N, 2)``, metres; one point for what has no length."""
     length = place.s1 - place.s0
     s = np.linspace(place.s0, place.s1, max(2, int(length / _STEP) + 1)) if length else [place.s0]

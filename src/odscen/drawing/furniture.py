@@ -38,10 +38,10 @@ def add_furniture(drawing: MapDrawing, odr: OpenDrive, table: RoadTable) -> MapD
     return replace(
         drawing,
         crosswalks=rings_of([walk.polygon for walk in walks]),
-        bars=_bars([(walk.polygon, walk.axis) for walk in walks]),
-        stop_lines=_strokes([line.ends for line in stop_lines(odr, table)]),
-        parking_spaces=_outlines(odr, table, "parkingSpace"),
-        buildings=_outlines(odr, table, "building"),
+        bars=_zebra_bars([(walk.polygon, walk.axis) for walk in walks]),
+        stop_lines=_join_strokes([line.ends for line in stop_lines(odr, table)]),
+        parking_spaces=_object_outlines(odr, table, "parkingSpace"),
+        buildings=_object_outlines(odr, table, "building"),
         symbols=symbols(odr, table),
     )
 
@@ -65,7 +65,7 @@ def _signed_area(xy: FloatArray) -> float:
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) / 2.0)
 
 
-def _strokes(ends: Sequence[FloatArray]) -> Lines:
+def _join_strokes(ends: Sequence[FloatArray]) -> Lines:
     """Lines between two points each, from arrays of shape ``(2, 2)``."""
     if not ends:
         return NO_LINES
@@ -73,7 +73,7 @@ def _strokes(ends: Sequence[FloatArray]) -> Lines:
     return Lines(xy, offsets(np.full(len(ends), 2)))
 
 
-def _bars(walks: Sequence[tuple[FloatArray, FloatArray]]) -> Lines:
+def _zebra_bars(walks: Sequence[tuple[FloatArray, FloatArray]]) -> Lines:
     """Bars of all zebra stripes: across the walker's path, cut to the crosswalk's outline."""
     import shapely
 
@@ -100,20 +100,20 @@ def _bars(walks: Sequence[tuple[FloatArray, FloatArray]]) -> Lines:
     return rings_of([shapely.get_coordinates(shapely.get_exterior_ring(part)) for part in parts])
 
 
-def _outlines(odr: OpenDrive, table: RoadTable, kind: str) -> Lines:
+def _object_outlines(odr: OpenDrive, table: RoadTable, kind: str) -> Lines:
     return rings_of(
         [
             outline
             for name, road in odr.roads.items()
             for item in road.objects
             if item.type == kind
-            for copy in _copies(item)
+            for copy in _repeat_object(item)
             for outline in object_outline(table, name, copy)
         ]
     )
 
 
-def _copies(item: RoadObject) -> list[RoadObject]:
+def _repeat_object(item: RoadObject) -> list[RoadObject]:
     """Give the object itself, or its repetitions along the road (section 13.3.1)."""
     copies = []
     for repeat in item.repeats:
@@ -121,11 +121,11 @@ def _copies(item: RoadObject) -> list[RoadObject]:
         for k in range(min(max(n, 1), _MOST_COPIES)):
             share = k * repeat.distance / repeat.length if repeat.length > 0.0 else 0.0
             t = repeat.t_start + share * (repeat.t_end - repeat.t_start)
-            copies.append(_moved(item, repeat.s + k * repeat.distance, t))
+            copies.append(_move_object(item, repeat.s + k * repeat.distance, t))
     return copies or [item]
 
 
-def _moved(item: RoadObject, s: float, t: float) -> RoadObject:
+def _move_object(item: RoadObject, s: float, t: float) -> RoadObject:
     """Copy of an object at another place; corners in road coordinates move with it."""
     outlines = tuple(
         outline._replace(

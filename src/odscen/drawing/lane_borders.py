@@ -92,14 +92,14 @@ class Borders:
 
 def evaluate_borders(odr: OpenDrive, table: RoadTable) -> Borders:
     """Evaluate every border of every lane of every section."""
-    sections = _sections(odr, table)
-    return _borders(sections, _stations(sections, table), table)
+    sections = _list_sections(odr, table)
+    return _compute_borders(sections, _sample_stations(sections, table), table)
 
 
-def _sections(odr: OpenDrive, table: RoadTable) -> Sections:
+def _list_sections(odr: OpenDrive, table: RoadTable) -> Sections:
     road, s0, s1, step, fast, breaks, models, sizes = [], [], [], [], [], [], [], []
     for name, item in odr.roads.items():
-        pace = _step(item)
+        pace = _sampling_step(item)
         # Editors leave geometries of millimetres with any heading at all: no place to draw from.
         kinks = [geometry.s for geometry in item.geometry if geometry.length > _SHORTEST]
         for section in item.sections:
@@ -127,13 +127,13 @@ def _sections(odr: OpenDrive, table: RoadTable) -> Sections:
     )
 
 
-def _step(road: Road) -> float:
+def _sampling_step(road: Road) -> float:
     if all(geometry.kind is GeometryKind.LINE for geometry in road.geometry):
         return _STEP_STRAIGHT
     return _STEP_CURVED if road.junction is None else _STEP_JUNCTION
 
 
-def _stations(sections: Sections, table: RoadTable) -> Stations:
+def _sample_stations(sections: Sections, table: RoadTable) -> Stations:
     length = sections.s1 - sections.s0
     points = float(np.sum(length / sections.step * (np.diff(sections.rows) + 1)))
     step = sections.step * max(1.0, points / _MOST_POINTS)
@@ -169,7 +169,7 @@ def _stations(sections: Sections, table: RoadTable) -> Stations:
     )
 
 
-def _borders(sections: Sections, stations: Stations, table: RoadTable) -> Borders:
+def _compute_borders(sections: Sections, stations: Stations, table: RoadTable) -> Borders:
     lane_section = np.repeat(np.arange(len(sections.road)), np.diff(sections.rows))
     section = np.concatenate([lane_section, np.arange(len(sections.road))])
     sizes = np.diff(stations.start)[section]

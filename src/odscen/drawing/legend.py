@@ -61,16 +61,18 @@ def legend_entries(
     """Swatches and names of what occurs, and only that."""
     present = {area.kind for area in drawing.areas}
     entries = [
-        (_box(AREA_COLORS[kind]), AREA_NAMES[kind]) for kind in AREA_NAMES if kind in present
+        (_draw_box(AREA_COLORS[kind]), AREA_NAMES[kind]) for kind in AREA_NAMES if kind in present
     ]
     if drawing.crosswalks.total:
-        entries.append((_zebra(), "Crosswalk"))
+        entries.append((_draw_zebra(), "Crosswalk"))
     if options.symbols:
         kinds = {symbol.kind for symbol in drawing.symbols}
         kinds -= set() if options.speed_limits else {"speed_limit"}
-        entries += [(_sign(kind), text) for kind, text in SYMBOL_NAMES.items() if kind in kinds]
+        entries += [
+            (_draw_sign(kind), text) for kind, text in SYMBOL_NAMES.items() if kind in kinds
+        ]
     if graph is not None and options.segments:
-        entries.append((_bands(), "Segments"))
+        entries.append((_draw_bands(), "Segments"))
     if graph is not None and options.graph:
         entries += _graph_entries(graph)
     return entries
@@ -78,26 +80,26 @@ def legend_entries(
 
 def place_entries(marks: Sequence[PlaceMarks]) -> list[tuple[Markup, str]]:
     """Rings and names of circled places, with how many there are of each kind."""
-    return [(_ring(kind.color), f"{kind.name} ({kind.total})") for kind in marks]
+    return [(_draw_ring(kind.color), f"{kind.name} ({kind.total})") for kind in marks]
 
 
 def _graph_entries(graph: MapGraph) -> list[tuple[Markup, str]]:
     names = ("Successor", "Lane change left", "Lane change right")
     relations = set(graph.lanes.relation.tolist())
-    entries = [(_dot(VEHICLE_NODE_COLOR), "Vehicle node")]
+    entries = [(_draw_dot(VEHICLE_NODE_COLOR), "Vehicle node")]
     entries += [
-        (_stroke(RELATION_COLORS[k]), name) for k, name in enumerate(names) if k in relations
+        (_draw_stroke(RELATION_COLORS[k]), name) for k, name in enumerate(names) if k in relations
     ]
     if len(graph.walks.x):
-        entries.append((_dot(PEDESTRIAN_NODE_COLOR), "Pedestrian node"))
+        entries.append((_draw_dot(PEDESTRIAN_NODE_COLOR), "Pedestrian node"))
     return entries
 
 
-def _box(color: str) -> Markup:
+def _draw_box(color: str) -> Markup:
     return element("rect", y=-7, width=18, height=14, rx=3, fill=color)
 
 
-def _zebra() -> Markup:
+def _draw_zebra() -> Markup:
     bars = [
         element("rect", x=x, y=-5, width=2.5, height=10, fill="#fff") for x in (2.5, 7.75, 13.0)
     ]
@@ -105,22 +107,22 @@ def _zebra() -> Markup:
     return join([ground, element("rect", x=1.5, y=-5, width=15, height=10, fill="#7b828b"), *bars])
 
 
-def _sign(kind: str) -> Markup:
+def _draw_sign(kind: str) -> Markup:
     parts = [element("use", href=f"#k-s-{kind}")]
     if kind == "speed_limit":
         parts.append(symbol_text("50", size=40, fill="#1d2126"))
     return element("g", *parts, transform="translate(9 0) scale(.19)")
 
 
-def _dot(color: str) -> Markup:
+def _draw_dot(color: str) -> Markup:
     return element("circle", cx=9, r=5.5, fill=color, stroke=INK, stroke_width=0.5)
 
 
-def _ring(color: str) -> Markup:
+def _draw_ring(color: str) -> Markup:
     return element("circle", cx=9, r=6, fill="none", stroke=color, stroke_width=3)
 
 
-def _bands() -> Markup:
+def _draw_bands() -> Markup:
     bands = [
         element("rect", x=6 * k, y=-7, width=6, height=14, fill=color, opacity=0.6)
         for k, color in enumerate(SEGMENT_COLORS[:3])
@@ -128,7 +130,7 @@ def _bands() -> Markup:
     return join(bands)
 
 
-def _stroke(color: str) -> Markup:
+def _draw_stroke(color: str) -> Markup:
     return element("path", d="M0 0h18", stroke=color, stroke_width=3)
 
 

@@ -159,16 +159,16 @@ class MapDrawing:
             "version": VERSION,
             "name": self.name,
             "bounds": [round(value, 2) for value in self.bounds],
-            "areas": [[area.level, area.kind, _packed(area.rings)] for area in self.areas],
+            "areas": [[area.level, area.kind, _pack_lines(area.rings)] for area in self.areas],
             "marks": [
-                [mark.level, mark.color, mark.width, mark.dash, _packed(mark.lines)]
+                [mark.level, mark.color, mark.width, mark.dash, _pack_lines(mark.lines)]
                 for mark in self.marks
             ],
             "symbols": [
                 [s.kind, round(s.x, 2), round(s.y, 2), round(s.hdg, 4), s.text]
                 for s in self.symbols
             ],
-            **{name: _packed(getattr(self, name)) for name in _PLAIN},
+            **{name: _pack_lines(getattr(self, name)) for name in _PLAIN},
         }
         return json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
@@ -190,26 +190,28 @@ class MapDrawing:
         return cls(
             name=str(document["name"]),
             bounds=(low_x, low_y, high_x, high_y),
-            areas=tuple(Area(level, kind, _lines(p)) for level, kind, p in document["areas"]),
+            areas=tuple(
+                Area(level, kind, _unpack_lines(p)) for level, kind, p in document["areas"]
+            ),
             marks=tuple(
-                Mark(level, color, width, tuple(dash) if dash else None, _lines(packed))
+                Mark(level, color, width, tuple(dash) if dash else None, _unpack_lines(packed))
                 for level, color, width, dash, packed in document["marks"]
             ),
             symbols=tuple(Symbol(*symbol) for symbol in document["symbols"]),
-            **{name: _lines(document[name]) for name in _PLAIN},
+            **{name: _unpack_lines(document[name]) for name in _PLAIN},
         )
 
 
 _PLAIN = ("crosswalks", "bars", "stop_lines", "parking_spaces", "buildings")
 
 
-def _packed(lines: Lines) -> dict[str, list[int]]:
+def _pack_lines(lines: Lines) -> dict[str, list[int]]:
     whole = np.rint(lines.xy * 100.0).astype(np.int64)
     steps = np.diff(whole, axis=0, prepend=np.zeros((1, 2), dtype=np.int64))
     return {"sizes": np.diff(lines.start).tolist(), "steps": steps.ravel().tolist()}
 
 
-def _lines(packed: dict[str, list[int]]) -> Lines:
+def _unpack_lines(packed: dict[str, list[int]]) -> Lines:
     steps = np.asarray(packed["steps"], dtype=np.int64).reshape(-1, 2)
     start = offsets(np.asarray(packed["sizes"], dtype=np.int64))
     if start[-1] != len(steps):

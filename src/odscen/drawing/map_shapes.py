@@ -45,7 +45,7 @@ class _Stroke(NamedTuple):
 
 def road_marks(borders: Borders, levels: IntArray, tolerance: float) -> tuple[Mark, ...]:
     """All painted markings, grouped by style; ``levels`` per section, ``tolerance`` in metres."""
-    strokes = _strokes(borders.sections)
+    strokes = _list_strokes(borders.sections)
     if not strokes:
         return ()
     stations = borders.stations
@@ -79,7 +79,7 @@ def road_marks(borders: Borders, levels: IntArray, tolerance: float) -> tuple[Ma
     )
 
 
-def _strokes(sections: Sections) -> list[_Stroke]:
+def _list_strokes(sections: Sections) -> list[_Stroke]:
     lanes = int(sections.rows[-1])
     strokes = []
     for index, model in enumerate(sections.models):
@@ -220,25 +220,25 @@ def map_drawing(
     """
     borders = evaluate_borders(odr, table)
     thin = thinned(borders.lines, tolerance)
-    levels = _levels(borders, table)
-    areas = _areas(thin, borders, table, levels, _junctions(odr, table))
+    levels = _section_levels(borders, table)
+    areas = _build_areas(thin, borders, table, levels, _junction_of_lanes(odr, table))
     sides = _bridge_sides(thin, borders, table, levels)
     drawing = MapDrawing(
         name=name,
-        bounds=_bounds([area.rings for area in areas]),
+        bounds=_bounds_of([area.rings for area in areas]),
         areas=areas,
         marks=(*sides, *road_marks(borders, levels, tolerance)),
     )
     return add_furniture(drawing, odr, table)
 
 
-def _bounds(parts: list[Lines]) -> Bounds:
+def _bounds_of(parts: list[Lines]) -> Bounds:
     xy = np.concatenate([part.xy for part in parts]) if parts else np.zeros((1, 2))
     low, high = xy.min(axis=0).tolist(), xy.max(axis=0).tolist()
     return (low[0], low[1], high[0], high[1])
 
 
-def _areas(
+def _build_areas(
     thin: Lines, borders: Borders, table: RoadTable, levels: IntArray, junction: IntArray
 ) -> tuple[Area, ...]:
     lanes = len(table.lane_keys)
@@ -266,16 +266,16 @@ def _areas(
     within = np.where(drawn & (level == 0) & (kinds != "sidewalk"), junction, -1)
     gaps = small_gaps(rings, within, kinds == "road")
     return tuple(
-        area._replace(rings=_joined(area.rings, gaps)) if area[:2] == (0, "road") else area
+        area._replace(rings=_join_lines(area.rings, gaps)) if area[:2] == (0, "road") else area
         for area in areas
     )
 
 
-def _joined(a: Lines, b: Lines) -> Lines:
+def _join_lines(a: Lines, b: Lines) -> Lines:
     return Lines(np.concatenate([a.xy, b.xy]), np.concatenate([a.start, a.start[-1] + b.start[1:]]))
 
 
-def _junctions(odr: OpenDrive, table: RoadTable) -> IntArray:
+def _junction_of_lanes(odr: OpenDrive, table: RoadTable) -> IntArray:
     """Number of the junction that each lane lies in, or -1."""
     numbers = {name: k for k, name in enumerate(odr.junctions)}
     of_road = [
@@ -295,7 +295,7 @@ def _ring_areas(rings: Lines) -> FloatArray:
     return area
 
 
-def _levels(borders: Borders, table: RoadTable) -> IntArray:
+def _section_levels(borders: Borders, table: RoadTable) -> IntArray:
     """Level of each section: one above whatever it passes over by :data:`_CLEARANCE`."""
     sections, stations = borders.sections, borders.stations
     levels = np.zeros(len(sections.road), dtype=np.int64)

@@ -98,18 +98,18 @@ def render_drawing(
     if view is not None:
         drawing = drawing.clipped(frame.bounds)
     marks = [kind for kind in marks if kind.total]
-    inside = _inside(drawing, graph, options, frame)
+    inside = _draw_inside(drawing, graph, options, frame)
     if marks:
         inside += place_layer(marks, radius=_RING / frame.scale)
     parts = [element("rect", width=frame.width, height="100%", fill=_PAPER)]
     foot = 0.0
     if options.margins:
-        parts.append(_head(drawing, statistics, frame))
+        parts.append(_draw_head(drawing, statistics, frame))
         entries = legend_entries(drawing, graph, options) + place_entries(marks)
         low = frame.top + frame.height
         listed, foot = legend(entries, left=frame.left, top=low, width=frame.inner)
         parts.append(listed)
-    parts.append(_map(frame, inside))
+    parts.append(_draw_map(frame, inside))
     height = frame.top + frame.height + frame.margin + foot
     svg = element(
         "svg",
@@ -156,7 +156,7 @@ class _SheetFrame:
         return self.width - 2 * self.margin
 
 
-def _inside(
+def _draw_inside(
     drawing: MapDrawing, graph: MapGraph | None, options: RenderOptions, frame: _SheetFrame
 ) -> Markup:
     symbol = min(max(_SYMBOL / frame.scale, 1.6), 40.0)
@@ -175,7 +175,7 @@ def _inside(
     return join(parts)
 
 
-def _map(frame: _SheetFrame, inside: Markup) -> Markup:
+def _draw_map(frame: _SheetFrame, inside: Markup) -> Markup:
     """Nest the map, in centimetres, into the sheet; the nested viewport clips it."""
     low_x, low_y, high_x, high_y = frame.bounds
     cm = (low_x * 100, -high_y * 100, (high_x - low_x) * 100, (high_y - low_y) * 100)
@@ -191,7 +191,7 @@ def _map(frame: _SheetFrame, inside: Markup) -> Markup:
     )
 
 
-def _text(
+def _draw_text(
     x: float, y: float, text: str, *, size: float, fill: str = INK, **attributes: str
 ) -> Markup:
     return element(
@@ -199,21 +199,21 @@ def _text(
     )
 
 
-def _head(drawing: MapDrawing, statistics: MapStatistics | None, frame: _SheetFrame) -> Markup:
+def _draw_head(drawing: MapDrawing, statistics: MapStatistics | None, frame: _SheetFrame) -> Markup:
     name = drawing.name if len(drawing.name) <= 60 else drawing.name[:59] + "…"
     size = min(30.0, 800.0 / (0.62 * max(len(name), 1)))
     parts = [
-        _text(frame.left, frame.margin + 26, name or "Map", size=size, font_weight="700"),
+        _draw_text(frame.left, frame.margin + 26, name or "Map", size=size, font_weight="700"),
         _scale_bar(frame),
-        _north(frame.width - frame.margin - 14, frame.margin + 30),
+        _draw_north_arrow(frame.width - frame.margin - 14, frame.margin + 30),
     ]
     if statistics is not None:
-        line = " · ".join(_figures(statistics))
-        parts.append(_text(frame.left, frame.margin + 52, line, size=15, fill=_SOFT))
+        line = " · ".join(_describe_statistics(statistics))
+        parts.append(_draw_text(frame.left, frame.margin + 52, line, size=15, fill=_SOFT))
     return join(parts)
 
 
-def _figures(statistics: MapStatistics) -> list[str]:
+def _describe_statistics(statistics: MapStatistics) -> list[str]:
     def km(length: float) -> str:
         return f"{number(length / 1000.0, 1 if length >= 10_000 else 2)} km"
 
@@ -260,18 +260,18 @@ def _scale_bar(frame: _SheetFrame) -> Markup:
         if length >= 1000.0 and share < 1.0:
             text = number(length * share / 1000.0, 3)
         x = right - wide + share * wide
-        parts.append(_text(x, y - 7, text, size=13, fill=_SOFT, text_anchor="middle"))
+        parts.append(_draw_text(x, y - 7, text, size=13, fill=_SOFT, text_anchor="middle"))
     return join(parts)
 
 
-def _north(x: float, y: float) -> Markup:
+def _draw_north_arrow(x: float, y: float) -> Markup:
     centre, tip = number(x), number(y - 24)
     low, notch = number(y + 18), number(y + 10)
     left = element("path", d=f"M{centre} {tip}L{number(x - 11)} {low}L{centre} {notch}z")
     data = f"M{centre} {tip}L{number(x + 11)} {low}L{centre} {notch}z"
     right = element("path", d=data, fill=_PAPER)
     arrow = element("g", left, right, fill=INK, stroke=INK, stroke_linejoin="round")
-    return arrow + _text(x, y + 34, "N", size=13, font_weight="700", text_anchor="middle")
+    return arrow + _draw_text(x, y + 34, "N", size=13, font_weight="700", text_anchor="middle")
 
 
 def svg_to_png(svg: str, *, width: int = 2400) -> bytes:

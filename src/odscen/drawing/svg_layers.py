@@ -58,20 +58,20 @@ class LayerOptions:
 
 def map_layers(drawing: MapDrawing, options: LayerOptions) -> Markup:
     """Surfaces, markings, crosswalks, stop lines and symbols of a map."""
-    parts = _ground(drawing, options) if options.ground else []
+    parts = _draw_ground(drawing, options) if options.ground else []
     if options.symbols:
-        parts.append(_symbols(drawing, options))
+        parts.append(_draw_symbols(drawing, options))
     return join([part for part in parts if part])
 
 
-def _ground(drawing: MapDrawing, options: LayerOptions) -> list[Markup]:
-    parts = [_rings(drawing.buildings, class_="m-building", fill="#e4dfd6", stroke="#c9c2b5")]
+def _draw_ground(drawing: MapDrawing, options: LayerOptions) -> list[Markup]:
+    parts = [_draw_rings(drawing.buildings, class_="m-building", fill="#e4dfd6", stroke="#c9c2b5")]
     for level in sorted({area.level for area in drawing.areas}):
-        parts += [_surfaces(drawing, level, options), _markings(drawing, level)]
+        parts += [_draw_surfaces(drawing, level, options), _draw_markings(drawing, level)]
     return [
         *parts,
-        _rings(drawing.parking_spaces, class_="m-mark", fill="none", stroke="#ffffff"),
-        _crosswalks(drawing, options),
+        _draw_rings(drawing.parking_spaces, class_="m-mark", fill="none", stroke="#ffffff"),
+        _draw_crosswalks(drawing, options),
         _stop_lines(drawing.stop_lines),
     ]
 
@@ -86,7 +86,7 @@ def svg_rings(lines: Lines) -> str:
     return path_data(lines.xy * (1.0, -1.0), lines.start, closed=True)
 
 
-def _rings(lines: Lines, **attributes: str) -> Markup:
+def _draw_rings(lines: Lines, **attributes: str) -> Markup:
     if lines.total == 0:
         return Markup("")
     width = 8 if "stroke" in attributes else None
@@ -100,7 +100,7 @@ def _stop_lines(lines: Lines) -> Markup:
     return element("g", line, fill="none")
 
 
-def _surfaces(drawing: MapDrawing, level: int, options: LayerOptions) -> Markup:
+def _draw_surfaces(drawing: MapDrawing, level: int, options: LayerOptions) -> Markup:
     order = list(AREA_COLORS)
     areas = sorted(
         (area for area in drawing.areas if area.level == level), key=lambda a: order.index(a.kind)
@@ -125,7 +125,7 @@ def _surfaces(drawing: MapDrawing, level: int, options: LayerOptions) -> Markup:
     return element("g", *parts, id=f"{options.prefix}level-{level}", stroke_linejoin="round")
 
 
-def _markings(drawing: MapDrawing, level: int) -> Markup:
+def _draw_markings(drawing: MapDrawing, level: int) -> Markup:
     parts = []
     for mark in drawing.marks:
         if mark.level != level or mark.color == BRIDGE:
@@ -144,7 +144,7 @@ def _markings(drawing: MapDrawing, level: int) -> Markup:
     return element("g", *parts, fill="none") if parts else Markup("")
 
 
-def _crosswalks(drawing: MapDrawing, options: LayerOptions) -> Markup:
+def _draw_crosswalks(drawing: MapDrawing, options: LayerOptions) -> Markup:
     if drawing.crosswalks.total == 0:
         return Markup("")
     outline = svg_rings(drawing.crosswalks)
@@ -161,7 +161,7 @@ def _crosswalks(drawing: MapDrawing, options: LayerOptions) -> Markup:
                 stroke_linejoin="round",
             ),
             element("path", d=outline, class_="m-crosswalk-ground", fill="#7b828b"),
-            _rings(drawing.bars, class_="m-bar", fill="#ffffff"),
+            _draw_rings(drawing.bars, class_="m-bar", fill="#ffffff"),
         ]
     )
 
@@ -215,7 +215,7 @@ def symbol_text(text: str, *, size: float, fill: str) -> Markup:
     )
 
 
-def _symbols(drawing: MapDrawing, options: LayerOptions) -> Markup:
+def _draw_symbols(drawing: MapDrawing, options: LayerOptions) -> Markup:
     shown = [
         symbol
         for symbol in drawing.symbols
@@ -225,11 +225,11 @@ def _symbols(drawing: MapDrawing, options: LayerOptions) -> Markup:
         return Markup("")
     # Lights last: they lie on top where signs share their pole.
     shown.sort(key=lambda symbol: list(SYMBOL_NAMES).index(symbol.kind), reverse=True)
-    uses = [_symbol(symbol, options) for symbol in shown]
+    uses = [_draw_symbol(symbol, options) for symbol in shown]
     return element("g", symbol_shapes(options.prefix), *uses, class_="m-symbols")
 
 
-def _symbol(symbol: Symbol, options: LayerOptions) -> Markup:
+def _draw_symbol(symbol: Symbol, options: LayerOptions) -> Markup:
     place = f"translate({round(symbol.x * 100)} {round(-symbol.y * 100)})"
     scale = number(options.symbol_size, 2)
     use = element("use", href=f"#{options.prefix}s-{symbol.kind}")
@@ -261,7 +261,10 @@ def place_layer(marks: Sequence[PlaceMarks], *, radius: float) -> Markup:
     They lie on a light rim, so that they show on every surface; the middle stays clear. Places of
     one kind that lie within one ring share it.
     """
-    rings = [_circles(_spread(kind.xy, radius), radius) + _over(kind) for kind in marks]
+    rings = [
+        _circle_path(_spread_places(kind.xy, radius), radius) + _overlay_path(kind)
+        for kind in marks
+    ]
     rim, line = round(radius * 48.0), round(radius * 28.0)
     parts = []
     for kind, ring in zip(marks, rings, strict=True):
@@ -272,11 +275,11 @@ def place_layer(marks: Sequence[PlaceMarks], *, radius: float) -> Markup:
     return element("g", *parts, class_="m-places", fill="none", stroke_linecap="round")
 
 
-def _over(kind: PlaceMarks) -> str:
+def _overlay_path(kind: PlaceMarks) -> str:
     return "" if kind.lines is None or not kind.lines.total else svg_xy(kind.lines)
 
 
-def _spread(xy: FloatArray, radius: float) -> FloatArray:
+def _spread_places(xy: FloatArray, radius: float) -> FloatArray:
     """Places no two of which lie within ``radius``; every other lies within it of one of them."""
     left, kept = xy, []
     while len(left):
@@ -285,7 +288,7 @@ def _spread(xy: FloatArray, radius: float) -> FloatArray:
     return np.array(kept).reshape(-1, 2)
 
 
-def _circles(xy: FloatArray, radius: float) -> str:
+def _circle_path(xy: FloatArray, radius: float) -> str:
     r = max(1, round(radius * 100.0))
     places = np.rint(xy * (100.0, -100.0)).astype(np.int64).tolist()
     half = f"a{r} {r} 0 1 0"
@@ -307,21 +310,23 @@ def graph_layers(
     lanes, walks = graph.lanes, graph.walks
     parts = []
     places = np.stack([lanes.x, lanes.y], axis=1)
-    shown = _inside(places, bounds)
+    shown = _within_bounds(places, bounds)
     edge_shown = shown[lanes.source] | shown[lanes.target]
     for relation, color in enumerate(RELATION_COLORS):
         rows = np.flatnonzero(edge_shown & (lanes.relation == relation))
-        parts.append(_edges(places, lanes.source[rows], lanes.target[rows], color, node_size))
+        parts.append(_draw_edges(places, lanes.source[rows], lanes.target[rows], color, node_size))
     walk_places = np.stack([walks.x, walks.y], axis=1)
-    walk_shown = _inside(walk_places, bounds)
+    walk_shown = _within_bounds(walk_places, bounds)
     rows = np.flatnonzero(walk_shown[walks.source] | walk_shown[walks.target])
-    parts.append(_edges(walk_places, walks.source[rows], walks.target[rows], "#b39700", node_size))
-    parts.append(_dots(places[shown], VEHICLE_NODE_COLOR, node_size))
-    parts.append(_dots(walk_places[walk_shown], PEDESTRIAN_NODE_COLOR, node_size))
+    parts.append(
+        _draw_edges(walk_places, walks.source[rows], walks.target[rows], "#b39700", node_size)
+    )
+    parts.append(_draw_dots(places[shown], VEHICLE_NODE_COLOR, node_size))
+    parts.append(_draw_dots(walk_places[walk_shown], PEDESTRIAN_NODE_COLOR, node_size))
     return element("g", *parts, class_="m-graph", fill="none", stroke_linecap="round")
 
 
-def _inside(places: FloatArray, bounds: Bounds | None) -> NDArray[np.bool_]:
+def _within_bounds(places: FloatArray, bounds: Bounds | None) -> NDArray[np.bool_]:
     if bounds is None:
         return np.ones(len(places), dtype=np.bool_)
     inside: NDArray[np.bool_] = np.all((places >= bounds[:2]) & (places <= bounds[2:]), axis=1)
@@ -339,7 +344,9 @@ def segment_layer(graph: MapGraph, *, width: float) -> Markup:
     parts = []
     for index, color in enumerate(SEGMENT_COLORS):
         rows = np.flatnonzero(inside & (color_of_edge == index))
-        parts.append(_edges(places, lanes.source[rows], lanes.target[rows], color, width * 2.5))
+        parts.append(
+            _draw_edges(places, lanes.source[rows], lanes.target[rows], color, width * 2.5)
+        )
     return element("g", *parts, class_="m-segments", fill="none", opacity=0.45)
 
 
@@ -357,7 +364,7 @@ def _segment_colors(count: int, adjacency: list[list[int]]) -> IntArray:
     return np.array(colors, dtype=np.int64)
 
 
-def _edges(
+def _draw_edges(
     places: FloatArray, source: NDArray[Any], target: NDArray[Any], color: str, size: float
 ) -> Markup:
     xy = np.stack([places[source], places[target]], axis=1).reshape(-1, 2) * (1.0, -1.0)
@@ -365,7 +372,7 @@ def _edges(
     return element("path", d=data, stroke=color, stroke_width=round(size * 40))
 
 
-def _dots(places: FloatArray, color: str, size: float) -> Markup:
+def _draw_dots(places: FloatArray, color: str, size: float) -> Markup:
     whole = np.rint(places * (100.0, -100.0)).astype(np.int64).tolist()
     data = "".join(f"M{x} {y}h0" for x, y in whole).replace(" -", "-")
     return element("path", d=data, stroke=color, stroke_width=round(size * 200))

@@ -57,7 +57,7 @@ def time_space_svg(
         *diagram.axis(),
         element("g", *diagram.bands(bands), clip_path="url(#plot)"),
         *diagram.lights(),
-        *_heading(bands, cycle, title),
+        *_draw_heading(bands, cycle, title),
     ]
     clip = element("clipPath", diagram.plot(), id="plot")
     drawn = element(
@@ -94,7 +94,7 @@ class _Diagram:
         )
 
     def axis(self) -> Iterator[Markup]:
-        step = next((one for one in _TICKS if self._until / one <= _MOST_TICKS), 120.0)
+        step = next((value for value in _TICKS if self._until / value <= _MOST_TICKS), 120.0)
         bottom = HEIGHT - _BOTTOM
         for tick in range(int(self._until / step) + 1):
             x = self.x(tick * step)
@@ -119,7 +119,7 @@ class _Diagram:
         for light in self._lights:
             y = self.y(light.metres)
             for windows, top in ((light.out, y - _BAR), (light.back, y)):
-                for begin, end in self._reds(windows, light.offset):
+                for begin, end in self._red_spans(windows, light.offset):
                     yield element(
                         "rect", x=self.x(begin), y=top, width=self.x(end) - self.x(begin),
                         height=_BAR - 0.5, fill=RED,
@@ -133,7 +133,7 @@ class _Diagram:
                 "text", f"+{number(light.offset, 1)} s", x=WIDTH - _RIGHT + 10.0, y=y + 4.0
             )
 
-    def _reds(
+    def _red_spans(
         self, windows: Sequence[tuple[float, float]], offset: float
     ) -> Iterator[tuple[float, float]]:
         """Begin and end of red in the picture; none for a direction that nobody drives."""
@@ -151,7 +151,7 @@ class _Diagram:
                 yield left, right
 
 
-def _heading(bands: Sequence[DiagramBand], cycle: float, title: str) -> Iterator[Markup]:
+def _draw_heading(bands: Sequence[DiagramBand], cycle: float, title: str) -> Iterator[Markup]:
     yield element("text", title, x=_LEFT, y=24.0, font_size=16, font_weight=600)
     keys: list[tuple[str, str, float]] = [
         (

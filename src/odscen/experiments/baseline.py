@@ -93,7 +93,7 @@ def fingerprint(
     found = {"map": map_sha256[:_SHORT]}
     if network is not None:
         found["network"] = network[:_SHORT]
-    found |= {f"scenario.{part}": _digest(value) for part, value in document.items()}
+    found |= {f"scenario.{part}": _digest_of(value) for part, value in document.items()}
     if settings.redraw != "open":
         found["redraw"] = settings.redraw
     return found | {"odscen": __version__, "sumo": version("libsumo")}
@@ -110,7 +110,7 @@ def map_digest(entry: MapEntry) -> str:
     return entry.sha256[:_SHORT]
 
 
-def _digest(value: object) -> str:
+def _digest_of(value: object) -> str:
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()[:_SHORT]
 
@@ -169,12 +169,12 @@ def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:
         head["tolerance"] = _SCATTER
     if baseline.sizing is not None:
         head["detect"] = baseline.sizing.model_dump(mode="json")
-    write_text(file, json_with_rows(head, "rows", _rows(baseline)))
+    write_text(file, json_with_rows(head, "rows", _baseline_rows(baseline)))
 
 
-def _rows(baseline: Baseline) -> list[dict[str, Any]]:
+def _baseline_rows(baseline: Baseline) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = [
-        {"figure": key.figure, "values": _plain(values)}
+        {"figure": key.figure, "values": _plain_numbers(values)}
         for key, values in baseline.figures.items()
         if key.kind == "run"
     ]
@@ -182,12 +182,12 @@ def _rows(baseline: Baseline) -> list[dict[str, Any]]:
         places: dict[str, dict[str, Any]] = {}
         for key, values in baseline.figures.items():
             if key.kind == kind:
-                places.setdefault(key.place, {kind: key.place})[key.figure] = _plain(values)
+                places.setdefault(key.place, {kind: key.place})[key.figure] = _plain_numbers(values)
         rows += [places[name] for name in sorted(places)]
     return rows
 
 
-def _plain(values: Sequence[float | None]) -> list[float | None]:
+def _plain_numbers(values: Sequence[float | None]) -> list[float | None]:
     """Whole numbers without a decimal point, as counts are written."""
     return [int(v) if v is not None and v.is_integer() else v for v in values]
 
@@ -215,17 +215,19 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
     figures: dict[FigureKey, tuple[float | None, ...]] = {}
     for row in data["rows"]:
         if "figure" in row:
-            figures[FigureKey("run", "", _name(row["figure"]))] = _values(row["values"], seeds)
+            figures[FigureKey("run", "", _required_name(row["figure"]))] = _read_values(
+                row["values"], seeds
+            )
             continue
         kind = next((kind for kind in _KINDS if kind in row), None)
         if kind is None:
             raise ValueError(f"row {row!r:.60} is of no figure, {', '.join(_KINDS)}")
-        place = _name(row[kind])
+        place = _required_name(row[kind])
         for name, values in row.items():
             if name != kind:
-                figures[FigureKey(kind, place, name)] = _values(values, seeds)
+                figures[FigureKey(kind, place, name)] = _read_values(values, seeds)
     by_scatter = data.get("tolerance") == _SCATTER
-    made_of = {name: _name(digest) for name, digest in dict(data["fingerprint"]).items()}
+    made_of = {name: _required_name(digest) for name, digest in dict(data["fingerprint"]).items()}
     chosen = data.get("detect")
     sizing = None if chosen is None else Sizing.model_validate(chosen)
     if sizing is not None and sizing.seeds != len(seeds):
@@ -233,13 +235,13 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
     return Baseline(seeds, made_of, figures, by_scatter, sizing)
 
 
-def _name(value: object) -> str:
+def _required_name(value: object) -> str:
     if not isinstance(value, str):
         raise ValueError(f"{value!r:.60} is not a text")
     return value
 
 
-def _values(values: Sequence[float | None], seeds: Sequence[int]) -> tuple[float | None, ...]:
+def _read_values(values: Sequence[float | None], seeds: Sequence[int]) -> tuple[float | None, ...]:
     if len(values) != len(seeds):
         raise ValueError(f"{len(values)} values for {len(seeds)} seeds")
     return tuple(None if value is None else float(value) for value in values)

@@ -68,10 +68,10 @@ def closeness_of(
     watched
         Ids of whose; ``None`` is everybody's.
     """
-    tracks = _tracks(trajectories, bodies)
+    tracks = _body_tracks(trajectories, bodies)
     clearances, distances = [], []
-    for one, other in _pairs(tracks, watched):
-        apart = _clearance(one, other)
+    for one, other in _watched_pairs(tracks, watched):
+        apart = _clearance_between(one, other)
         if apart is not None:
             clearances.append(apart)
         away = _conflict_distance(one, other)
@@ -107,7 +107,7 @@ def criticality(row: Mapping[str, Any]) -> float:
     return max(near, default=0.0)
 
 
-def _tracks(
+def _body_tracks(
     table: pl.DataFrame, bodies: Mapping[str, tuple[float, float]]
 ) -> dict[str, _BodyTrack]:
     found = {}
@@ -120,7 +120,7 @@ def _tracks(
     return dict(sorted(found.items()))
 
 
-def _pairs(
+def _watched_pairs(
     tracks: Mapping[str, _BodyTrack], watched: Collection[str] | None
 ) -> Iterator[tuple[_BodyTrack, _BodyTrack]]:
     names = [*tracks]
@@ -130,18 +130,18 @@ def _pairs(
                 yield tracks[one], tracks[other]
 
 
-def _clearance(one: _BodyTrack, other: _BodyTrack) -> float | None:
+def _clearance_between(one: _BodyTrack, other: _BodyTrack) -> float | None:
     """Least distance of the discs that cover two bodies, 0 where they overlap."""
     _, rows, others = np.intersect1d(one.step, other.step, return_indices=True)
     if not len(rows):
         return None
-    a, r = _discs(one, rows)
-    b, s = _discs(other, others)
+    a, r = _covering_discs(one, rows)
+    b, s = _covering_discs(other, others)
     away = np.hypot(*np.moveaxis(a[:, :, None, :] - b[:, None, :, :], -1, 0))
     return max(float(away.min()) - r - s, 0.0)
 
 
-def _discs(track: _BodyTrack, rows: IntArray) -> tuple[FloatArray, float]:
+def _covering_discs(track: _BodyTrack, rows: IntArray) -> tuple[FloatArray, float]:
     """Centres ``(rows, discs, 2)`` of discs along a body, and their radius."""
     count = max(math.ceil(track.length / max(track.width, 0.1)), 1)
     along = (np.arange(count) + 0.5) / count * track.length - track.length / 2.0

@@ -50,7 +50,7 @@ def made_by_edits(a: Scenario | None, b: Scenario | None) -> Iterator[str]:
         if not known and variant.parent != parent.name:
             continue
         yield f"{name} is a variant of {other} ({variant.parent}): " + "; ".join(
-            map(_words, variant.edits)
+            map(_describe_edit, variant.edits)
         )
         if not known:
             yield f"{other} is not as it was when the variant was made, so more may differ"
@@ -58,7 +58,7 @@ def made_by_edits(a: Scenario | None, b: Scenario | None) -> Iterator[str]:
             yield f"{name} was changed after it was made, so more than these edits differs"
 
 
-def _words(edit: Mapping[str, Any]) -> str:
+def _describe_edit(edit: Mapping[str, Any]) -> str:
     try:
         return read_edit(edit).words
     except ScenarioError:  # an edit of another version
@@ -179,12 +179,12 @@ class RunComparison:
             "confidence": CONFIDENCE,
             "a": side(self.a),
             "b": side(self.b),
-            "figures": [_row(row) for row in self.rows],
+            "figures": [_difference_row(row) for row in self.rows],
             "notes": list(self.notes),
         }
 
 
-def _row(row: Row) -> dict[str, Any]:
+def _difference_row(row: Row) -> dict[str, Any]:
     key = {"kind": row.key.kind, "place": row.key.place or None, "figure": row.key.figure}
     found = asdict(row.difference)
     found |= {"relative": row.difference.relative, "clear": row.difference.clear}
@@ -248,7 +248,7 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     networks: list[pl.DataFrame] = []
     maps: set[tuple[str, str]] = set()
     for path in folders:
-        summary = _summary(path)
+        summary = _read_summary(path)
         with in_file(str(path)):
             measured, figures = measure(path, summary), read_tables(path / FIGURES_FOLDER)
         if summary["seed"] in runs:
@@ -278,8 +278,8 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
         runs,
         places,
         tuple(networks),
-        None if workspace is None else _shapes(workspace, maps),
-        _document(folders[0]),
+        None if workspace is None else _map_shapes(workspace, maps),
+        _read_document(folders[0]),
     )
 
 
@@ -293,7 +293,7 @@ def _no_run(folder: Path) -> str:
     return f"runs of {len(deeper)} scenarios, one folder further down; {wanted}: {listed}"
 
 
-def _summary(folder: Path) -> dict[str, Any]:
+def _read_summary(folder: Path) -> dict[str, Any]:
     summary = whole_summary(folder)
     status = summary["status"]
     if status != RunStatus.COMPLETED or not isinstance(summary["seed"], int):
@@ -303,12 +303,12 @@ def _summary(folder: Path) -> dict[str, Any]:
     return summary
 
 
-def _document(folder: Path) -> Scenario | None:
+def _read_document(folder: Path) -> Scenario | None:
     path = folder / SCENARIO_FILE
     return loads(path.read_text(encoding="utf-8"), file=str(path)) if path.is_file() else None
 
 
-def _shapes(workspace: Workspace, maps: set[tuple[str, str]]) -> PlaceShapes | None:
+def _map_shapes(workspace: Workspace, maps: set[tuple[str, str]]) -> PlaceShapes | None:
     """Shapes of the one map that all runs are on, if the workspace has it."""
     with suppress(InputError):
         if len(maps) == 1:
@@ -329,7 +329,7 @@ def compare_runs(a: RunSet, b: RunSet) -> RunComparison:
         difference = compare_figure(one, other)
         if difference.a is not None or difference.b is not None:
             rows.append(Row(key, difference))
-    return RunComparison(a, b, tuple(rows), _most_changed(rows, a, b), _notes(a, b))
+    return RunComparison(a, b, tuple(rows), _most_changed(rows, a, b), _comparison_notes(a, b))
 
 
 def _most_changed(rows: list[Row], a: RunSet, b: RunSet) -> tuple[Row, ...]:
@@ -351,7 +351,7 @@ def _most_changed(rows: list[Row], a: RunSet, b: RunSet) -> tuple[Row, ...]:
     return tuple(row for _, _, row in sorted(scored, key=lambda item: item[:2])[:MOST])
 
 
-def _notes(a: RunSet, b: RunSet) -> tuple[str, ...]:
+def _comparison_notes(a: RunSet, b: RunSet) -> tuple[str, ...]:
     notes = list(made_by_edits(a.document, b.document))
     if a.scenario != b.scenario and not notes:
         notes.append(f"the scenarios have different names: {a.scenario} and {b.scenario}")

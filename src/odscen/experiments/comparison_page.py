@@ -41,8 +41,8 @@ def comparison_page(result: RunComparison) -> str:
     head = page_head(
         "Comparison of runs",
         title,
-        element("p", element("b", "A "), _side(a.name, a.runs)),
-        element("p", element("b", "B "), _side(b.name, b.runs)),
+        element("p", element("b", "A "), _describe_side(a.name, a.runs)),
+        element("p", element("b", "B "), _describe_side(b.name, b.runs)),
         *(element("p", note, class_="soft") for note in result.notes),
     )
     parts = [
@@ -56,7 +56,7 @@ def comparison_page(result: RunComparison) -> str:
     return html_page(f"{title} - comparison", join([part for part in parts if part]))
 
 
-def _side(name: str, seeds: Iterable[int]) -> str:
+def _describe_side(name: str, seeds: Iterable[int]) -> str:
     listed = sorted(seeds)
     return f"{name} (seed{'s' if len(listed) > 1 else ''} {', '.join(map(str, listed))})"
 
@@ -66,11 +66,14 @@ def _summary_section(figures: Sequence[Row]) -> Markup:
     clear.sort(key=lambda row: -abs(row.difference.relative or np.inf))
     if not figures or all(row.says is Finding.SAME for row in figures):
         content = element("p", "A and B are the same in every figure.")
-    elif not any(map(_counts, clear)):
+    elif not any(map(_is_large_enough, clear)):
         words = "Whatever is clear is too small to matter." if clear else "Each may be random."
         content = element("p", f"No difference to speak of. {words}")
     else:
-        content = element("ul", *(element("li", _sentence(row)) for row in filter(_counts, clear)))
+        content = element(
+            "ul",
+            *(element("li", _describe_difference(row)) for row in filter(_is_large_enough, clear)),
+        )
     explained = (
         "clear means statistically significant: the 95 % confidence interval of the difference "
         "leaves out zero. It takes at least two runs a side, better five or more."
@@ -78,22 +81,22 @@ def _summary_section(figures: Sequence[Row]) -> Markup:
     return report_section("Summary", content, explained=explained, ident="short")
 
 
-def _counts(row: Row) -> bool:
+def _is_large_enough(row: Row) -> bool:
     """Whether a clear difference is large enough for the summary."""
     return abs(row.difference.relative or 1.0) >= REPORTED
 
 
-def _sentence(row: Row) -> str:
+def _describe_difference(row: Row) -> str:
     found, figure = row.difference, row.key.entry
     if found.a is None or found.b is None:
         return figure.label
     values = f"{figure.written(found.a)} in A, {figure.written(found.b)} in B"
     word = "more" if found.b > found.a else "less"
     share = f"{number(100.0 * abs(found.relative), 1)} % {word} in B: " if found.relative else ""
-    return f"{figure.label}: {share}{values}{_better(row)}."
+    return f"{figure.label}: {share}{values}{_describe_improvement(row)}."
 
 
-def _better(row: Row) -> str:
+def _describe_improvement(row: Row) -> str:
     improves = row.improves
     return "" if improves is None else f"; {'B' if improves else 'A'} is better"
 
@@ -115,7 +118,7 @@ def _chart_section(figures: Sequence[Row]) -> Markup | None:
 
 def _interval_chart(rows: Sequence[Row]) -> Markup:
     shares = np.array([100.0 * (row.difference.relative or 0.0) for row in rows])
-    reach = _reach(float(np.abs(shares).max()))
+    reach = _axis_reach(float(np.abs(shares).max()))
     height = len(rows) * _ROW + _FOOT
     middle = (_LABELS + _WIDTH - _RIGHT) / 2.0
     scale = (_WIDTH - _RIGHT - _LABELS) / 2.0 / reach
@@ -144,14 +147,16 @@ def _interval_chart(rows: Sequence[Row]) -> Markup:
             bar = f"M{number(x(low), 1)} {number(y)}H{number(x(high), 1)}"
             marks.append(element("path", d=bar, class_="interval"))
         marks.append(element("circle", cx=x(share), cy=y, r=5))
-        parts.append(element("g", element("title", _sentence(row)), *marks, class_=style))
+        parts.append(
+            element("g", element("title", _describe_difference(row)), *marks, class_=style)
+        )
     svg = element("svg", *parts, viewBox=f"0 0 {number(_WIDTH)} {number(height)}", role="img",
                   class_="chart tall")  # fmt: skip
     keys = legend([("c-clear", "clear"), ("c-unclear", "may be random, or too few runs")])
     return element("div", svg, keys, class_="chart-box", tabindex="0")
 
 
-def _reach(largest: float) -> float:
+def _axis_reach(largest: float) -> float:
     """Round end of the axis, per cent; figures that grow manifold are cut."""
     return next((end for end in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0) if largest <= end), 100.0)
 
@@ -173,7 +178,7 @@ def _table_section(figures: Sequence[Row]) -> Markup:
 def _table_row(row: Row) -> Markup:
     cells = row.cells
     clear = row.says is Finding.CLEAR
-    says = row.says + (_better(row) if clear else "")
+    says = row.says + (_describe_improvement(row) if clear else "")
     return element(
         "tr",
         element("th", row.key.label, scope="row"),
@@ -217,7 +222,7 @@ def _change_map(result: RunComparison, shapes: PlaceShapes) -> Markup | None:
     junctions = {row.key.place for row in result.places if row.key.kind == "junction"}
     svg = place_map(
         shapes,
-        _grades(result),
+        _grade_places(result),
         title="Map of the roads and junctions, coloured by how they have changed",
         names={name: name for name in junctions},
     )
@@ -228,7 +233,7 @@ def _change_map(result: RunComparison, shapes: PlaceShapes) -> Markup | None:
                    class_="map-figure")  # fmt: skip
 
 
-def _grades(result: RunComparison) -> PlaceStyles:
+def _grade_places(result: RunComparison) -> PlaceStyles:
     """Colour and words of each place with traffic on both sides."""
     passed = {
         (str(row.key.kind), row.key.place): min(row.difference.a or 0.0, row.difference.b or 0.0)
@@ -252,7 +257,7 @@ def _grades(result: RunComparison) -> PlaceStyles:
 
 
 def _diagram_section(a: RunSet, b: RunSet) -> Markup | None:
-    groups = [dots for runs, name in ((a, "A"), (b, "B")) if (dots := _dots(runs, name))]
+    groups = [dots for runs, name in ((a, "A"), (b, "B")) if (dots := _runs_as_dots(runs, name))]
     if len(groups) < 2:
         return None
     drawn = dot_chart(
@@ -271,7 +276,7 @@ def _diagram_section(a: RunSet, b: RunSet) -> Markup | None:
     )
 
 
-def _dots(runs: RunSet, name: str) -> Dots | None:
+def _runs_as_dots(runs: RunSet, name: str) -> Dots | None:
     import polars as pl
 
     tables = [table.filter(pl.col("density") > 0) for table in runs.networks]

@@ -70,14 +70,14 @@ def pack_map(workspace: Workspace, entry: MapEntry) -> MapPack:
     """Pack a map with the assets of its workspace; equal files give an equal pack."""
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w", format=tarfile.PAX_FORMAT) as archive:
-        for name, path in _files(workspace, entry):
+        for name, path in _list_map_files(workspace, entry):
             content = path.read_bytes()
             archive.addfile(member(name, len(content)), io.BytesIO(content))
     whole = buffer.getvalue()
     return MapPack(digest(whole), zlib.compress(whole, _LEVEL))
 
 
-def _files(workspace: Workspace, entry: MapEntry) -> Iterator[tuple[str, Path]]:
+def _list_map_files(workspace: Workspace, entry: MapEntry) -> Iterator[tuple[str, Path]]:
     for root, prefix in ((entry.folder, f"maps/{entry.name}"), (workspace.assets_folder, "assets")):
         for path in sorted(root.rglob("*")) if root.is_dir() else ():
             if path.is_file():
@@ -180,16 +180,16 @@ class DaskExecutor:
         """
         lost: float | None = None
         while True:
-            with self._connected(lost) as client:
+            with self._connect(lost) as client:
                 if (yield from self._carried_out(client, orders)):
                     return
             lost = self._lost
 
-    def _connected(self, lost: float | None) -> Client:
+    def _connect(self, lost: float | None) -> Client:
         """A client; a scheduler that was lost may take :data:`PATIENCE` to be back."""
         while True:
             try:
-                return _client(self.scheduler)
+                return _make_client(self.scheduler)
             except ToolError:
                 if lost is None:
                     raise
@@ -206,12 +206,12 @@ class DaskExecutor:
         ended: SimpleQueue[Future] = SimpleQueue()
         running: dict[Future, WorkOrder] = {}
         while client.status != "closed":
-            while client.status == "running" and len(running) < self._room(client):
-                if (order := self._next(orders)) is None:
+            while client.status == "running" and len(running) < self._free_room(client):
+                if (order := self._take_next_order(orders)) is None:
                     if running:
                         break
                     return True
-                future = self._submitted(client, order)
+                future = self._submit_order(client, order)
                 running[future] = order
                 future.add_done_callback(ended.put)
             if client.status == "running":
@@ -220,14 +220,14 @@ class DaskExecutor:
                 future = ended.get(timeout=_LISTEN)
             except Empty:
                 continue
-            if found := self._taken(future, running.pop(future)):
-                self._count(found)
+            if found := self._take_outcomes(future, running.pop(future)):
+                self._count_outcomes(found)
                 yield found
         self._packs.clear()
         self._again += running.values()
         return False
 
-    def _next(self, orders: Orders) -> WorkOrder | None:
+    def _take_next_order(self, orders: Orders) -> WorkOrder | None:
         if self._again:
             return self._again.pop()
         if not self._runs:
@@ -236,7 +236,7 @@ class DaskExecutor:
         size = int(wanted / max(self._spent / self._runs, 1e-3))
         return orders.next(min(max(size, 1), MOST_RUNS))
 
-    def _room(self, client: Client) -> int:
+    def _free_room(self, client: Client) -> int:
         """Orders that may be with the scheduler at a time: each worker has its next one there."""
         if time.monotonic() - self._looked > _LOOK:
             with suppress(OSError):  # a scheduler that is lost just now
@@ -244,13 +244,13 @@ class DaskExecutor:
             self._looked = time.monotonic()
         return 2 * self._threads + 1
 
-    def _submitted(self, client: Client, order: WorkOrder) -> Future:
+    def _submit_order(self, client: Client, order: WorkOrder) -> Future:
         maps = {source.map_name: source for source in order.sources.values()}
-        packs = {name: self._pack(client, name, one.map_sha256) for name, one in maps.items()}
+        packs = {name: self._pack_map(client, name, one.map_sha256) for name, one in maps.items()}
         key = f"odscen-order-{uuid.uuid4().hex}"
         return client.submit(carry_out_packed, order, packs, key=key, pure=False)
 
-    def _pack(self, client: Client, name: str, sha256: str) -> Future:
+    def _pack_map(self, client: Client, name: str, sha256: str) -> Future:
         if name not in self._packs:
             pack = pack_map(self.workspace, self.workspace.map_for(name, sha256))
             self._sent += 1
@@ -258,7 +258,7 @@ class DaskExecutor:
             self._packs[name] = client.submit(carried_pack, pack, key=key, pure=False)
         return self._packs[name]
 
-    def _taken(self, future: Future, order: WorkOrder) -> list[Outcome]:
+    def _take_outcomes(self, future: Future, order: WorkOrder) -> list[Outcome]:
         """Outcomes of an order; none if it is carried out again."""
         from concurrent.futures import CancelledError
 
@@ -268,7 +268,7 @@ class DaskExecutor:
             found: list[Outcome] = future.result()
         except KilledWorker as error:
             if not str(error.task).startswith(_MAP_KEY):
-                return self._killed(order)
+                return self._retry_killed(order)
             return self._sent_again(order)
         except CancelledError:  # the scheduler has been started anew, and knows nothing of it
             return self._sent_again(order)
@@ -283,7 +283,7 @@ class DaskExecutor:
         self._again.append(order)
         return []
 
-    def _killed(self, order: WorkOrder) -> list[Outcome]:
+    def _retry_killed(self, order: WorkOrder) -> list[Outcome]:
         """Carry out again, one by one, runs whose workers died; give up those that go on so."""
         lost = []
         for each in order.runs:
@@ -296,12 +296,12 @@ class DaskExecutor:
                 self._again.append(replace(order, runs=(each,)))
         return lost
 
-    def _count(self, found: list[Outcome]) -> None:
+    def _count_outcomes(self, found: list[Outcome]) -> None:
         self._runs += len(found)
         self._spent += sum(float(one.row.get("seconds", 0.0)) for one in found)
 
 
-def _client(scheduler: str | None) -> Client:
+def _make_client(scheduler: str | None) -> Client:
     if scheduler is None:
         raise InputError(
             "--executor dask needs --scheduler: its address, such as tcp://host:8786, or its file"

@@ -84,7 +84,7 @@ def write_shards(
         files = {run: _staged_files(staged / run) for run in part}
         folder = out / f"shard-{number:05d}"
         with new_folder(folder) as making:
-            _WRITERS.get(form, _copied)(making, files)
+            _WRITERS.get(form, _copy_files)(making, files)
         written.append(folder)
     return written
 
@@ -92,7 +92,7 @@ def write_shards(
 def _staged_files(folder: Path) -> list[Path]:
     """Files that a run was exported to, as they were written."""
     check_files(folder)
-    return sorted(one for one in folder.iterdir() if one.name != SUMS_FILE)
+    return sorted(path for path in folder.iterdir() if path.name != SUMS_FILE)
 
 
 def _plain_array(shape: tuple[int, ...], kind: str, content: bytearray) -> Any:
@@ -128,13 +128,13 @@ def _plain_values(path: Path) -> dict[str, object]:
         raise InputError(f"not an index of scenarios: {error}", file=str(path)) from error
 
 
-def _copied(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
+def _copy_files(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
     for paths in files.values():
         for path in paths:
             (folder / path.name).write_bytes(path.read_bytes())
 
 
-def _scenarionet(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
+def _merge_scenarionet(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
     """Copy the descriptions, and make one index of all."""
     for index in _INDEXES:
         whole: dict[str, object] = {}
@@ -143,11 +143,13 @@ def _scenarionet(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
                 if path.name == index:
                     whole |= _plain_values(path)
         (folder / index).write_bytes(pickled(whole))
-    rest = {run: [one for one in paths if one.name not in _INDEXES] for run, paths in files.items()}
-    _copied(folder, rest)
+    rest = {
+        run: [path for path in paths if path.name not in _INDEXES] for run, paths in files.items()
+    }
+    _copy_files(folder, rest)
 
 
-def _waymo(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
+def _merge_waymo(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
     """Write all records one after the other: a file of the format may have any number."""
     listed = []
     with (folder / _RECORDS).open("wb") as records:
@@ -162,8 +164,8 @@ def _waymo(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
 
 
 _WRITERS: Final[dict[str, Callable[[Path, Mapping[str, Sequence[Path]]], None]]] = {
-    "scenarionet": _scenarionet,
-    "waymo": _waymo,
+    "scenarionet": _merge_scenarionet,
+    "waymo": _merge_waymo,
 }
 
 
@@ -215,7 +217,7 @@ class DatasetPlan(Part):
         return data
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _check_consistency(self) -> Self:
         if not self.study.run.trajectories:
             raise ValueError("study.run.trajectories: a dataset is made of them")
         if len(set(self.formats)) < len(self.formats):
@@ -345,19 +347,19 @@ def card_text(facts: DatasetFacts) -> str:
         f"Formats: {', '.join(plan.formats)}; at most {plan.shard} runs in a shard. "
         "Splits are by town: no map is in two of them.\n",
         "## Splits\n",
-        _table(
+        _markdown_table(
             ["split", "maps", "scenarios", "runs", *STATISTICS],
             [list(row.values()) for row in facts.splits()],
         ),
         "Figures are means over runs; units as in the figures of odscen "
         "(mean_speed m/s, mean_delay s).\n",
         "## Maps\n",
-        _table(
+        _markdown_table(
             ["map", "split", "sha256 of the .xodr"],
             [[name, split, sha256] for name, (sha256, split) in facts.maps.items()],
         ),
         "## How it was made\n",
-        _made(plan),
+        _describe_making(plan),
         "## What was left out\n",
         _left_out(facts),
         "The same plan, maps and versions give the same files; `dataset.json` has the plan and "
@@ -366,7 +368,7 @@ def card_text(facts: DatasetFacts) -> str:
     return "\n".join(part for part in parts if part) + "\n"
 
 
-def _made(plan: DatasetPlan) -> str:
+def _describe_making(plan: DatasetPlan) -> str:
     study = plan.study
     seeds = f"{len(study.seeds)} seeds ({study.seeds[0]} to {study.seeds[-1]}) of each scenario"
     sampled = [
@@ -383,15 +385,15 @@ def _left_out(facts: DatasetFacts) -> str:
     if not facts.left_out:
         return "Nothing.\n"
     rows = [[count, words] for words, count in facts.left_out.items()]
-    return _table(["runs", "why"], rows)
+    return _markdown_table(["runs", "why"], rows)
 
 
-def _table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+def _markdown_table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     lines = [heads, ["---"] * len(heads), *rows]
-    return "".join(f"| {' | '.join(map(_cell, line))} |\n" for line in lines)
+    return "".join(f"| {' | '.join(map(_markdown_cell, line))} |\n" for line in lines)
 
 
-def _cell(value: object) -> str:
+def _markdown_cell(value: object) -> str:
     text = "-" if value is None else str(value)
     return text.replace("|", "\\|").replace("\n", " ")
 
@@ -434,21 +436,21 @@ def make_dataset(
             check_files(out)
         # Before anything is written: a plan that is refused leaves the folder to another one.
         sources = found_sources(plan.study, workspace, beside=beside)
-        plan.refuse_without_split(dict.fromkeys(one.map_name for one in sources.values()))
+        plan.refuse_without_split(dict.fromkeys(source.map_name for source in sources.values()))
         refuse_taken_names(grid_of(plan.study, sources).parameters)
-        _begin(out, plan)
+        _begin_dataset(out, plan)
         study = out / STUDY_FOLDER
         grid = begin_study_of(workspace, plan.study, study, beside=beside)
 
         def take(outcome: Outcome) -> None:
-            _stage(out, outcome)
+            _stage_exports(out, outcome)
 
         ended = carry_out_study(study, executor, formats=plan.formats, take=take, done=done)
-        table, left_out = _chosen(plan, ended.table)
-        return _finished(out, plan, grid, table, left_out)
+        table, left_out = _choose_runs(plan, ended.table)
+        return _finish_dataset(out, plan, grid, table, left_out)
 
 
-def _begin(out: Path, plan: DatasetPlan) -> None:
+def _begin_dataset(out: Path, plan: DatasetPlan) -> None:
     text = json.dumps(plan.model_dump(mode="json"), indent=1, ensure_ascii=False) + "\n"
     file = out / PLAN_FILE
     if file.is_file():
@@ -465,7 +467,7 @@ def folder_name(run: str) -> str:
     return run.replace("/", "-")
 
 
-def _stage(out: Path, outcome: Outcome) -> None:
+def _stage_exports(out: Path, outcome: Outcome) -> None:
     for form, files in (outcome.exports or {}).items():
         folder = out / STAGED_FOLDER / form / folder_name(outcome.name)
         for name, content in files.items():
@@ -473,7 +475,7 @@ def _stage(out: Path, outcome: Outcome) -> None:
         write_sums(folder, {name: digest(content) for name, content in files.items()})
 
 
-def _chosen(plan: DatasetPlan, table: pl.DataFrame) -> tuple[pl.DataFrame, dict[str, int]]:
+def _choose_runs(plan: DatasetPlan, table: pl.DataFrame) -> tuple[pl.DataFrame, dict[str, int]]:
     """Runs that are in the dataset, with ``split``; how many are not, by reason."""
     import polars as pl
 
@@ -497,7 +499,7 @@ def _chosen(plan: DatasetPlan, table: pl.DataFrame) -> tuple[pl.DataFrame, dict[
     )
 
 
-def _finished(
+def _finish_dataset(
     out: Path,
     plan: DatasetPlan,
     grid: StudyGrid,
@@ -521,14 +523,14 @@ def _finished(
     part = out / f".{TABLE_FILE}.part"
     table.write_parquet(part)
     part.replace(out / TABLE_FILE)
-    maps = {one.map_name: one.map_sha256 for one in grid.sources.values()}
+    maps = {source.map_name: source.map_sha256 for source in grid.sources.values()}
     facts = DatasetFacts(
         plan,
         {name: (sha256, str(plan.split_of(name))) for name, sha256 in sorted(maps.items())},
         versions(),
         table,
         left_out,
-        _files(out, plan),
+        _list_dataset_files(out, plan),
     )
     said: dict[str, Any] = facts.to_dict()
     write_text(out / FACTS_FILE, json.dumps(said, indent=1, ensure_ascii=False) + "\n")
@@ -540,7 +542,7 @@ def _finished(
     return facts
 
 
-def _files(out: Path, plan: DatasetPlan) -> dict[str, tuple[int, str]]:
+def _list_dataset_files(out: Path, plan: DatasetPlan) -> dict[str, tuple[int, str]]:
     found = {TABLE_FILE: out / TABLE_FILE}
     for split in plan.splits:
         for path in sorted((out / split).rglob("*")):

@@ -111,10 +111,10 @@ def _run_as_they_are(pilots: Sequence[_Pilot], runner: SeedRunner, place: RunPla
     for pilot in pilots:
         pilot.case.case = _with_seeds(pilot.case, pilot.count)
     runner.run([pilot.case for pilot in pilots], place)
-    return [pilot for pilot in pilots if _works(pilot.case)]
+    return [pilot for pilot in pilots if _case_works(pilot.case)]
 
 
-def _works(case: LoadedCase) -> bool:
+def _case_works(case: LoadedCase) -> bool:
     return not case.refused and not any(run.error for run in case.runs.values())
 
 
@@ -130,35 +130,35 @@ class _Pilot:
         self.detect = detect
         self.count = min(PILOT, detect.seeds_max)
         self.slower = case
-        self.stepped = self._changed(
+        self.stepped = self._change_case(
             replace(case.run, settings=with_other_steps(case.run)), seeds=self.count
         )
 
-    def _changed(self, run: CheckedRun, *, seeds: int) -> LoadedCase:
+    def _change_case(self, run: CheckedRun, *, seeds: int) -> LoadedCase:
         return replace(self.case, case=_with_seeds(self.case, seeds), run=run, runs={}, refused={})
 
     def with_headway(self, more: float, *, seeds: int) -> LoadedCase:
         """The scenario with drivers who keep so many seconds more."""
         run = replace(self.case.run, scenario=with_longer_headway(self.case.run.scenario, more))
-        return self._changed(run, seeds=seeds)
+        return self._change_case(run, seeds=seeds)
 
     def more_headway(self) -> float:
         """Seconds with which the figure changes by what is to be caught, if it is proportional."""
-        pairs = self._pairs(self.slower)
+        pairs = self._figure_pairs(self.slower)
         effect = abs(fmean(new - old for old, new in pairs)) if pairs else 0.0
         share = self.detect.size(fmean(old for old, _ in pairs)) / effect if effect else _MOST
         return PROBE * min(_MOST, max(_LEAST, share))
 
     def goes_on(self) -> bool:
         """Whether more seeds are to be run; else the case has its seeds."""
-        pairs = self._pairs(self.slower)
+        pairs = self._figure_pairs(self.slower)
         if len(pairs) < FEWEST_SEEDS:
             self.case.refused[-1] = (
                 f"{len(pairs)} of {self.count} pairs of runs, as it is and with a longer headway, "
                 f"have {self.detect.figure.name}; {FEWEST_SEEDS} are needed to choose seeds"
             )
             return False
-        sizing = size_of(self.detect, pairs, self._pairs(self.stepped))
+        sizing = size_of(self.detect, pairs, self._figure_pairs(self.stepped))
         if sizing.seeds > self.count:
             self.count = min(sizing.seeds, 2 * self.count)
             for changed in (self.slower, self.stepped):
@@ -169,7 +169,7 @@ class _Pilot:
         self._leave_others()
         return False
 
-    def _pairs(self, changed: LoadedCase) -> list[tuple[float, float]]:
+    def _figure_pairs(self, changed: LoadedCase) -> list[tuple[float, float]]:
         """The figure as it is and with a change, of seeds that have it on both sides."""
         key = self.detect.key
         found = [
@@ -208,7 +208,7 @@ _NAMED = 2
 
 def keep_map(baselines: Path, entry: MapEntry, digest: str) -> None:
     """Keep the OpenDRIVE text of a map, compressed; a map that is kept already is left alone."""
-    file = _file(baselines, digest)
+    file = _kept_map_file(baselines, digest)
     if not file.is_file():
         write_file(file, gzip.compress(entry.read("xodr"), mtime=0))
 
@@ -225,7 +225,7 @@ def changes_since(baselines: Path, digest: str, entry: MapEntry) -> tuple[MapCha
     entry
         The map of now.
     """
-    before = _kept(_file(baselines, digest), digest)
+    before = _read_kept_map(_kept_map_file(baselines, digest), digest)
     if before is None:
         return None
     return map_differences(before, parse(entry.read("xodr"), file=entry.path("xodr").name))
@@ -235,16 +235,16 @@ def change_words(changes: tuple[MapChange, ...]) -> str:
     """The first differences in words, and how many more there are."""
     if not changes:
         return "the map is written otherwise, but means the same"
-    said = "; ".join(one.words for one in changes[:_NAMED])
+    said = "; ".join(change.words for change in changes[:_NAMED])
     more = len(changes) - _NAMED
     return f"the map: {said}" + (f"; and {more} more" if more > 0 else "")
 
 
-def _file(baselines: Path, digest: str) -> Path:
+def _kept_map_file(baselines: Path, digest: str) -> Path:
     return baselines / FOLDER / f"{digest}.xodr.gz"
 
 
-def _kept(file: Path, digest: str) -> OpenDrive | None:
+def _read_kept_map(file: Path, digest: str) -> OpenDrive | None:
     """A map that was kept; one that is damaged or missing tells nothing, and fails nothing."""
     try:
         with gzip.open(file) as stream:
@@ -361,7 +361,7 @@ def _unusable_result(case: UnusableCase) -> CaseResult:
     changes = _map_changes(case.case, entry, before)
     if changes is None:
         return replace(result, causes=(cause,))
-    notes = tuple(one.words for one in changes[:_MAP_CHANGES])
+    notes = tuple(change.words for change in changes[:_MAP_CHANGES])
     return replace(result, causes=(_in_words(cause, changes),), notes=notes)
 
 
@@ -436,15 +436,17 @@ def _hold_case(
         causes=causes,
         verdict=verdict,
         failures=tuple(failures),
-        missing=_seeds(own, figures, "the baseline has seed {}, which was not run"),
+        missing=_describe_missing_seeds(
+            own, figures, "the baseline has seed {}, which was not run"
+        ),
         new=(
-            *(_seeds(figures, own, "the baseline has no seed {}") if own else ()),
+            *(_describe_missing_seeds(figures, own, "the baseline has no seed {}") if own else ()),
             *_not_sized(case, baseline),
         ),
         notes=(
             *result.notes,
-            *_notes(loaded, verdict.figures, names),
-            *(one.words for one in (changes or ())[:_MAP_CHANGES]),
+            *_note_map_dependence(loaded, verdict.figures, names),
+            *(change.words for change in (changes or ())[:_MAP_CHANGES]),
         ),
     )
 
@@ -471,7 +473,9 @@ def _in_words(cause: Cause, changes: tuple[MapChange, ...]) -> Cause:
     return replace(cause, words=change_words(changes)) if cause.words == "the map" else cause
 
 
-def _seeds(there: Iterable[int], known: Iterable[int], words: str) -> tuple[str, ...]:
+def _describe_missing_seeds(
+    there: Iterable[int], known: Iterable[int], words: str
+) -> tuple[str, ...]:
     """Seeds of one side that the other does not have, in words."""
     listed = ", ".join(map(str, sorted(set(there) - set(known))))
     return (f"{words.format(listed)}; write it with --update-baseline",) if listed else ()
@@ -488,13 +492,17 @@ def _not_sized(case: Case, baseline: Baseline) -> tuple[str, ...]:
     return (f"the baseline was not made to catch {wanted}; write it with --update-baseline",)
 
 
-def _notes(
+def _note_map_dependence(
     loaded: LoadedCase, figures: Iterable[Change], causes: Collection[str]
 ) -> tuple[str, ...]:
     """Say that demand given by the size or the speed of the map follows the map."""
-    follows = [one for one in loaded.run.scenario.demand.background if one.trips is None]
+    follows = [
+        background
+        for background in loaded.run.scenario.demand.background
+        if background.trips is None
+    ]
     planned = any(change.key.figure == "planned" for change in figures)
     if not (planned and follows and "map" in causes and "demand" not in causes):
         return ()
-    names = ", ".join(one.id for one in follows)
+    names = ", ".join(follow.id for follow in follows)
     return (f"the number of road users follows the map: {names} is given per km or as a share",)

@@ -54,14 +54,14 @@ def read_rows(folder: Path) -> Rows:
     rows: Rows = {}
     sealed = (folder / SUMS_FILE).is_file()  # earlier versions wrote rows without checksums
     for part in sorted((folder / PARTS_FOLDER).glob("part-*.jsonl")):
-        _take(rows, part.read_bytes(), part, sealed=sealed)
+        _take_rows(rows, part.read_bytes(), part, sealed=sealed)
     journal = folder / JOURNAL_FILE
     with suppress(FileNotFoundError):
         content = journal.read_bytes()
         whole = content.rfind(b"\n") + 1
         # One that was torn by a kill ends before its checksum does.
         torn = content if sealed and _WHOLE.search(content, whole) else content[:whole]
-        _take(rows, torn, journal, sealed=sealed)
+        _take_rows(rows, torn, journal, sealed=sealed)
     return rows
 
 
@@ -71,7 +71,7 @@ def row_line(name: str, row: Mapping[str, Any]) -> bytes:
     return text[:-1] + b',"sum":"' + digest(text).encode()[:16] + b'"}\n'
 
 
-def _take(rows: Rows, content: bytes, file: Path, *, sealed: bool) -> None:
+def _take_rows(rows: Rows, content: bytes, file: Path, *, sealed: bool) -> None:
     lines = content.removesuffix(b"\n").split(b"\n") if content else []
     for number, line in enumerate(lines, start=1):
         try:
@@ -143,7 +143,7 @@ class StudyJournal:
         _trace: TracebackType | None,
     ) -> None:
         if self._file is not None:
-            self._sync()
+            self._sync_to_disk()
             self._file.close()
 
     def __contains__(self, name: object) -> bool:
@@ -161,9 +161,9 @@ class StudyJournal:
         self._file.flush()  # a killed process loses nothing; a power cut at most a second
         self._lines += 1
         if self._lines >= PART_ROWS:
-            self._move()
+            self._move_journal()
         elif time.monotonic() - self._synced > _EVERY:
-            self._sync()
+            self._sync_to_disk()
         return True
 
     def forget(self, names: Iterable[str]) -> None:
@@ -176,26 +176,26 @@ class StudyJournal:
         self._write_part(b"".join(row_line(name, row) for name, row in self.rows.items()))
         for part in parts:  # after the new one, which has their rows
             part.unlink()
-        self._empty()
+        self._empty_journal()
 
-    def _move(self) -> None:
-        self._sync()
+    def _move_journal(self) -> None:
+        self._sync_to_disk()
         self._write_part((self._folder / JOURNAL_FILE).read_bytes())
-        self._empty()
+        self._empty_journal()
 
     def _write_part(self, content: bytes) -> None:
         folder = self._folder / PARTS_FOLDER
         numbers = [int(path.stem.rpartition("-")[2]) for path in folder.glob("part-*.jsonl")]
         write_file(folder / f"part-{max(numbers, default=0) + 1:06d}.jsonl", content)
 
-    def _empty(self) -> None:
+    def _empty_journal(self) -> None:
         if self._file is not None:
             self._file.seek(0)
             self._file.truncate()
             self._lines = 0
-            self._sync()
+            self._sync_to_disk()
 
-    def _sync(self) -> None:
+    def _sync_to_disk(self) -> None:
         if self._file is not None:
             self._file.flush()
             os.fsync(self._file.fileno())

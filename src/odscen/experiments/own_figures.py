@@ -23,13 +23,15 @@ if TYPE_CHECKING:
     from odscen.runs.finished_run import Run
 
 
-def _free(name: str) -> str:
+def _check_free_name(name: str) -> str:
     if name in names_of("run"):
         raise ValueError(f"{name} is a figure of odscen; give yours another name")
     return name
 
 
-FigureName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$"), AfterValidator(_free)]
+FigureName = Annotated[
+    str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$"), AfterValidator(_check_free_name)
+]
 
 
 class FigureEntry(Part):
@@ -54,7 +56,9 @@ def declared(data: Mapping[str, Any]) -> dict[str, Figure]:
             label=str(given.get("label") or name.replace("_", " ")),
             definition="Defined by the suite.",
             source=str(given.get("function", "")),
-            better=next((one for one in Better if one == given.get("better")), Better.NEITHER),
+            better=next(
+                (better for better in Better if better == given.get("better")), Better.NEITHER
+            ),
             tolerance=str(given.get("tolerance", "2 %")),
         )
     more = {name: column.figure for name, column in COLUMNS.items() if SUITE in column.tables}
@@ -93,7 +97,7 @@ def own_values(figures: Mapping[str, Figure], run: Run, *, beside: Path) -> dict
         file, _, function = figure.source.rpartition(":")
 
         def call(run: Run, file: Path = beside / file, function: str = function) -> object:
-            return _function(file, function)(run)
+            return _load_function(file, function)(run)
 
         found[name] = value_of(call, run, source=figure.source, element=f"figures.{name}")
     return found
@@ -119,7 +123,7 @@ def own_column(name: str, function: str, *, beside: Path) -> Callable[[Run], flo
 
 
 @cache
-def _function(file: Path, name: str) -> Callable[[Run], object]:
+def _load_function(file: Path, name: str) -> Callable[[Run], object]:
     """Load a function from a file; the file is run once."""
     spec = importlib.util.spec_from_file_location(f"odscen_figures_{file.stem}", file)
     if spec is None or spec.loader is None:

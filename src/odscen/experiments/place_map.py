@@ -52,8 +52,8 @@ def place_map(
         about = element("title", f"{name}: {words}")
         parts.append(element("path", about, d=data, class_=style))
         if name in names:
-            x, y = _middle(lines.xy[: int(lines.start[1])])
-            labels.append(_label(names[name], round(x * 100), round(-y * 100), size))
+            x, y = _middle_of_line(lines.xy[: int(lines.start[1])])
+            labels.append(_draw_label(names[name], round(x * 100), round(-y * 100), size))
     width = round(100 * max(3.0, extent / 350.0))
     radius = round(100 * min(extent / 110.0, 10.0))
     discs = []
@@ -63,7 +63,7 @@ def place_map(
         about = element("title", f"{name}: {words}")
         discs.append(element("circle", about, cx=cx, cy=cy, r=radius, class_=style))
         if name in names:
-            labels.append(_label(names[name], cx, cy - round(radius * 1.4), size))
+            labels.append(_draw_label(names[name], cx, cy - round(radius * 1.4), size))
     return element(
         "svg",
         element("title", title),
@@ -77,12 +77,12 @@ def place_map(
     )
 
 
-def _middle(line: FloatArray) -> tuple[float, float]:
+def _middle_of_line(line: FloatArray) -> tuple[float, float]:
     """Point half way along a polyline."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     x, y = (float(np.interp(along[-1] / 2.0, along, axis)) for axis in line.T)
     return x, y
 
 
-def _label(text: str, x: int, y: int, size: int) -> Markup:
+def _draw_label(text: str, x: int, y: int, size: int) -> Markup:
     return element("text", text, x=x, y=y, font_size=size)

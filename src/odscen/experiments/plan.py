@@ -144,7 +144,7 @@ class StudyPlan(Part):
     keep: Keep = "none"
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _check_consistency(self) -> Self:
         if not self.scenarios and not self.sample:
             raise ValueError("nothing is run: give scenarios (files) or sample")
         if len(set(self.seeds)) < len(self.seeds):
@@ -163,7 +163,7 @@ class StudyPlan(Part):
     @property
     def variant_names(self) -> tuple[str, ...]:
         """Names of all variants, in order."""
-        own = tuple(one.name for one in self.variant)
+        own = tuple(variant.name for variant in self.variant)
         return own if self.only_variants else (AS_DESIGNED, *own)
 
     def sweep(self) -> SweepPlan | None:
@@ -344,7 +344,7 @@ def found_sources(
         If the workspace does not have a map.
     """
     found: dict[str, ScenarioSource] = {}
-    for source in (*_of_files(plan, workspace, beside), *_sampled(plan, workspace)):
+    for source in (*_of_files(plan, workspace, beside), *_sampled_sources(plan, workspace)):
         if source.name in found:
             raise InputError(f"two scenarios of the study are called {source.name!r}")
         found[source.name] = source
@@ -388,34 +388,38 @@ def refuse_unknown_parameters(
             )
 
 
-def _sampled(plan: StudyPlan, workspace: Workspace) -> Iterator[ScenarioSource]:
-    for one in plan.sample:
-        settings = _sampling(one)
+def _sampled_sources(plan: StudyPlan, workspace: Workspace) -> Iterator[ScenarioSource]:
+    for scenarios in plan.sample:
+        settings = _sampling_settings(scenarios)
         config = settings.sampling.model_dump(mode="json")
-        for name in _maps(one, workspace):
+        for name in _match_maps(scenarios, workspace):
             refuse_unknown_parameters(plan, {}, f"{name} (sampled)")
             entry = workspace.map(name)
-            for seed in range(one.seed, one.seed + one.count):
+            for seed in range(scenarios.seed, scenarios.seed + scenarios.count):
                 yield ScenarioSource(
                     f"{name}-{seed:04d}", name, entry.sha256, seed=seed, config=config
                 )
 
 
-def _sampling(one: SampledScenarios) -> GenerationSettings:
-    config = validated(SamplingConfig, one.config)
+def _sampling_settings(sampled_scenarios: SampledScenarios) -> GenerationSettings:
+    config = validated(SamplingConfig, sampled_scenarios.config)
     return GenerationSettings(
-        count=one.count,
-        seed=one.seed,
-        fill=one.fill,
-        roi_segments=one.roi_segments,
+        count=sampled_scenarios.count,
+        seed=sampled_scenarios.seed,
+        fill=sampled_scenarios.fill,
+        roi_segments=sampled_scenarios.roi_segments,
         config=config,
     )
 
 
-def _maps(one: SampledScenarios, workspace: Workspace) -> list[str]:
+def _match_maps(sampled_scenarios: SampledScenarios, workspace: Workspace) -> list[str]:
     names = workspace.map_names()
-    found = [name for name in names if any(fnmatch.fnmatchcase(name, each) for each in one.maps)]
-    for pattern in one.maps:
+    found = [
+        name
+        for name in names
+        if any(fnmatch.fnmatchcase(name, each) for each in sampled_scenarios.maps)
+    ]
+    for pattern in sampled_scenarios.maps:
         if not fnmatch.filter(names, pattern):
             raise InputError(
                 f"sample: no map matches {pattern!r}; there are {', '.join(names) or 'none'}"
@@ -455,11 +459,11 @@ def refuse_other(old: StudyGrid, new: StudyGrid) -> None:
 
 
 def _refuse_other_variants(old: StudyGrid, new: StudyGrid) -> None:
-    theirs = {one.name: one for one in new.plan.variant}
-    for one in old.plan.variant:
-        if theirs.get(one.name) != one:
+    theirs = {variant.name: variant for variant in new.plan.variant}
+    for variant in old.plan.variant:
+        if theirs.get(variant.name) != variant:
             raise ConflictError(
-                f"variant {one.name!r} has changed or is not in the plan; name another folder"
+                f"variant {variant.name!r} has changed or is not in the plan; name another folder"
             )
     if not old.plan.only_variants and new.plan.only_variants:
         raise ConflictError(

@@ -204,7 +204,7 @@ def search(
     refuse_unknown(plan.names, scenario)
     proposer = proposal_kind(plan.method).start(plan)
     with disk_errors(f"search {out}"), locked(out, what=f"search {out.name!r}"):
-        said = _said(plan, search_settings, settings)
+        said = _describe_search(plan, search_settings, settings)
         begin_folder(out, {SEARCH_FILE: said}, scenario, what="search")
         executor = LocalExecutor(workspace, processes, check)
         looking = _Looking(workspace, scenario, plan, out, cases, executor, done)
@@ -287,7 +287,9 @@ class _Looking:
         return found
 
 
-def _said(plan: SweepPlan, how: SearchSettings, settings: SweepSettings) -> dict[str, Any]:
+def _describe_search(
+    plan: SweepPlan, how: SearchSettings, settings: SweepSettings
+) -> dict[str, Any]:
     """What ``search.json`` says."""
     return {
         "format": FORMAT,

@@ -79,7 +79,7 @@ def is_study(folder: Path) -> bool:
 def write_study(folder: Path, grid: StudyGrid) -> None:
     """Write what a study runs; documents first, so that a study that is there is whole."""
     rows = []
-    configs = _configs(grid)
+    configs = _number_configs(grid)
     for source in grid.sources.values():
         row: dict[str, Any] = {
             "name": source.name,
@@ -97,7 +97,7 @@ def write_study(folder: Path, grid: StudyGrid) -> None:
         "version": VERSION,
         "versions": versions(),
         "plan": grid.plan.model_dump(mode="json"),
-        "configs": [json.loads(text) for text in _configs(grid)],
+        "configs": [json.loads(text) for text in _number_configs(grid)],
         "scenarios": rows,
     }
     if not (folder / STUDY_FILE).is_file():
@@ -105,9 +105,11 @@ def write_study(folder: Path, grid: StudyGrid) -> None:
     write_text(folder / STUDY_FILE, seal(said, indent=1))
 
 
-def _configs(grid: StudyGrid) -> dict[str, int]:
+def _number_configs(grid: StudyGrid) -> dict[str, int]:
     """Configurations of sampling, each once, with its number."""
-    each = (json.dumps(one.config) for one in grid.sources.values() if one.config is not None)
+    each = (
+        json.dumps(source.config) for source in grid.sources.values() if source.config is not None
+    )
     return {text: number for number, text in enumerate(dict.fromkeys(each))}
 
 
@@ -121,15 +123,15 @@ def read_study(folder: Path) -> StudyGrid:
     DamagedError
         If it is not as it was written.
     """
-    data = _read(folder)
+    data = _read_document(folder)
     with in_file(str(folder / STUDY_FILE)), documents("a study"):
         plan = validated(StudyPlan, data["plan"])
         configs = data["configs"]
-        sources = {row["name"]: _source(folder, row, configs) for row in data["scenarios"]}
+        sources = {row["name"]: _read_source(folder, row, configs) for row in data["scenarios"]}
     return grid_of(plan, sources)
 
 
-def _read(folder: Path) -> dict[str, Any]:
+def _read_document(folder: Path) -> dict[str, Any]:
     file = folder / STUDY_FILE
     if not file.is_file():
         raise InputError(f"no study is here: it has no {STUDY_FILE}", file=str(folder))
@@ -138,7 +140,7 @@ def _read(folder: Path) -> dict[str, Any]:
     return unsealed(file)
 
 
-def _source(folder: Path, row: Mapping[str, Any], configs: list[Any]) -> ScenarioSource:
+def _read_source(folder: Path, row: Mapping[str, Any], configs: list[Any]) -> ScenarioSource:
     name, about = str(row["name"]), (str(row["map"]), str(row["map_sha256"]))
     if "config" in row:
         return ScenarioSource(name, *about, seed=int(row["seed"]), config=configs[row["config"]])
@@ -156,7 +158,7 @@ def refuse_other_odscen(folder: Path) -> None:
     ConflictError
         Names both versions.
     """
-    theirs, ours = _read(folder).get("versions", {}), versions()
+    theirs, ours = _read_document(folder).get("versions", {}), versions()
     for name, own in ours.items():
         if theirs.get(name) != own:
             raise ConflictError(
@@ -443,15 +445,15 @@ def carry_out_study(
                 executor.outcomes(orders),
                 journal,
                 count=grid.count,
-                take=lambda outcome: _keep(out, outcome, take),
+                take=lambda outcome: _keep_outcome(out, outcome, take),
                 done=done,
             )
             table = write_table(out, grid, journal.rows)
-        state = _state(out, grid, journal.rows, active=False)
+        state = _study_state(out, grid, journal.rows, active=False)
     return EndedStudy(state, table)
 
 
-def _keep(out: Path, outcome: Outcome, more: Callable[[Outcome], None] | None) -> None:
+def _keep_outcome(out: Path, outcome: Outcome, more: Callable[[Outcome], None] | None) -> None:
     """Keep what a run has given beside its row."""
     if outcome.folder is not None:
         with new_folder(out / RUNS_FOLDER / outcome.name) as folder:
@@ -486,7 +488,9 @@ class StudyOrders:
         self._target = target
         self._formats = formats
         self._left: Iterator[StudyRun] = (run for run in grid.runs() if run.name not in known)
-        self._variants = {one.name: one.edits for one in grid.plan.variant} | {AS_DESIGNED: ()}
+        self._variants = {variant.name: variant.edits for variant in grid.plan.variant} | {
+            AS_DESIGNED: ()
+        }
 
     def next(self, most: int) -> WorkOrder | None:
         """An order of at most so many runs; ``None`` when there are no more."""
@@ -517,7 +521,7 @@ def study_state(out: Path) -> StudyState:
     InputError
         If there is no study.
     """
-    return _state(out, read_study(out), read_rows(out), active=is_locked(out))
+    return _study_state(out, read_study(out), read_rows(out), active=is_locked(out))
 
 
 def study_results(out: Path) -> EndedStudy:
@@ -539,11 +543,11 @@ def study_results(out: Path) -> EndedStudy:
         If there is no study.
     """
     grid, rows = read_study(out), read_rows(out)
-    state = _state(out, grid, rows, active=is_locked(out))
+    state = _study_state(out, grid, rows, active=is_locked(out))
     return EndedStudy(state, study_table(grid, rows))
 
 
-def _state(
+def _study_state(
     out: Path, grid: StudyGrid, rows: Mapping[str, Mapping[str, Any]], *, active: bool
 ) -> StudyState:
     names = {run.name for run in grid.runs()}
@@ -555,7 +559,7 @@ def _state(
         out,
         grid.plan.name,
         grid.count,
-        {one: counts.get(one, 0) for one in ("completed", "failed", REFUSED)},
+        {name: counts.get(name, 0) for name in ("completed", "failed", REFUSED)},
         tuple(problems.most_common()),
         sum(seconds) / len(seconds) if seconds else None,
         active,

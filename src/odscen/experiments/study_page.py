@@ -83,8 +83,8 @@ def study_groups(out: Path, figures: Sequence[str]) -> tuple[list[StudyGroup], l
         If there is no study, or no such figure.
     """
     _refuse_unknown(figures)
-    own = _completed(study_results(out).table)
-    return _groups(own, figures), paired_differences(own, figures)
+    own = _completed_rows(study_results(out).table)
+    return _group_figures(own, figures), paired_differences(own, figures)
 
 
 def figures_had(out: Path) -> list[str]:
@@ -95,7 +95,7 @@ def figures_had(out: Path) -> list[str]:
     InputError
         If there is no study.
     """
-    table = _completed(study_results(out).table)
+    table = _completed_rows(study_results(out).table)
     had = [name for name in study_figures() if table[name].null_count() < table.height]
     return had or list(SHOWN_FIGURES)
 
@@ -106,13 +106,13 @@ def _refuse_unknown(figures: Iterable[str]) -> None:
             raise InputError(f"no figure of runs is called {name!r}")
 
 
-def _completed(table: pl.DataFrame) -> pl.DataFrame:
+def _completed_rows(table: pl.DataFrame) -> pl.DataFrame:
     import polars as pl
 
     return table.filter(pl.col("status") == str(RunStatus.COMPLETED))
 
 
-def _groups(table: pl.DataFrame, figures: Sequence[str]) -> list[StudyGroup]:
+def _group_figures(table: pl.DataFrame, figures: Sequence[str]) -> list[StudyGroup]:
     return [
         StudyGroup(
             str(scenario),
@@ -146,7 +146,7 @@ def paired_differences(table: pl.DataFrame, figures: Sequence[str]) -> list[Stud
         first, on=_KEYS, suffix=" before", nulls_equal=True, maintain_order="left"
     )
     differences = [pl.col(name) - pl.col(f"{name} before") for name in figures]
-    return _groups(both.with_columns(differences), figures)
+    return _group_figures(both.with_columns(differences), figures)
 
 
 def write_study_page(out: Path, figures: Sequence[str], file: Path) -> Path:
@@ -166,12 +166,14 @@ def write_study_page(out: Path, figures: Sequence[str], file: Path) -> Path:
 
 def study_page(state: StudyState, table: pl.DataFrame, figures: Sequence[str]) -> str:
     """Page of a study; equal tables give equal text."""
-    own = _completed(table)
+    own = _completed_rows(table)
     parts = [
-        _head(state),
-        _section("Means", "means", _groups(own, figures), figures, _MEANS),
-        _section("Differences", "differences", paired_differences(own, figures), figures, _PAIRS),
-        _problems(state),
+        _render_head(state),
+        _render_section("Means", "means", _group_figures(own, figures), figures, _MEANS),
+        _render_section(
+            "Differences", "differences", paired_differences(own, figures), figures, _PAIRS
+        ),
+        _render_problems(state),
     ]
     return html_page(f"{state.name} - study", join([part for part in parts if part]))
 
@@ -188,7 +190,7 @@ _PAIRS: Final = (
 _FAILURES: Final = "why runs failed, or were not possible, most frequent first."
 
 
-def _head(state: StudyState) -> Markup:
+def _render_head(state: StudyState) -> Markup:
     bad = state.ended - state.counts["completed"]
     left = state.runs - state.ended
     verdict = f"{bad:,} of {state.runs:,} runs failed" if bad else "All runs completed"
@@ -204,7 +206,7 @@ def _head(state: StudyState) -> Markup:
     )
 
 
-def _section(
+def _render_section(
     title: str, ident: str, groups: Sequence[StudyGroup], figures: Sequence[str], explained: str
 ) -> Markup | None:
     if not groups:
@@ -212,14 +214,14 @@ def _section(
     rows = [
         element(
             "tr",
-            element("th", one.scenario, scope="row"),
-            element("td", one.variant),
-            element("td", f"{one.runs:,}", class_="n"),
-            *(element("td", one.words(name), class_="n") for name in figures),
+            element("th", group.scenario, scope="row"),
+            element("td", group.variant),
+            element("td", f"{group.runs:,}", class_="n"),
+            *(element("td", group.words(name), class_="n") for name in figures),
         )
-        for one in groups[:MOST_ROWS]
+        for group in groups[:MOST_ROWS]
     ]
-    heads = ("Scenario", "Variant", "Runs", *map(_label, figures))
+    heads = ("Scenario", "Variant", "Runs", *map(_figure_label, figures))
     more = len(groups) - MOST_ROWS
     return report_section(
         title,
@@ -230,12 +232,12 @@ def _section(
     )
 
 
-def _label(name: str) -> str:
+def _figure_label(name: str) -> str:
     figure = study_figures()[name]
     return f"{figure.label}, {figure.unit}" if figure.unit else figure.label
 
 
-def _problems(state: StudyState) -> Markup | None:
+def _render_problems(state: StudyState) -> Markup | None:
     if not state.problems:
         return None
     rows = [

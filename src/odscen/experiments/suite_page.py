@@ -165,7 +165,7 @@ def suite_page(
     """
     idents = {case.name: f"case-{number}" for number, case in enumerate(result.cases, start=1)}
     told = [case for case in result.worst_first if headline(case)]
-    parts = [_head(result), _overview(result, idents), _touched(result)]
+    parts = [_render_head(result), _render_overview(result, idents), _render_touched(result)]
     for number, case in enumerate(told):
         drawn = None
         if number < MOST_MAPS:
@@ -177,7 +177,7 @@ def suite_page(
     )
 
 
-def _head(result: SuiteResult) -> Markup:
+def _render_head(result: SuiteResult) -> Markup:
     total, runs = len(result.cases), sum(len(case.runs) for case in result.cases)
     bad = sum(not case.status.passes for case in result.cases)
     verdict = f"{bad} of {total} scenarios do not pass" if bad else "All scenarios pass"
@@ -193,7 +193,7 @@ def _head(result: SuiteResult) -> Markup:
     )
 
 
-def _overview(result: SuiteResult, idents: Mapping[str, str]) -> Markup:
+def _render_overview(result: SuiteResult, idents: Mapping[str, str]) -> Markup:
     rows = [_case_row(case, idents[case.name]) for case in result.worst_first]
     heads = ("Scenario", "Verdict", "Why", "Map", "Seeds", "Computed in, s")
     explained = (
@@ -220,7 +220,7 @@ def _case_row(case: CaseResult, ident: str) -> Markup:
     )
 
 
-def _touched(result: SuiteResult) -> Markup | None:
+def _render_touched(result: SuiteResult) -> Markup | None:
     """Which changed input touches which scenarios."""
     if not result.touched:
         return None
@@ -264,7 +264,7 @@ def _case_section(
         element("ul", *(element("li", words) for words in besides)) if besides else None,
         drawn,
         html_table(heads, rows, label=f"Figures of {case.name}") if rows else None,
-        _reports(case, beside),
+        _link_reports(case, beside),
         explained=explained,
         ident=ident,
     )
@@ -278,7 +278,7 @@ def _change_row(change: Change, ranks: Mapping[tuple[str, str], int]) -> Markup:
     return element("tr", element("th", name, scope="row"), *cells, effect)
 
 
-def _reports(case: CaseResult, beside: Path | None) -> Markup | None:
+def _link_reports(case: CaseResult, beside: Path | None) -> Markup | None:
     """Links to the reports of the runs, where they are kept."""
     links = []
     for run in case.runs:

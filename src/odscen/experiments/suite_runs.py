@@ -149,7 +149,7 @@ def map_before(entry: MapEntry, digest: str, workspace: Workspace | None) -> Map
         return entry
     if workspace is None:
         return None
-    return workspace.first_map(lambda one: one.sha256.startswith(digest))
+    return workspace.first_map(lambda map_entry: map_entry.sha256.startswith(digest))
 
 
 class _SuiteMaps:
@@ -175,7 +175,7 @@ class _SuiteMaps:
         key = reference.name, reference.sha256, reference.spacing
         if key not in self._known:
             try:
-                self._known[key] = self._found(scenario)
+                self._known[key] = self._find_map(scenario)
             except (InputError, ToolError) as error:
                 self._known[key] = error
         found = self._known[key]
@@ -199,7 +199,7 @@ class _SuiteMaps:
                     element="maps",
                 )
 
-    def _found(self, scenario: Scenario) -> MapEntry:
+    def _find_map(self, scenario: Scenario) -> MapEntry:
         """The map of the suite, built beside those of the workspace if need be; else one of these.
 
         So the workspace has no map more to choose or draw from, and none in place of another.
@@ -218,7 +218,9 @@ class _SuiteMaps:
         except OSError as error:
             raise InputError(error.strerror or str(error), file=str(source)) from error
         sha256 = hashlib.sha256(content).hexdigest()
-        there = workspace.first_map(lambda one: (one.sha256, one.conversion) == (sha256, wished))
+        there = workspace.first_map(
+            lambda map_entry: (map_entry.sha256, map_entry.conversion) == (sha256, wished)
+        )
         if there is not None:
             return there
         kept = workspace.of_suites()

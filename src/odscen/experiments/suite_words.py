@@ -46,11 +46,16 @@ def headline(case: CaseResult) -> str:
     if case.status is CaseStatus.FAILED and case.unusable:
         return f"usable: {case.unusable[0]}"
     if case.status is CaseStatus.FAILED:
-        return f"{_cause(case)}{'; '.join(_worst(case))}"
-    return "; ".join([*_better(case)[:_IN_HEADLINE], *([why] if (why := _inputs(case)) else [])])
+        return f"{_describe_cause(case)}{'; '.join(_describe_worst(case))}"
+    return "; ".join(
+        [
+            *_describe_better(case)[:_IN_HEADLINE],
+            *([why] if (why := _describe_changed_inputs(case)) else []),
+        ]
+    )
 
 
-def _cause(case: CaseResult) -> str:
+def _describe_cause(case: CaseResult) -> str:
     """``"map: "``; the figures' own behaviour if no input has changed, nothing without baseline."""
     if case.verdict is None:
         return ""
@@ -61,7 +66,7 @@ def _cause(case: CaseResult) -> str:
     return f"{likeliest.words if likeliest.name == 'map' else likeliest.name}: "
 
 
-def _worst(case: CaseResult) -> list[str]:
+def _describe_worst(case: CaseResult) -> list[str]:
     """The first missed expectation, the worst figures, the worst place."""
     verdict = case.verdict
     if verdict is None:
@@ -84,12 +89,12 @@ def _is_key(change: Change) -> bool:
     return own or entry.name in _KEY or (isinstance(entry, RunFigure) and entry.count)
 
 
-def _better(case: CaseResult) -> list[str]:
+def _describe_better(case: CaseResult) -> list[str]:
     better = () if case.verdict is None else case.verdict.better
     return [f"better: {change.words}" for change in better]
 
 
-def _inputs(case: CaseResult) -> str | None:
+def _describe_changed_inputs(case: CaseResult) -> str | None:
     changed = ", ".join(case.changed_inputs)
     return f"changed since the baseline: {changed}" if changed else None
 
@@ -100,7 +105,7 @@ def reason(case: CaseResult) -> str | None:
         return None
     if case.verdict.failing and not case.causes:
         return "map, scenario and versions are those of the baseline: the behaviour has changed"
-    return _inputs(case)
+    return _describe_changed_inputs(case)
 
 
 def where(case: CaseResult) -> str | None:
@@ -125,7 +130,7 @@ def where(case: CaseResult) -> str | None:
 
 def details(case: CaseResult) -> list[str]:
     """All there is to say of a scenario below its headline, one line each."""
-    found = [*case.problems, *_better(case)]
+    found = [*case.problems, *_describe_better(case)]
     found += [text for text in (where(case), reason(case)) if text]
     return list(dict.fromkeys(text for text in (*found, *case.notes) if text != headline(case)))
 
@@ -134,7 +139,7 @@ def lines(case: CaseResult) -> list[str]:
     """What the terminal has of a scenario, one line each; nothing of one that is as it was."""
     top = headline(case)
     below = details(case)
-    rest = [words for words in below if words not in (*case.problems, *_better(case))]
+    rest = [words for words in below if words not in (*case.problems, *_describe_better(case))]
     shown = [words for words in below if words not in rest]
     if len(shown) > MOST_PROBLEMS:
         shown = [*shown[:MOST_PROBLEMS], f"and {len(shown) - MOST_PROBLEMS} more"]
@@ -153,9 +158,9 @@ def seed_words(seeds: Sequence[int]) -> str:
 
 def sizing_words(sizings: Sequence[Sizing]) -> str:
     """What the chosen seeds of scenarios catch, in one sentence."""
-    counts = [one.seeds for one in sizings]
+    counts = [sizing.seeds for sizing in sizings]
     few = f"{min(counts)} to {max(counts)}" if min(counts) < max(counts) else f"{counts[0]}"
-    enough = sum(one.enough for one in sizings)
+    enough = sum(sizing.enough for sizing in sizings)
     return (
         f"{few} seeds a scenario were chosen to catch what the suite wants to be caught; in "
         f"{enough} of {len(sizings)} scenarios they do"
@@ -277,11 +282,11 @@ def junit_xml(result: SuiteResult) -> str:
     ``classname`` is the suite, ``name`` the scenario, or ``SCENARIO[seed-N]`` of a run, times in
     seconds. A scenario takes no time of its own, so that the times add up.
     """
-    suite = etree.Element("testsuite", name=_text(result.suite.name))
+    suite = etree.Element("testsuite", name=_writable_text(result.suite.name))
     for case in result.cases:
-        _scenario(suite, case, result.suite.name)
+        _add_scenario_case(suite, case, result.suite.name)
         for run in case.runs:
-            _run(suite, case, run, result.suite.name)
+            _add_run_case(suite, case, run, result.suite.name)
     seconds = sum(case.wall_seconds for case in result.cases)
     counts = {
         "tests": str(len(suite)),
@@ -297,15 +302,15 @@ def junit_xml(result: SuiteResult) -> str:
     return etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8").decode()
 
 
-def _scenario(suite: etree._Element, case: CaseResult, suite_name: str) -> None:
+def _add_scenario_case(suite: etree._Element, case: CaseResult, suite_name: str) -> None:
     properties = dict(_case_properties(case))
     element = _test_case(suite, case, suite_name, case.name, 0.0, properties)
     if case.status.passes:
         if told := [text for text in (headline(case), *details(case)) if text]:
-            etree.SubElement(element, "system-out").text = _text("\n".join(told))
+            etree.SubElement(element, "system-out").text = _writable_text("\n".join(told))
         return
     tag = "error" if case.status is CaseStatus.ERROR else "failure"
-    _outcome(element, tag, case.status.value, [headline(case), *details(case)])
+    _add_outcome(element, tag, case.status.value, [headline(case), *details(case)])
 
 
 def _case_properties(case: CaseResult) -> Iterator[tuple[str, str]]:
@@ -327,14 +332,16 @@ def _case_properties(case: CaseResult) -> Iterator[tuple[str, str]]:
             yield f"baseline.fingerprint.{name}", before[name]
 
 
-def _run(suite: etree._Element, case: CaseResult, run: SeedResult, suite_name: str) -> None:
+def _add_run_case(
+    suite: etree._Element, case: CaseResult, run: SeedResult, suite_name: str
+) -> None:
     name = f"{case.name}[seed-{run.seed}]"
     properties = dict(_run_properties(run))
     element = _test_case(suite, case, suite_name, name, run.wall_seconds, properties)
     if run.error:
-        _outcome(element, "error", "run failed", [run.error])
+        _add_outcome(element, "error", "run failed", [run.error])
     elif run.missed:
-        _outcome(element, "failure", "expectation", run.missed)
+        _add_outcome(element, "failure", "expectation", run.missed)
 
 
 def _run_properties(run: SeedResult) -> Iterator[tuple[str, str]]:
@@ -367,18 +374,18 @@ def _test_case(
         "file": str(case.case.file),
         "time": f"{seconds:.3f}",
     }
-    safe = {key: _text(value) for key, value in attributes.items()}
+    safe = {key: _writable_text(value) for key, value in attributes.items()}
     element = etree.SubElement(suite, "testcase", safe)
     listed = etree.SubElement(element, "properties")
     for key, value in properties.items():
-        etree.SubElement(listed, "property", name=_text(key), value=_text(value))
+        etree.SubElement(listed, "property", name=_writable_text(key), value=_writable_text(value))
     return element
 
 
-def _outcome(element: etree._Element, tag: str, kind: str, words: Sequence[str]) -> None:
-    told = [_text(text) for text in words]
+def _add_outcome(element: etree._Element, tag: str, kind: str, words: Sequence[str]) -> None:
+    told = [_writable_text(text) for text in words]
     etree.SubElement(element, tag, {"message": told[0], "type": kind}).text = "\n".join(told)
 
 
-def _text(text: str) -> str:
+def _writable_text(text: str) -> str:
     return _UNWRITABLE.sub("?", text)

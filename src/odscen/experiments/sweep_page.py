@@ -108,7 +108,7 @@ class SweepShown:
     @property
     def styles(self) -> list[str]:
         """Class of each case."""
-        return [_style(row) for row in self.rows]
+        return [_style_of_case(row) for row in self.rows]
 
 
 def sweep_page(sweep: SweepShown) -> str:
@@ -123,11 +123,16 @@ def sweep_page(sweep: SweepShown) -> str:
         verdict=f"{safe} of {run} safe",
         style="good" if safe == run and run else "bad" if safe == 0 else "fair",
     )
-    sections = [_plane(sweep), _influence(sweep), _lines(sweep), _table(sweep)]
+    sections = [
+        _draw_plane(sweep),
+        _draw_influence(sweep),
+        _draw_parallel_lines(sweep),
+        _render_case_table(sweep),
+    ]
     return html_page(f"{sweep.title} - sweep", join([head, *(s for s in sections if s)]))
 
 
-def _style(row: Mapping[str, Any]) -> str:
+def _style_of_case(row: Mapping[str, Any]) -> str:
     if row["safe"] is None:
         return OTHER
     if not row["safe"]:
@@ -135,11 +140,11 @@ def _style(row: Mapping[str, Any]) -> str:
     return CALM if row.get("min_ttc") is None and row.get("min_pet") is None else SAFE
 
 
-def _keys(styles: Sequence[str]) -> Markup:
+def _draw_keys(styles: Sequence[str]) -> Markup:
     return legend([(style, words) for style, words in _WORDS.items() if style in styles])
 
 
-def _axis(values: FloatArray, name: str, unit: str) -> Axis:
+def _make_axis(values: FloatArray, name: str, unit: str) -> Axis:
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     room = 0.04 * (high - low) or max(abs(low) * 0.05, 0.5)
@@ -147,7 +152,7 @@ def _axis(values: FloatArray, name: str, unit: str) -> Axis:
     return Axis(low - room, high + room, ticks, f"{name}, {unit}" if unit else name)
 
 
-def _plane(sweep: SweepShown) -> Markup | None:
+def _draw_plane(sweep: SweepShown) -> Markup | None:
     """Two parameters as a plane; of one, it against the least time to collision."""
     names = sweep.names[:2]
     if len(names) == 1:
@@ -156,17 +161,17 @@ def _plane(sweep: SweepShown) -> Markup | None:
         names.append(_DEFAULT_MEASURE)
     units = {**column_units(), **sweep.units}
     x, y = (sweep.column(name) for name in names)
-    across, up = (_axis(v, name, units[name]) for v, name in zip((x, y), names, strict=True))
+    across, up = (_make_axis(v, name, units[name]) for v, name in zip((x, y), names, strict=True))
     frame = ChartFrame(across, up, height=400.0)
     drawn: list[Markup] = []
     if len(sweep.names) == 2:
-        drawn += [_boundary(frame, sweep, x, y)]
+        drawn += [_draw_boundary(frame, sweep, x, y)]
     styles = sweep.styles
     for style in dict.fromkeys(styles):
         dots = [
             element(
                 "circle",
-                element("title", _said(row, sweep)),
+                element("title", _describe_case(row, sweep)),
                 cx=number(float(frame.x(a)), 1),
                 cy=number(float(frame.y(b)), 1),
                 r=4 if len(sweep.rows) <= 500 else 2.5,
@@ -186,13 +191,13 @@ def _plane(sweep: SweepShown) -> Markup | None:
         explained += "Cases at one place differ in the other parameters."
     return report_section(
         "Safe and not" if len(sweep.names) != 1 else "Safe along the parameter",
-        chart(frame, drawn, description=about, keys=_keys(styles)),
+        chart(frame, drawn, description=about, keys=_draw_keys(styles)),
         explained=explained,
         ident="boundary",
     )
 
 
-def _boundary(frame: ChartFrame, sweep: SweepShown, x: FloatArray, y: FloatArray) -> Markup:
+def _draw_boundary(frame: ChartFrame, sweep: SweepShown, x: FloatArray, y: FloatArray) -> Markup:
     known = np.array([row["safe"] is not None for row in sweep.rows])
     safe = np.array([row["safe"] is True for row in sweep.rows])
     found = safe_boundary(np.column_stack([x, y])[known], safe[known])
@@ -204,7 +209,7 @@ def _boundary(frame: ChartFrame, sweep: SweepShown, x: FloatArray, y: FloatArray
     return element("path", d=data or "M0,0", class_="safe-boundary")
 
 
-def _influence(sweep: SweepShown) -> Markup | None:
+def _draw_influence(sweep: SweepShown) -> Markup | None:
     """How each parameter goes with how close it was, as rank correlation."""
     from scipy.stats import spearmanr
 
@@ -231,7 +236,7 @@ def _influence(sweep: SweepShown) -> Markup | None:
     return report_section("What matters", table, explained=explained, ident="influence")
 
 
-def _lines(sweep: SweepShown) -> Markup:
+def _draw_parallel_lines(sweep: SweepShown) -> Markup:
     """Parallel coordinates: an axis for each parameter and measure, a line for each case."""
     measures = [
         name for name in (_DEFAULT_MEASURE, "min_pet", "impact_speed", "max_drac")
@@ -245,14 +250,16 @@ def _lines(sweep: SweepShown) -> Markup:
     drawn = [element("title", "All cases: one line each, one axis for each parameter and measure.")]
     for place, name in zip(at.tolist(), names, strict=True):
         values = sweep.column(name)
-        axis = _axis(values, name, units.get(name, ""))
+        axis = _make_axis(values, name, units.get(name, ""))
         heights.append(bottom - (values - axis.low) / (axis.high - axis.low) * (bottom - top))
-        axes.append(_upright(axis, place, top, bottom))
+        axes.append(_draw_upright_axis(axis, place, top, bottom))
     styles = sweep.styles
     chosen = np.unique(np.linspace(0, len(styles) - 1, min(len(styles), MOST_LINES)).astype(int))
     for style in (OTHER, CALM, SAFE, UNSAFE):
         lines = [
-            _line(at, [h[index] for h in heights], _said(sweep.rows[index], sweep))
+            _draw_case_line(
+                at, [h[index] for h in heights], _describe_case(sweep.rows[index], sweep)
+            )
             for index in chosen.tolist()
             if styles[index] == style
         ]
@@ -264,11 +271,11 @@ def _lines(sweep: SweepShown) -> Markup:
     )
     if len(chosen) < len(styles):
         explained += f" {len(chosen):,} of {len(styles):,} cases are drawn."
-    box = element("div", svg, _keys(styles), class_="chart-box", tabindex="0")
+    box = element("div", svg, _draw_keys(styles), class_="chart-box", tabindex="0")
     return report_section("All cases", box, explained=explained, ident="cases")
 
 
-def _upright(axis: Axis, x: float, top: float, bottom: float) -> Markup:
+def _draw_upright_axis(axis: Axis, x: float, top: float, bottom: float) -> Markup:
     parts = [
         element("path", d=f"M{number(x)} {number(top)}V{number(bottom)}", class_="grid"),
         text_at(x, top - 14, axis.name, class_="axis-name", text_anchor="middle"),
@@ -279,7 +286,7 @@ def _upright(axis: Axis, x: float, top: float, bottom: float) -> Markup:
     return join(parts)
 
 
-def _line(at: FloatArray, heights: Sequence[float], words: str) -> Markup:
+def _draw_case_line(at: FloatArray, heights: Sequence[float], words: str) -> Markup:
     data, pen = "", "M"
     for x, y in zip(at.tolist(), heights, strict=True):
         if np.isfinite(y):
@@ -290,17 +297,17 @@ def _line(at: FloatArray, heights: Sequence[float], words: str) -> Markup:
     return element("path", element("title", words), d=data)
 
 
-def _table(sweep: SweepShown) -> Markup:
+def _render_case_table(sweep: SweepShown) -> Markup:
     measures = [key for key in sweep.rows[0] if key not in {"case", "safe", "status", "detail"}]
-    names = [*sweep.names, *(key for key in measures if _measured(sweep, key))]
+    names = [*sweep.names, *(key for key in measures if _has_measure(sweep, key))]
     units = {**column_units(), **sweep.units}
     heads = ["case", "", "safe", *(f"{n}, {units[n]}" if units.get(n) else n for n in names)]
     rows = []
     for row in sweep.rows:
         links = [element("a", words, href=path) for words, path in sweep.links[row["case"]]]
         files = element("td", *(part for link in links for part in (link, " ")))
-        cells = [element("td", row["case"]), files, element("td", _verdict(row))]
-        cells += [element("td", _written(row[name]), class_="n") for name in names]
+        cells = [element("td", row["case"]), files, element("td", _describe_verdict(row))]
+        cells += [element("td", _format_value(row[name]), class_="n") for name in names]
         rows.append(element("tr", *cells))
     box = element("input", id="filter", type="search", placeholder="for example: not safe")
     field = element("label", "Filter ", box, class_="filter")
@@ -309,18 +316,18 @@ def _table(sweep: SweepShown) -> Markup:
     return report_section("Each case", field, table, explained=explained, ident="table")
 
 
-def _measured(sweep: SweepShown, measure: str) -> bool:
+def _has_measure(sweep: SweepShown, measure: str) -> bool:
     """Whether a column is a measure that some case has."""
     return measure not in sweep.units and any(row[measure] is not None for row in sweep.rows)
 
 
-def _verdict(row: Mapping[str, Any]) -> str:
+def _describe_verdict(row: Mapping[str, Any]) -> str:
     if row["safe"] is None:
         return f"{row['status']}: {row['detail']}"
-    return _WORDS[_style(row)]
+    return _WORDS[_style_of_case(row)]
 
 
-def _written(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -328,6 +335,6 @@ def _written(value: Any) -> str:
     return number(float(value), 3) if isinstance(value, int | float) else str(value)
 
 
-def _said(row: Mapping[str, Any], sweep: SweepShown) -> str:
-    values = ", ".join(f"{name} {_written(row[name])}" for name in sweep.names)
-    return f"{row['case']}: {values}: {_verdict(row)}"
+def _describe_case(row: Mapping[str, Any], sweep: SweepShown) -> str:
+    values = ", ".join(f"{name} {_format_value(row[name])}" for name in sweep.names)
+    return f"{row['case']}: {values}: {_describe_verdict(row)}"

@@ -332,7 +332,7 @@ def write_table(
 ) -> Sweep:
     """Write table and page of all cases."""
     table = write_cases(out, scenario, plan.names, rows=rows, limits=limits)
-    return Sweep(out, table, _boundary(plan, rows))
+    return Sweep(out, table, _find_boundary(plan, rows))
 
 
 def write_cases(
@@ -354,7 +354,7 @@ def write_cases(
         {name: scenario.parameters[name].unit for name in names},
         ["no collision", *map(str, limits)],
         rows,
-        {row["case"]: _links(out, row["case"]) for row in rows},
+        {row["case"]: _case_links(out, row["case"]) for row in rows},
     )
     write_text(out / PAGE_FILE, sweep_page(shown))
     seal_files(out, (TABLE_FILE, PAGE_FILE))
@@ -379,7 +379,7 @@ def read_table(out: Path) -> Sweep:
     else:
         runs = CaseRuns(scenario, out, settings_from_dict(said))
         table = _as_table(runs.rows(named_cases(plan)))
-    return Sweep(out, table, _boundary(plan, table.to_dicts()))
+    return Sweep(out, table, _find_boundary(plan, table.to_dicts()))
 
 
 def named_cases(plan: SweepPlan) -> dict[str, dict[str, float]]:
@@ -400,7 +400,7 @@ def _as_table(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
     return pl.DataFrame(rows, schema=schema, orient="row")
 
 
-def _boundary(plan: SweepPlan, rows: Sequence[Mapping[str, Any]]) -> tuple[Any, ...]:
+def _find_boundary(plan: SweepPlan, rows: Sequence[Mapping[str, Any]]) -> tuple[Any, ...]:
     import numpy as np
 
     if len(plan.names) != 2:
@@ -411,7 +411,7 @@ def _boundary(plan: SweepPlan, rows: Sequence[Mapping[str, Any]]) -> tuple[Any, 
     return tuple((tuple(a), tuple(b)) for a, b in safe_boundary(points, safe).tolist())
 
 
-def _links(out: Path, case: str) -> list[tuple[str, str]]:
+def _case_links(out: Path, case: str) -> list[tuple[str, str]]:
     given = {
         "scenario": f"cases/{case}{SUFFIX}",
         "OpenSCENARIO": f"cases/{case}.xosc",
@@ -565,7 +565,7 @@ def opened_case(out: Path, case: str) -> Scenario:
     limits = [limit for text in said["safe"] if (limit := _of_ttc(text)) is not None]
     criteria = list(found.criteria)
     if any(actor.ego for actor in found.actors):
-        own = ["collided(ego) == 0", *(_criterion(limit) for limit in limits)]
+        own = ["collided(ego) == 0", *(_describe_criterion(limit) for limit in limits)]
         criteria += [text for text in own if text not in criteria]
     changes = {
         "name": f"{whole.name[:100]}, {case}",
@@ -575,7 +575,7 @@ def opened_case(out: Path, case: str) -> Scenario:
     return found.model_copy(update=changes)
 
 
-def _criterion(limit: Limit) -> str:
+def _describe_criterion(limit: Limit) -> str:
     return f"{_TTC}(ego) {limit.expectation.op} {limit.expectation.bound:g} s"
 
 
@@ -639,7 +639,7 @@ def estimate(
     CaseRuns(scenario, Path(), settings)  # an unknown figure or limit is refused
     with scratch_folder() as folder:
         began = time.monotonic()
-        run = _possible(workspace, scenario, plan, settings, patience, folder)
+        run = _find_possible_case(workspace, scenario, plan, settings, patience, folder)
         (ended,) = run_all([run], reports=False, figures=False)
         seconds = time.monotonic() - began
         disk = sum(file.stat().st_size for file in run.folder.rglob("*") if file.is_file())
@@ -649,7 +649,7 @@ def estimate(
     return SweepEstimate(run.name, seconds, disk, whole)
 
 
-def _possible(
+def _find_possible_case(
     workspace: Workspace,
     scenario: Scenario,
     plan: SweepPlan,

@@ -246,7 +246,7 @@ def outcome_of(
     """
     impacts: list[float] = []
     for event in events:
-        if event.kind == "collision" and _concerns(watched, event.actor, event.partner):
+        if event.kind == "collision" and _concerns_watched(watched, event.actor, event.partner):
             known = (event.values or {}).get("impact_speed")
             impacts.append(_impact_speed(event, trajectories()) if known is None else float(known))
     found: dict[str, bool | float | None] = {
@@ -254,7 +254,7 @@ def outcome_of(
         "impact_speed": max(impacts, default=None),
     }
     rows = [] if conflicts is None else conflicts.to_dicts()
-    own = [row for row in rows if _concerns(watched, row["one"], row["other"])]
+    own = [row for row in rows if _concerns_watched(watched, row["one"], row["other"])]
     for name, column, best in (
         ("min_ttc", "ttc", min), ("min_pet", "pet", min), ("max_drac", "drac", max),
     ):  # fmt: skip
@@ -262,7 +262,7 @@ def outcome_of(
     return found
 
 
-def _concerns(watched: Collection[str] | None, *ids: str | None) -> bool:
+def _concerns_watched(watched: Collection[str] | None, *ids: str | None) -> bool:
     return watched is None or any(name in watched for name in ids)
 
 
@@ -343,7 +343,7 @@ def study_table(grid: StudyGrid, rows: Mapping[str, Mapping[str, Any]]) -> pl.Da
         "case": [run.case or None for run in ended],
         "seed": [run.seed for run in ended],
         "map": [grid.sources[run.scenario].map_name for run in ended],
-        **{name: _values(grid, ended, name) for name in grid.parameters},
+        **{name: _values_of_runs(grid, ended, name) for name in grid.parameters},
     }
     said = [rows[run.name] for run in ended]
     for name in schema:
@@ -352,5 +352,5 @@ def study_table(grid: StudyGrid, rows: Mapping[str, Mapping[str, Any]]) -> pl.Da
     return pl.DataFrame(columns, schema=schema)
 
 
-def _values(grid: StudyGrid, runs: Sequence[StudyRun], name: str) -> list[float]:
+def _values_of_runs(grid: StudyGrid, runs: Sequence[StudyRun], name: str) -> list[float]:
     return [grid.values(run.case)[name] for run in runs]

@@ -127,7 +127,7 @@ def allowed_by_chance(
     float or None
         ``None`` where fewer than :data:`FEWEST_SEEDS` of a side have the figure.
     """
-    one, other = _known(old), _known(new)
+    one, other = _known_values(old), _known_values(new)
     if min(len(one), len(other)) < FEWEST_SEEDS:
         return None
     tail = tail_of(level, both_sides=both_sides)
@@ -155,7 +155,7 @@ def seeds_needed(values: Sequence[float], *, level: float) -> int | None:
         return None
     share = statistics.stdev(values) / mean
     count = FEWEST_SEEDS
-    while count < _MOST_SEEDS and _detectable(share, count, level) > CHANGE:
+    while count < _MOST_SEEDS and _detectable_change(share, count, level) > CHANGE:
         count = math.ceil(count * 1.05)
     return count
 
@@ -172,14 +172,14 @@ def hardly_varying(values: Sequence[float | None]) -> str | None:
     )
 
 
-def _detectable(share: float, count: int, level: float) -> float:
+def _detectable_change(share: float, count: int, level: float) -> float:
     """Change that is caught as often as wanted, as a share of the mean."""
     freedom = 2 * count - 2
     needed = quantile(level / 2, freedom) + quantile(1 - CAUGHT, freedom)
     return needed * share * math.sqrt(2 / count)
 
 
-def _known(values: Mapping[int, float | None]) -> dict[int, float]:
+def _known_values(values: Mapping[int, float | None]) -> dict[int, float]:
     return {seed: value for seed, value in values.items() if value is not None}
 
 
@@ -495,10 +495,10 @@ def scatter_of_differences(pairs: Pairs, *, wanted: float = 0.0) -> float:
     if effect < wanted:
         unrelated = math.sqrt(2.0) * statistics.stdev(old for old, _ in pairs)
         found = max(found, min(unrelated, found * wanted / effect if effect else unrelated))
-    return found * _assured(len(pairs))
+    return found * _assured_scatter(len(pairs))
 
 
-def _assured(count: int) -> float:
+def _assured_scatter(count: int) -> float:
     """Upper end of the interval of a standard deviation over ``count`` values, as a share of it."""
     from scipy.stats import chi2
 

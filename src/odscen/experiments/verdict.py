@@ -155,14 +155,16 @@ def hold_against(
     detect
         A change that is to be caught: its figure has more of the false alarms than others.
     """
-    compared = _compared(baseline, runs)
-    limits = _Limits(tolerances, _level(compared, tolerances, detect), detect, better_fails)
+    compared = _compare_seeds(baseline, runs)
+    limits = _Limits(
+        tolerances, _share_false_alarms(compared, tolerances, detect), detect, better_fails
+    )
     changes = []
     for one in compared:
         tolerance = tolerances.of(one.key)
         if baseline.by_scatter and (one.key.kind, one.key.figure) not in tolerances.given:
             tolerance = limits.by_scatter(one, tolerance)
-        change = _change(one, tolerance, tolerances, by_scatter=baseline.by_scatter)
+        change = _judge_change(one, tolerance, tolerances, by_scatter=baseline.by_scatter)
         if change is not None:
             if better_fails and change.effect is Effect.BETTER:
                 change = replace(change, effect=Effect.FAILS)
@@ -185,7 +187,7 @@ class _Compared(NamedTuple):
     weight: float
 
 
-def _compared(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Compared]:
+def _compare_seeds(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Compared]:
     """Figures of the seeds that both have; by scatter also of other seeds, if those differ."""
     common = [seed for seed in baseline.seeds if seed in runs]
     others = baseline.by_scatter and set(runs) != set(baseline.seeds)
@@ -207,10 +209,10 @@ def _compared(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Compare
         for one in compared
         if one.key.figure == "vehicles"
     }
-    return [one._replace(weight=_vehicles(one.key, passed)) for one in compared]
+    return [one._replace(weight=_count_vehicles(one.key, passed)) for one in compared]
 
 
-def _level(
+def _share_false_alarms(
     compared: Sequence[_Compared], tolerances: Tolerances, detect: Detection | None
 ) -> Level:
     """Share out false alarms among the figures that can fail by scatter."""
@@ -231,21 +233,23 @@ class _Limits(NamedTuple):
     detect: Detection | None
     better_fails: bool
 
-    def by_scatter(self, one: _Compared, usual: Tolerance) -> Tolerance:
+    def by_scatter(self, compared: _Compared, usual: Tolerance) -> Tolerance:
         """What chance explains, where that is more than the least that matters."""
-        watched = self.detect if self.detect is not None and one.key == self.detect.key else None
-        level = self.level.run if one.key.kind == "run" else self.level.place
-        better = self.tolerances.entry(one.key).better
+        watched = (
+            self.detect if self.detect is not None and compared.key == self.detect.key else None
+        )
+        level = self.level.run if compared.key.kind == "run" else self.level.place
+        better = self.tolerances.entry(compared.key).better
         allowed = allowed_by_chance(
-            one.old,
-            one.new,
+            compared.old,
+            compared.new,
             level=level if watched is None else WATCHED,
             both_sides=self.better_fails or better is Better.NEITHER,
         )
         if allowed is None:
             return usual
         floor = usual.times(FLOOR)
-        mean = _mean_known(one.old)
+        mean = _mean_known(compared.old)
         if watched is not None and watched.floor(mean) < floor.allowed(mean):
             floor = Tolerance(absolute=watched.floor(mean))
         return floor if allowed <= floor.allowed(mean) else Tolerance(0.0, allowed, by_scatter=True)
@@ -256,16 +260,16 @@ def _mean_known(values: Mapping[int, float | None]) -> float:
     return sum(known) / len(known)
 
 
-def _change(
-    one: _Compared, tolerance: Tolerance, tolerances: Tolerances, *, by_scatter: bool
+def _judge_change(
+    compared: _Compared, tolerance: Tolerance, tolerances: Tolerances, *, by_scatter: bool
 ) -> Change | None:
-    key, entry = one.key, tolerances.entry(one.key)
-    difference = compare_figure(one.old, one.new)
+    key, entry = compared.key, tolerances.entry(compared.key)
+    difference = compare_figure(compared.old, compared.new)
     if difference.a is None or difference.b is None:
         # Places and actors without a figure are seen by who passed and who arrived.
         if difference.a is difference.b or key.kind != "run":
             return None
-        there = one.old if difference.b is None else one.new
+        there = compared.old if difference.b is None else compared.new
         if by_scatter and None in there.values():  # with other seeds there may be none, too
             return None
         return Change(key, entry, difference, EXACT, 1.0, Effect.FAILS)
@@ -274,12 +278,14 @@ def _change(
     if size <= allowed + _NOISE:
         return None
     # A mean over n vehicles varies by chance with 1 / sqrt(n). Where none is allowed, one counts.
-    score = size / (allowed or 1.0) * math.sqrt(one.weight)
-    effect = _effect(key, tolerances, one.weight, better=entry.improves(difference.difference))
+    score = size / (allowed or 1.0) * math.sqrt(compared.weight)
+    effect = _effect_of(
+        key, tolerances, compared.weight, better=entry.improves(difference.difference)
+    )
     return Change(key, entry, difference, tolerance, score, effect)
 
 
-def _effect(
+def _effect_of(
     key: FigureKey, tolerances: Tolerances, weight: float, *, better: bool | None
 ) -> Effect:
     if key.kind == "actor" and (key.kind, key.figure) not in tolerances.given:
@@ -289,7 +295,7 @@ def _effect(
     return Effect.BETTER if better else Effect.FAILS
 
 
-def _vehicles(key: FigureKey, passed: Mapping[FigureKey, tuple[float, ...]]) -> float:
+def _count_vehicles(key: FigureKey, passed: Mapping[FigureKey, tuple[float, ...]]) -> float:
     """Vehicles that a figure of a place rests on: mean over the seeds, the lesser of both sides."""
     if key.kind not in ("segment", "junction"):
         return 1.0
@@ -360,13 +366,13 @@ def causes_between(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[Caus
         key=lambda name: (order.index(name) if name in order else len(order), name),
     )
     return tuple(
-        Cause(_LABELS.get(name, name.removeprefix("scenario.")), _words(name, old, new))
+        Cause(_LABELS.get(name, name.removeprefix("scenario.")), _describe_input(name, old, new))
         for name in names
         if old.get(name) != new.get(name)
     )
 
 
-def _words(name: str, old: Mapping[str, str], new: Mapping[str, str]) -> str:
+def _describe_input(name: str, old: Mapping[str, str], new: Mapping[str, str]) -> str:
     if name in _PACKAGES or name == "redraw":
         without = "open" if name == "redraw" else "none"
         return f"{name} {old.get(name, without)} -> {new.get(name, without)}"

@@ -177,19 +177,19 @@ def _carried_out(
     workspace = workspaces[order.sources[run.scenario].map_name]
     with scratch_folder() as folder:
         try:
-            checked = _checked(order, run, values, workspace, folder)
-            outcome = _simulated(order, run, checked, workspace, stopped)
+            checked = _check_order_run(order, run, values, workspace, folder)
+            outcome = _simulate_run(order, run, checked, workspace, stopped)
         except InputError as error:
-            outcome = Outcome(run.name, outcome_row(REFUSED, _words(error)))
+            outcome = Outcome(run.name, outcome_row(REFUSED, _describe_error(error)))
     outcome.row["seconds"] = round(time.monotonic() - began, 3)
     return outcome
 
 
-def _words(error: InputError) -> str:
+def _describe_error(error: InputError) -> str:
     return "; ".join([str(error), *getattr(error, "problems", ())])
 
 
-def _checked(
+def _check_order_run(
     order: WorkOrder,
     run: StudyRun,
     values: Mapping[str, float],
@@ -197,11 +197,11 @@ def _checked(
     out: Path,
 ) -> CheckedRun:
     source = order.sources[run.scenario]
-    entry = _entry(workspace, source)
+    entry = _find_entry(workspace, source)
     loaded = load_map(entry)
-    scenario = _document(source, loaded)
+    scenario = _read_or_sample(source, loaded)
     if edits := order.variants.get(run.variant, ()):
-        scenario = edited(scenario, [read_edit(dict(one)) for one in edits], loaded)
+        scenario = edited(scenario, [read_edit(dict(edit)) for edit in edits], loaded)
     if values:
         scenario = concrete(scenario, values, name=run.name)
     name = run.name.replace("/", "-")
@@ -215,18 +215,18 @@ def _entry_of(workspace: Workspace, name: str, sha256: str) -> MapEntry:
     return workspace.map_for(name, sha256)
 
 
-def _entry(workspace: Workspace, source: ScenarioSource) -> MapEntry:
+def _find_entry(workspace: Workspace, source: ScenarioSource) -> MapEntry:
     return _entry_of(workspace, source.map_name, source.map_sha256)
 
 
-def _document(source: ScenarioSource, loaded: LoadedMap) -> Scenario:
+def _read_or_sample(source: ScenarioSource, loaded: LoadedMap) -> Scenario:
     if source.text is not None:
-        return _read(source.text, source.name)
-    return _sampled(source.name, loaded, source.seed, json.dumps(source.config or {}))
+        return _read_scenario(source.text, source.name)
+    return _sample_scenario(source.name, loaded, source.seed, json.dumps(source.config or {}))
 
 
 @lru_cache(maxsize=4)
-def _sampled(name: str, loaded: LoadedMap, seed: int, config: str) -> Scenario:
+def _sample_scenario(name: str, loaded: LoadedMap, seed: int, config: str) -> Scenario:
     """Sample a scenario, once for all of its seeds and variants."""
     return sample_scenario(
         loaded.sumo.graph,
@@ -238,11 +238,11 @@ def _sampled(name: str, loaded: LoadedMap, seed: int, config: str) -> Scenario:
 
 
 @lru_cache(maxsize=4)
-def _read(text: str, name: str) -> Scenario:
+def _read_scenario(text: str, name: str) -> Scenario:
     return loads(text, file=name)
 
 
-def _simulated(
+def _simulate_run(
     order: WorkOrder,
     run: StudyRun,
     checked: CheckedRun,
@@ -254,7 +254,7 @@ def _simulated(
         [checked],
         reports=False,
         reporter=_StoppableReporter(stopped),
-        refused=lambda _name, error: refusals.append(_words(error)),
+        refused=lambda _name, error: refusals.append(_describe_error(error)),
     )
     if not ended:
         return Outcome(run.name, outcome_row(REFUSED, refusals[0]))
@@ -269,9 +269,9 @@ def _simulated(
     exports = None
     if order.formats and not failed:
         try:
-            exports = _exported(order.formats, workspace, result)
+            exports = _export_run(order.formats, workspace, result)
         except InputError as error:
-            row = outcome_row(REFUSED, f"cannot be exported: {_words(error)}")
+            row = outcome_row(REFUSED, f"cannot be exported: {_describe_error(error)}")
     return Outcome(run.name, row, kept, exports)
 
 
@@ -291,7 +291,7 @@ class _StoppableReporter(Reporter):
         self._own.advanced(progress)
 
 
-def _exported(
+def _export_run(
     formats: tuple[str, ...], workspace: Workspace, result: Run
 ) -> dict[str, dict[str, bytes]]:
     from odscen.app.exchange.exports import export_run

@@ -72,9 +72,9 @@ def write_commonroad_files(source: ExportSource) -> ExportFiles:
 
     recording = recording_of(source)
     elements, tracks = recording.elements, recording.tracks
-    stretches = list(_stretches(tracks))
+    stretches = list(_presence_stretches(tracks))
     limits = sorted({lane.speed_limit for lane in elements.lanes if 0 < lane.speed_limit < 1e3})
-    lights = _lights(recording.signals)
+    lights = _group_equal_signals(recording.signals)
     counts = (len(elements.lanes), len(elements.crosswalks), len(limits), len(lights))
     starts = [1]
     for count in (*counts, len(stretches)):
@@ -83,20 +83,23 @@ def write_commonroad_files(source: ExportSource) -> ExportFiles:
     text = "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8"?>',
-            _root(recording),
+            _write_root(recording),
             "<location><geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude>"
             "<gpsLongitude>999</gpsLongitude></location>",
             "<scenarioTags><simulated/></scenarioTags>",
-            *_lanelets(recording, ids, limits, lights),
-            *(_crosswalk(one, ids.crosswalks + k) for k, one in enumerate(elements.crosswalks)),
-            *(_sign(limit, ids.signs + k) for k, limit in enumerate(limits)),
-            *(_light(one, recording.signals, ids.lights + k) for k, one in enumerate(lights)),
-            *_obstacles(recording, stretches, ids),
+            *_write_lanelets(recording, ids, limits, lights),
+            *(
+                _write_crosswalk(one, ids.crosswalks + k)
+                for k, one in enumerate(elements.crosswalks)
+            ),
+            *(_write_sign(limit, ids.signs + k) for k, limit in enumerate(limits)),
+            *(_write_light(one, recording.signals, ids.lights + k) for k, one in enumerate(lights)),
+            *_write_obstacles(recording, stretches, ids),
             _planning_problem(recording, ids.problem),
             "</commonRoad>\n",
         ]
     )
-    said = _said(recording, stretches, ids, len(lights))
+    said = _describe_export(recording, stretches, ids, len(lights))
     return {
         f"{recording.name}.xml": text,
         f"{recording.name}.export.json": json.dumps(said, indent=2, ensure_ascii=False) + "\n",
@@ -108,7 +111,7 @@ def benchmark_id(name: str) -> str:
     return f"ZAM_{re.sub('[^A-Za-z0-9]', '', name) or 'Map'}-1_1_T-1"
 
 
-def _root(recording: RunRecording) -> str:
+def _write_root(recording: RunRecording) -> str:
     about = {
         "commonRoadVersion": "2020a",
         "benchmarkID": benchmark_id(recording.map_name),
@@ -121,7 +124,7 @@ def _root(recording: RunRecording) -> str:
     return f"<commonRoad {' '.join(f'{key}={quoteattr(value)}' for key, value in about.items())}>"
 
 
-def _said(
+def _describe_export(
     recording: RunRecording, stretches: list[_Presence], ids: _Ids, lights: int
 ) -> dict[str, object]:
     tracks = recording.tracks
@@ -150,7 +153,7 @@ def _said(
 
 
 # ---------------------------------------------------------------------------- lanelets and lights
-def _lanelets(
+def _write_lanelets(
     recording: RunRecording, ids: _Ids, limits: list[float], lights: list[list[int]]
 ) -> Iterator[str]:
     at_approach: dict[int, list[int]] = {}
@@ -162,12 +165,14 @@ def _lanelets(
         yield "".join(
             [
                 f'<lanelet id="{ids.lanes + row}">',
-                _bound("leftBound", lane.left),
-                _bound("rightBound", lane.right),
-                *(f'<predecessor ref="{ids.lanes + one}"/>' for one in lane.entries),
+                _write_bound("leftBound", lane.left),
+                _write_bound("rightBound", lane.right),
+                *(f'<predecessor ref="{ids.lanes + entry}"/>' for entry in lane.entries),
                 *(f'<successor ref="{ids.lanes + one}"/>' for one in lane.exits),
-                _adjacent("adjacentLeft", lane, lane.left_lane, ids, beyond=lane.keeps_right),
-                _adjacent("adjacentRight", lane, lane.right_lane, ids, beyond=not lane.keeps_right),
+                _write_adjacent("adjacentLeft", lane, lane.left_lane, ids, beyond=lane.keeps_right),
+                _write_adjacent(
+                    "adjacentRight", lane, lane.right_lane, ids, beyond=not lane.keeps_right
+                ),
                 _stop_line(lane, own),
                 f"<laneletType>{_lanelet_type(lane)}</laneletType>",
                 "<userOneWay>vehicle</userOneWay>",
@@ -188,7 +193,7 @@ def _lanelet_type(lane: LaneElement) -> str:
     )
 
 
-def _adjacent(name: str, lane: LaneElement, row: int, ids: _Ids, *, beyond: bool) -> str:
+def _write_adjacent(name: str, lane: LaneElement, row: int, ids: _Ids, *, beyond: bool) -> str:
     if row >= 0:
         return f'<{name} ref="{ids.lanes + row}" drivingDir="same"/>'
     if beyond and lane.opposite >= 0:
@@ -196,11 +201,11 @@ def _adjacent(name: str, lane: LaneElement, row: int, ids: _Ids, *, beyond: bool
     return ""
 
 
-def _bound(name: str, points: FloatArray) -> str:
-    return f"<{name}>{''.join(_point(point) for point in points)}</{name}>"
+def _write_bound(name: str, points: FloatArray) -> str:
+    return f"<{name}>{''.join(_write_point(point) for point in points)}</{name}>"
 
 
-def _point(point: FloatArray) -> str:
+def _write_point(point: FloatArray) -> str:
     x, y, z = point
     return f"<point><x>{x:.4f}</x><y>{y:.4f}</y><z>{z:.4f}</z></point>"
 
@@ -208,12 +213,12 @@ def _point(point: FloatArray) -> str:
 def _stop_line(lane: LaneElement, lights: list[int]) -> str:
     if not lights:
         return ""
-    refs = "".join(f'<trafficLightRef ref="{one}"/>' for one in lights)
-    ends = "".join(_point(side[-1]) for side in (lane.left, lane.right))
+    refs = "".join(f'<trafficLightRef ref="{light}"/>' for light in lights)
+    ends = "".join(_write_point(side[-1]) for side in (lane.left, lane.right))
     return f"<stopLine>{ends}<lineMarking>solid</lineMarking>{refs}</stopLine>"
 
 
-def _crosswalk(crosswalk: CrosswalkElement, number: int) -> str:
+def _write_crosswalk(crosswalk: CrosswalkElement, number: int) -> str:
     import numpy as np
 
     start, end = crosswalk.axis
@@ -222,15 +227,15 @@ def _crosswalk(crosswalk: CrosswalkElement, number: int) -> str:
     return "".join(
         [
             f'<lanelet id="{number}">',
-            _bound("leftBound", crosswalk.axis + side),
-            _bound("rightBound", crosswalk.axis - side),
+            _write_bound("leftBound", crosswalk.axis + side),
+            _write_bound("rightBound", crosswalk.axis - side),
             "<laneletType>crosswalk</laneletType>",
             "<userBidirectional>pedestrian</userBidirectional></lanelet>",
         ]
     )
 
 
-def _sign(limit: float, number: int) -> str:
+def _write_sign(limit: float, number: int) -> str:
     return (
         f'<trafficSign id="{number}"><trafficSignElement><trafficSignID>{_MAX_SPEED}'
         f"</trafficSignID><additionalValue>{limit:.4f}</additionalValue></trafficSignElement>"
@@ -238,7 +243,7 @@ def _sign(limit: float, number: int) -> str:
     )
 
 
-def _lights(signals: LaneSignals) -> list[list[int]]:
+def _group_equal_signals(signals: LaneSignals) -> list[list[int]]:
     """Rows of signals that are one light: same approach and turn, and the same colours always."""
     keys = [
         (int(approach), _DIRECTIONS.get(turn, "all"), color.tobytes())
@@ -250,7 +255,7 @@ def _lights(signals: LaneSignals) -> list[list[int]]:
     return list(found.values())
 
 
-def _light(rows: list[int], signals: LaneSignals, number: int) -> str:
+def _write_light(rows: list[int], signals: LaneSignals, number: int) -> str:
     """A light whose cycle is what it showed during the run, instant by instant."""
     colors = signals.color[rows[0]].tolist()
     cycle = "".join(
@@ -261,13 +266,13 @@ def _light(rows: list[int], signals: LaneSignals, number: int) -> str:
     direction = _DIRECTIONS.get(signals.turn[rows[0]], "all")
     return (
         f'<trafficLight id="{number}"><cycle>{cycle}</cycle><position>'
-        f"{_point(signals.stop[rows[0]])}</position><direction>{direction}</direction>"
+        f"{_write_point(signals.stop[rows[0]])}</position><direction>{direction}</direction>"
         "<active>true</active></trafficLight>"
     )
 
 
 # ---------------------------------------------------------------------------- road users
-def _stretches(tracks: Tracks) -> Iterator[_Presence]:
+def _presence_stretches(tracks: Tracks) -> Iterator[_Presence]:
     import numpy as np
 
     for row, valid in enumerate(tracks.valid):
@@ -276,7 +281,9 @@ def _stretches(tracks: Tracks) -> Iterator[_Presence]:
             yield _Presence(row, first, after - 1)
 
 
-def _obstacles(recording: RunRecording, stretches: list[_Presence], ids: _Ids) -> Iterator[str]:
+def _write_obstacles(
+    recording: RunRecording, stretches: list[_Presence], ids: _Ids
+) -> Iterator[str]:
     tracks = recording.tracks
     borders = [lane.left for lane in recording.elements.lanes]
     left = min(float(line[:, 0].min()) for line in borders) - _WAITING[0]
@@ -284,14 +291,14 @@ def _obstacles(recording: RunRecording, stretches: list[_Presence], ids: _Ids) -
     for k, one in enumerate(stretches):
         category = tracks.categories[one.row]
         if one.first == 0:
-            begins = _state("initialState", tracks, one.row, 0)
+            begins = _write_state("initialState", tracks, one.row, 0)
         else:
-            begins = _pose("initialState", left, below + k * _WAITING[1], 0.0, 0, 0.0)
+            begins = _write_pose("initialState", left, below + k * _WAITING[1], 0.0, 0, 0.0)
         # A trajectory has a state at least, and none of them is at instant 0.
         later = range(max(one.first, 1), one.last + 1)
-        states = [_state("state", tracks, one.row, instant) for instant in later]
+        states = [_write_state("state", tracks, one.row, instant) for instant in later]
         if not states:
-            states = [_state("state", tracks, one.row, 0, at=1)]
+            states = [_write_state("state", tracks, one.row, 0, at=1)]
         yield "".join(
             [
                 f'<dynamicObstacle id="{ids.obstacles + k}">',
@@ -304,14 +311,16 @@ def _obstacles(recording: RunRecording, stretches: list[_Presence], ids: _Ids) -
         )
 
 
-def _state(name: str, tracks: Tracks, row: int, instant: int, *, at: int | None = None) -> str:
+def _write_state(
+    name: str, tracks: Tracks, row: int, instant: int, *, at: int | None = None
+) -> str:
     x, y, hdg, speed = (
         float(values[row, instant]) for values in (tracks.x, tracks.y, tracks.hdg, tracks.speed)
     )
-    return _pose(name, x, y, hdg, instant if at is None else at, speed)
+    return _write_pose(name, x, y, hdg, instant if at is None else at, speed)
 
 
-def _pose(name: str, x: float, y: float, hdg: float, instant: int, speed: float) -> str:
+def _write_pose(name: str, x: float, y: float, hdg: float, instant: int, speed: float) -> str:
     return (
         f"<{name}><position><point><x>{x:.4f}</x><y>{y:.4f}</y></point></position>"
         f"<orientation><exact>{hdg:.6f}</exact></orientation><time><exact>{instant}</exact></time>"

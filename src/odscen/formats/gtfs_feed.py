@@ -78,11 +78,13 @@ def read_feed(tables: Mapping[str, str], *, day: date | None = None) -> Feed:
     for name in NEEDED:
         if name not in tables:
             raise InputError(f"the feed has no {name}")
-    services = _services(tables, day)
-    routes = {row["route_id"]: row for row in _rows(tables, "routes.txt", "route_id", "route_type")}
+    services = _services_on_day(tables, day)
+    routes = {
+        row["route_id"]: row for row in _read_rows(tables, "routes.txt", "route_id", "route_type")
+    }
     trips: dict[str, str] = {}
     other = 0
-    for row in _rows(tables, "trips.txt", "route_id", "service_id", "trip_id"):
+    for row in _read_rows(tables, "trips.txt", "route_id", "service_id", "trip_id"):
         if services is None or row["service_id"] in services:
             route = routes.get(row["route_id"])
             if route is None:
@@ -91,10 +93,12 @@ def read_feed(tables: Mapping[str, str], *, day: date | None = None) -> Feed:
                 trips[row["trip_id"]] = _route_name(route)
             else:
                 other += 1
-    visits = _visits(tables, trips)
+    visits = _read_visits(tables, trips)
     return Feed(
-        stops=_stops(tables),
-        trips=tuple(FeedTrip(one, trips[one], visits[one]) for one in trips if visits.get(one)),
+        stops=_read_stops(tables),
+        trips=tuple(
+            FeedTrip(trip, trips[trip], visits[trip]) for trip in trips if visits.get(trip)
+        ),
         other_modes=other,
     )
 
@@ -117,7 +121,7 @@ class _FeedRow(dict[str, str]):
             raise self.refusal(column, "is not a number") from None
 
 
-def _rows(tables: Mapping[str, str], file: str, *needed: str) -> Iterator[_FeedRow]:
+def _read_rows(tables: Mapping[str, str], file: str, *needed: str) -> Iterator[_FeedRow]:
     reader = csv.reader(io.StringIO(tables[file].removeprefix("\ufeff")))
     try:
         columns = [name.strip() for name in next(reader, [])]
@@ -136,7 +140,7 @@ def _rows(tables: Mapping[str, str], file: str, *needed: str) -> Iterator[_FeedR
         ) from error
 
 
-def _services(tables: Mapping[str, str], day: date | None) -> set[str] | None:
+def _services_on_day(tables: Mapping[str, str], day: date | None) -> set[str] | None:
     """Services that run on a day; ``None`` without a calendar."""
     given = [name for name in CALENDARS if name in tables]
     if not given:
@@ -146,11 +150,13 @@ def _services(tables: Mapping[str, str], day: date | None) -> set[str] | None:
     stamp, weekday = day.strftime("%Y%m%d"), _DAYS[day.weekday()]
     running: set[str] = set()
     if "calendar.txt" in tables:
-        for row in _rows(tables, "calendar.txt", "service_id", *_DAYS, "start_date", "end_date"):
+        for row in _read_rows(
+            tables, "calendar.txt", "service_id", *_DAYS, "start_date", "end_date"
+        ):
             if row[weekday] == "1" and row["start_date"] <= stamp <= row["end_date"]:
                 running.add(row["service_id"])
     if "calendar_dates.txt" in tables:
-        for row in _rows(tables, "calendar_dates.txt", "service_id", "date", "exception_type"):
+        for row in _read_rows(tables, "calendar_dates.txt", "service_id", "date", "exception_type"):
             if row["date"] == stamp and row["exception_type"] == _ADDED:
                 running.add(row["service_id"])
             elif row["date"] == stamp and row["exception_type"] == _REMOVED:
@@ -168,7 +174,7 @@ def _route_name(route: _FeedRow) -> str:
     return route.get("route_short_name", "").strip() or route["route_id"]
 
 
-def _stops(tables: Mapping[str, str]) -> dict[str, FeedStop]:
+def _read_stops(tables: Mapping[str, str]) -> dict[str, FeedStop]:
     return {
         row["stop_id"]: FeedStop(
             row["stop_id"],
@@ -176,17 +182,19 @@ def _stops(tables: Mapping[str, str]) -> dict[str, FeedStop]:
             row.number("stop_lat"),
             row.number("stop_lon"),
         )
-        for row in _rows(tables, "stops.txt", "stop_id", "stop_lat", "stop_lon")
+        for row in _read_rows(tables, "stops.txt", "stop_id", "stop_lat", "stop_lon")
         if row["stop_lat"].strip() and row["stop_lon"].strip()
     }
 
 
-def _visits(tables: Mapping[str, str], trips: Collection[str]) -> dict[str, tuple[FeedVisit, ...]]:
+def _read_visits(
+    tables: Mapping[str, str], trips: Collection[str]
+) -> dict[str, tuple[FeedVisit, ...]]:
     found: dict[str, list[tuple[float, FeedVisit]]] = {}
     columns = ("trip_id", "stop_id", "stop_sequence", "departure_time")
-    for row in _rows(tables, "stop_times.txt", *columns):
+    for row in _read_rows(tables, "stop_times.txt", *columns):
         if row["trip_id"] in trips:
-            visit = FeedVisit(row["stop_id"], _seconds(row))
+            visit = FeedVisit(row["stop_id"], _read_seconds(row))
             found.setdefault(row["trip_id"], []).append((row.number("stop_sequence"), visit))
     return {
         trip: tuple(visit for _, visit in sorted(visits, key=lambda pair: pair[0]))
@@ -194,7 +202,7 @@ def _visits(tables: Mapping[str, str], trips: Collection[str]) -> dict[str, tupl
     }
 
 
-def _seconds(row: _FeedRow) -> float | None:
+def _read_seconds(row: _FeedRow) -> float | None:
     text = row["departure_time"] or row.get("arrival_time", "")
     if not text.strip():
         return None

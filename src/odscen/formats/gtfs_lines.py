@@ -85,10 +85,10 @@ def place_feed(
     """
     left_out: dict[str, int] = {"trips of other modes": feed.other_modes}
     wanted = set(routes)
-    trips = [one for one in feed.trips if not wanted or one.route in wanted]
+    trips = [trip for trip in feed.trips if not wanted or trip.route in wanted]
     served = {visit.stop for trip in trips for visit in trip.visits}
     known = [stop for stop in feed.stops.values() if stop.id in served]
-    nodes = _nodes(known, region, project, within)
+    nodes = _find_stop_nodes(known, region, project, within)
     left_out["stops away from the region"] = len(known) - len(nodes)
     groups: dict[tuple[str, tuple[str, ...], tuple[float, ...]], list[float]] = {}
     for trip in trips:
@@ -100,28 +100,30 @@ def place_feed(
         groups.setdefault((trip.route, run.stops, relative), []).append(first)
     lines: list[TransitLine] = []
     for (route, stops, relative), firsts in sorted(groups.items()):
-        name = _free(route, {line.id for line in lines})
-        line = _line(name, stops, relative, [nodes[stop] for stop in stops], region)
+        name = _choose_free_name(route, {line.id for line in lines})
+        line = _make_line(name, stops, relative, [nodes[stop] for stop in stops], region)
         if line is None:
-            _count(left_out, "trips without a route inside the region", len(firsts))
+            _count_left_out(left_out, "trips without a route inside the region", len(firsts))
             continue
         start = line.stops[0].after or 0.0
         departs = sorted({round(first - clock - start, 1) for first in firsts})
         inside = tuple(time for time in departs if 0.0 <= time < duration)
-        _count(left_out, "trips outside the time of the run", len(departs) - len(inside))
+        _count_left_out(left_out, "trips outside the time of the run", len(departs) - len(inside))
         if inside:
             lines.append(line.model_copy(update={"departures": inside}))
-    used = {one.stop for line in lines for one in line.stops}
+    used = {stop.stop for line in lines for stop in line.stops}
     places = tuple(
-        TransitStop(id=_clean(stop.id), name=stop.name[:200], node=node_id(region.graph, node))
+        TransitStop(
+            id=_clean_identifier(stop.id), name=stop.name[:200], node=node_id(region.graph, node)
+        )
         for stop in known
-        if (node := nodes.get(stop.id)) is not None and _clean(stop.id) in used
+        if (node := nodes.get(stop.id)) is not None and _clean_identifier(stop.id) in used
     )
     counted = {why: number for why, number in left_out.items() if number}
     return PlacedFeed(Transit(stops=places, lines=tuple(lines)), counted)
 
 
-def _nodes(
+def _find_stop_nodes(
     stops: Sequence[FeedStop],
     region: Region,
     project: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
@@ -129,7 +131,7 @@ def _nodes(
 ) -> dict[str, int]:
     """Node of each stop that lies beside a lane of the region."""
     lanes = region.graph.lanes
-    rows = np.array([one is None for one in lanes.lanes.junctions], dtype=np.bool_)
+    rows = np.array([junction is None for junction in lanes.lanes.junctions], dtype=np.bool_)
     ids = np.array([key.lane for key in lanes.lanes.keys])
     right = np.where((ids < 0) == lanes.lanes.forward, -1.0, 1.0)[lanes.lane]
     outer = np.where(right < 0, lanes.right_lane, lanes.left_lane) < 0
@@ -160,7 +162,7 @@ def _on_map(trip: FeedTrip, nodes: dict[str, int]) -> _Run:
     return _Run(tuple(stop for stop, _ in kept), tuple(time for _, time in kept))
 
 
-def _line(
+def _make_line(
     name: str,
     stops: Sequence[str],
     relative: Sequence[float],
@@ -172,7 +174,7 @@ def _line(
     grows = all(one < other for one, other in pairwise(relative))
     if not grows or not all(region.leads(one, other) for one, other in pairwise(places)):
         return None
-    start, metres = _start(region, nodes[0])
+    start, metres = _find_start(region, nodes[0])
     goals = region.router.goal_candidates(nodes[-1])
     if not len(goals):
         return None
@@ -183,14 +185,14 @@ def _line(
         start=node_id(region.graph, start),
         goal=node_id(region.graph, int(goals[int(np.argmin(distances))])),
         stops=tuple(
-            ServedStop(stop=_clean(stop), after=round(lead + time, 1))
+            ServedStop(stop=_clean_identifier(stop), after=round(lead + time, 1))
             for stop, time in zip(stops, relative, strict=True)
         ),
         departures=(0.0,),
     )
 
 
-def _start(region: Region, first: int) -> tuple[int, float]:
+def _find_start(region: Region, first: int) -> tuple[int, float]:
     """Where trips set off, and metres from there to their first stop."""
     best: tuple[float, int] | None = None
     for entry in entries(region):
@@ -207,17 +209,17 @@ def _start(region: Region, first: int) -> tuple[int, float]:
     return start, float(lanes.offset[first] - lanes.offset[start])
 
 
-def _clean(name: str) -> str:
+def _clean_identifier(name: str) -> str:
     """Name as an identifier of the document."""
     text = _ODD.sub("-", name).strip("-._")[:60]
     return text or "stop"
 
 
-def _free(name: str, taken: set[str]) -> str:
-    stem = _clean(f"line-{name}")
+def _choose_free_name(name: str, taken: set[str]) -> str:
+    stem = _clean_identifier(f"line-{name}")
     names = (stem if n == 1 else f"{stem}-{n}" for n in range(1, len(taken) + 2))
-    return next(one for one in names if one not in taken)
+    return next(name for name in names if name not in taken)
 
 
-def _count(left_out: dict[str, int], why: str, number: int) -> None:
+def _count_left_out(left_out: dict[str, int], why: str, number: int) -> None:
     left_out[why] = left_out.get(why, 0) + number

@@ -70,11 +70,11 @@ def _write_scenario(source: ExportSource, dialect: Dialect) -> ExportFiles:
     _note_traffic(source, dialect, notes)
     said = scenario.environment.model_dump(exclude_defaults=True) or scenario.demand.clock
     # ScenarioRunner asks each file for its weather.
-    sky = _weather(source, dialect) if said or dialect.for_scenario_runner else None
+    sky = _write_weather(source, dialect) if said or dialect.for_scenario_runner else None
     story = Story(scenario, places, dialect, notes, sky)
     entities = [entity(actor, places, dialect) for actor in scenario.actors]
     signals = traffic_signals(source, notes)
-    return _files(source, dialect, entities, story.storyboard(), notes, signals)
+    return _make_files(source, dialect, entities, story.storyboard(), notes, signals)
 
 
 def _write_run(source: ExportSource, recorded: RecordedRun, dialect: Dialect) -> ExportFiles:
@@ -85,21 +85,23 @@ def _write_run(source: ExportSource, recorded: RecordedRun, dialect: Dialect) ->
     notes = ExportNotes()
     triggers = Triggers(Places(source), dialect, notes, {})
     lines = lines_of(recorded)
-    made = AsRun(source, recorded, dialect, triggers, _weather(source, dialect), lines)
+    made = AsRun(source, recorded, dialect, triggers, _write_weather(source, dialect), lines)
     for user in recorded.users:
         if user.id not in lines:
             notes.left_out.append((user.id, "never in the simulation"))
-    return _files(source, dialect, list(made.entities()), made.storyboard(), notes)
+    return _make_files(source, dialect, list(made.entities()), made.storyboard(), notes)
 
 
-def _weather(source: ExportSource, dialect: Dialect) -> _Element:
+def _write_weather(source: ExportSource, dialect: Dialect) -> _Element:
     from odscen.formats.openscenario.xosc_weather import environment, said_of
 
     scenario = source.scenario
-    return environment(_parameters(source), scenario.demand.clock, dialect, said_of(scenario))
+    return environment(
+        _weather_parameters(source), scenario.demand.clock, dialect, said_of(scenario)
+    )
 
 
-def _files(
+def _make_files(
     source: ExportSource,
     dialect: Dialect,
     entities: Sequence[_Element],
@@ -116,7 +118,7 @@ def _files(
         revMajor=1,
         revMinor=dialect.minor,
         date=_DATE,
-        description=_title(source.scenario, dialect),
+        description=_make_title(source.scenario, dialect),
         author="odscen",
     )
     map_name = f"{source.scenario.map.name}.xodr"
@@ -137,13 +139,13 @@ def _files(
     }
 
 
-def _title(scenario: Scenario, dialect: Dialect) -> str:
+def _make_title(scenario: Scenario, dialect: Dialect) -> str:
     """Description of the file; ScenarioRunner takes it as a name."""
     said = "" if dialect.for_scenario_runner else scenario.description
     return (said or scenario.name).removeprefix(LEFT_HANDED)
 
 
-def _parameters(source: ExportSource) -> dict[str, float]:
+def _weather_parameters(source: ExportSource) -> dict[str, float]:
     given = source.scenario.environment
     return {**(source.assets.weather(given.preset) or {}), **given.parameters}
 
@@ -171,7 +173,7 @@ def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) ->
         "simulation": scenario.simulation != usual,
         "variant": scenario.variant is not None,
         "study": bool(scenario.study.model_dump(exclude_defaults=True)),
-        "description": scenario.description not in ("", _title(scenario, dialect)),
+        "description": scenario.description not in ("", _make_title(scenario, dialect)),
         "flows": bool(scenario.flows),
         "demand": bool(scenario.demand.parts),
         "transit": bool(scenario.transit.lines),

@@ -41,16 +41,16 @@ def write_run_arrays(source: ExportSource) -> ExportFiles:
 
     recording = recording_of(source)
     arrays = {
-        **_head(recording),
-        **_graph(source.sumo_map.graph),
-        **_elements(recording.elements),
-        **_tracks(recording),
+        **_describe_recording(recording),
+        **_graph_arrays(source.sumo_map.graph),
+        **_element_arrays(recording.elements),
+        **_track_arrays(recording),
         "agent_node": _first_nodes(recording, source.sumo_map.graph),
     }
     return {f"{recording.name}.npz": npz_bytes(arrays)}
 
 
-def _head(recording: RunRecording) -> Arrays:
+def _describe_recording(recording: RunRecording) -> Arrays:
     import numpy as np
 
     about = {
@@ -67,7 +67,7 @@ def _head(recording: RunRecording) -> Arrays:
     return {"about": np.array(json.dumps(about, ensure_ascii=False)), "time": recording.times}
 
 
-def _graph(graph: MapGraph) -> Arrays:
+def _graph_arrays(graph: MapGraph) -> Arrays:
     import numpy as np
 
     lanes, walks = graph.lanes, graph.walks
@@ -90,7 +90,7 @@ def _graph(graph: MapGraph) -> Arrays:
     }
 
 
-def _elements(elements: MapElements) -> Arrays:
+def _element_arrays(elements: MapElements) -> Arrays:
     import numpy as np
 
     lanes = elements.lanes
@@ -104,16 +104,18 @@ def _elements(elements: MapElements) -> Arrays:
         "lane_right": np.array([lane.right_lane for lane in lanes], dtype=np.int64),
         "lane_opposite": np.array([lane.opposite for lane in lanes], dtype=np.int64),
         "lane_edge": np.array(pairs, dtype=np.int64).reshape(-1, 2).T,
-        **_ragged("lane_point", [np.hstack([x.centre, x.left, x.right]) for x in lanes], 9),
+        **_ragged_arrays("lane_point", [np.hstack([x.centre, x.left, x.right]) for x in lanes], 9),
         "line_type": np.array([line.kind for line in elements.lines], dtype=np.str_),
         "line_color": np.array([line.color for line in elements.lines], dtype=np.str_),
-        **_ragged("line_point", [line.points for line in elements.lines], 3),
-        **_ragged("road_edge_point", elements.edges, 3),
-        **_ragged("crosswalk_point", [one.corners for one in elements.crosswalks], 3),
+        **_ragged_arrays("line_point", [line.points for line in elements.lines], 3),
+        **_ragged_arrays("road_edge_point", elements.edges, 3),
+        **_ragged_arrays(
+            "crosswalk_point", [crosswalk.corners for crosswalk in elements.crosswalks], 3
+        ),
     }
 
 
-def _ragged(name: str, parts: Sequence[FloatArray], columns: int) -> Arrays:
+def _ragged_arrays(name: str, parts: Sequence[FloatArray], columns: int) -> Arrays:
     """All points one after the other, and where those of each element begin."""
     import numpy as np
 
@@ -123,7 +125,7 @@ def _ragged(name: str, parts: Sequence[FloatArray], columns: int) -> Arrays:
     return {name: points, f"{name}_start": offsets(len(part) for part in parts)}
 
 
-def _tracks(recording: RunRecording) -> Arrays:
+def _track_arrays(recording: RunRecording) -> Arrays:
     import numpy as np
 
     tracks, signals = recording.tracks, recording.signals
@@ -154,7 +156,7 @@ def _first_nodes(recording: RunRecording, graph: MapGraph) -> np.ndarray[Any, np
     places = np.stack([tracks.x[rows, first], tracks.y[rows, first]], axis=1)
     nodes = np.stack([graph.lanes.x, graph.lanes.y], axis=1)
     nearest = cKDTree(nodes).query(places)[1].astype(np.int64)
-    walks = np.array([one == "pedestrian" for one in tracks.categories], dtype=np.bool_)
+    walks = np.array([category == "pedestrian" for category in tracks.categories], dtype=np.bool_)
     return np.where(walks, np.int64(-1), nearest)
 
 

@@ -50,7 +50,7 @@ def write_scenario_descriptions(source: ExportSource) -> ExportFiles:
     """
     from odscen.formats.recordings.record import recording_of
 
-    description = _description(recording_of(source))
+    description = _describe_scenario(recording_of(source))
     name = f"sd_{DATASET}_{description['version'].replace(' ', '_')}_{description['id']}.pkl"
     return {
         name: pickled(description),
@@ -75,12 +75,12 @@ def pickled(value: object) -> bytes:
     return buffer.getvalue()
 
 
-def _description(recording: RunRecording) -> dict[str, Any]:
+def _describe_scenario(recording: RunRecording) -> dict[str, Any]:
     import numpy as np
 
     tracks, length = recording.tracks, len(recording.times)
     leading = tracks.ids[max(tracks.leading(0), 0)]
-    objects = {name: _track(tracks, row) for row, name in enumerate(tracks.ids)}
+    objects = {name: _describe_track(tracks, row) for row, name in enumerate(tracks.ids)}
     return {
         "id": recording.name,
         "version": VERSION,
@@ -103,16 +103,18 @@ def _description(recording: RunRecording) -> dict[str, Any]:
             "recorded_step": float(recording.recorded_step),
             "interpolated": bool(recording.interpolated),
             "tracks_length": length,
-            "number_summary": _numbers(recording),
-            "object_summary": {name: _summary(tracks, row) for row, name in enumerate(tracks.ids)},
+            "number_summary": _count_objects(recording),
+            "object_summary": {
+                name: _summarize_track(tracks, row) for row, name in enumerate(tracks.ids)
+            },
         },
         "tracks": objects,
-        "dynamic_map_states": _lights(recording),
-        "map_features": _features(recording.elements),
+        "dynamic_map_states": _describe_lights(recording),
+        "map_features": _describe_features(recording.elements),
     }
 
 
-def _track(tracks: Tracks, row: int) -> dict[str, Any]:
+def _describe_track(tracks: Tracks, row: int) -> dict[str, Any]:
     import numpy as np
 
     valid = tracks.valid[row]
@@ -144,7 +146,7 @@ def _track(tracks: Tracks, row: int) -> dict[str, Any]:
     }
 
 
-def _lights(recording: RunRecording) -> dict[str, Any]:
+def _describe_lights(recording: RunRecording) -> dict[str, Any]:
     signals, length = recording.signals, len(recording.times)
     found = {}
     for row, (lane, stop) in enumerate(zip(signals.lane.tolist(), signals.stop, strict=True)):
@@ -168,8 +170,10 @@ def _lane_id(row: int) -> str:
     return f"lane_{row}"
 
 
-def _features(elements: MapElements) -> dict[str, Any]:
-    found = {_lane_id(row): _lane(lane, elements) for row, lane in enumerate(elements.lanes)}
+def _describe_features(elements: MapElements) -> dict[str, Any]:
+    found = {
+        _lane_id(row): _describe_lane(lane, elements) for row, lane in enumerate(elements.lanes)
+    }
     for row, line in enumerate(elements.lines):
         found[f"line_{row}"] = {"type": line_name(line.kind, line.color), "polyline": line.points}
     for row, edge in enumerate(elements.edges):
@@ -179,7 +183,7 @@ def _features(elements: MapElements) -> dict[str, Any]:
     return found
 
 
-def _lane(lane: LaneElement, elements: MapElements) -> dict[str, Any]:
+def _describe_lane(lane: LaneElement, elements: MapElements) -> dict[str, Any]:
     import numpy as np
 
     gaps = np.linalg.norm(lane.left[:, :2] - lane.right[:, :2], axis=1)
@@ -194,15 +198,15 @@ def _lane(lane: LaneElement, elements: MapElements) -> dict[str, Any]:
         "interpolating": bool(lane.junction),
         "entry_lanes": [_lane_id(row) for row in lane.entries],
         "exit_lanes": [_lane_id(row) for row in lane.exits],
-        "left_neighbor": _neighbour(lane, lane.left_lane, elements),
-        "right_neighbor": _neighbour(lane, lane.right_lane, elements),
+        "left_neighbor": _describe_neighbour(lane, lane.left_lane, elements),
+        "right_neighbor": _describe_neighbour(lane, lane.right_lane, elements),
         "odr_lane": lane.key,
         # MetaDrive wants a number, or no entry at all.
         **({"speed_limit_kmh": lane.speed_limit * _KMH} if limited else {}),
     }
 
 
-def _neighbour(lane: LaneElement, row: int, elements: MapElements) -> list[dict[str, Any]]:
+def _describe_neighbour(lane: LaneElement, row: int, elements: MapElements) -> list[dict[str, Any]]:
     if row < 0:
         return []
     return [
@@ -225,14 +229,14 @@ def line_name(kind: str, color: str) -> str:
     return f"ROAD_LINE_{name}_{'YELLOW' if yellow else 'WHITE'}"
 
 
-def _numbers(recording: RunRecording) -> dict[str, Any]:
+def _count_objects(recording: RunRecording) -> dict[str, Any]:
     tracks = recording.tracks
-    kinds = [_TYPES.get(one, "VEHICLE") for one in tracks.categories]
-    moving = [_distance(tracks, row) > 1.0 for row in range(len(kinds))]
+    kinds = [_TYPES.get(category, "VEHICLE") for category in tracks.categories]
+    moving = [_distance_moved(tracks, row) > 1.0 for row in range(len(kinds))]
     return {
         "num_objects": len(kinds),
         "object_types": sorted(set(kinds)),
-        "num_objects_each_type": {one: kinds.count(one) for one in sorted(set(kinds))},
+        "num_objects_each_type": {kind: kinds.count(kind) for kind in sorted(set(kinds))},
         "num_moving_objects": sum(moving),
         "num_moving_objects_each_type": {
             one: sum(here and kind == one for kind, here in zip(kinds, moving, strict=True))
@@ -246,19 +250,19 @@ def _numbers(recording: RunRecording) -> dict[str, Any]:
     }
 
 
-def _summary(tracks: Tracks, row: int) -> dict[str, Any]:
+def _summarize_track(tracks: Tracks, row: int) -> dict[str, Any]:
     valid = tracks.valid[row]
     return {
         "type": _TYPES.get(tracks.categories[row], "VEHICLE"),
         "object_id": tracks.ids[row],
         "track_length": len(valid),
-        "moving_distance": _distance(tracks, row),
+        "moving_distance": _distance_moved(tracks, row),
         "valid_length": int(valid.sum()),
         "continuous_valid_length": int(valid.sum()),
     }
 
 
-def _distance(tracks: Tracks, row: int) -> float:
+def _distance_moved(tracks: Tracks, row: int) -> float:
     import numpy as np
 
     at = np.flatnonzero(tracks.valid[row])

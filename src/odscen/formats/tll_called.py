@@ -38,7 +38,7 @@ def called_timing(
     made: dict[str, Any] = {"junction": light.names[0], "control": "actuated", "offset": offset}
     made |= {"green": list(greens)} if greens != light.green else {}
     made |= {"detectors": found} if (found := taken_detectors(gaps, own, light)) else {}
-    buses = any(f"a:{program.light}.bus." in one for one in program.conditions.values())
+    buses = any(f"a:{program.light}.bus." in condition for condition in program.conditions.values())
     return validated(JunctionTiming, made | ({"bus_priority": True} if buses else {}))
 
 

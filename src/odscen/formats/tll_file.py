@@ -89,57 +89,66 @@ def parse_signal_file(text: str | bytes) -> SignalFile:
         If it is not XML, has no ``<tlLogic>``, or a value in it cannot be read.
     """
     root = read_xml(text)
-    programs = tuple(_program(one) for one in root.iter("tlLogic"))
+    programs = tuple(_read_program(element) for element in root.iter("tlLogic"))
     if not programs:
         raise InputError("there is no <tlLogic> in the file")
     wauts = {
-        one.get("id", ""): FileSwitches(
-            one.get("startProg", ""),
+        element.get("id", ""): FileSwitches(
+            element.get("startProg", ""),
             tuple(
-                (_number(one, "refTime", 0.0) + _number(switch, "time"), switch.get("to", ""))
-                for switch in one.iterfind("wautSwitch")
+                (
+                    _read_number(element, "refTime", 0.0) + _read_number(switch, "time"),
+                    switch.get("to", ""),
+                )
+                for switch in element.iterfind("wautSwitch")
             ),
         )
-        for one in root.iter("WAUT")
+        for element in root.iter("WAUT")
     }
     switches = {
-        one.get("junctionID", ""): wauts[one.get("wautID", "")]
-        for one in root.iter("wautJunction")
-        if one.get("wautID", "") in wauts
+        element.get("junctionID", ""): wauts[element.get("wautID", "")]
+        for element in root.iter("wautJunction")
+        if element.get("wautID", "") in wauts
     }
-    loops = [_loop(one) for tag in ("inductionLoop", "e1Detector") for one in root.iter(tag)]
+    loops = [
+        _read_loop(element) for tag in ("inductionLoop", "e1Detector") for element in root.iter(tag)
+    ]
     return SignalFile(programs, {loop.id: loop for loop in loops}, switches)
 
 
-def _program(element: etree._Element) -> FileProgram:
+def _read_program(element: etree._Element) -> FileProgram:
     light, name = element.get("id", ""), element.get("programID", "0")
     kind = element.get("type", "static")
     place = f"tlLogic {light!r}, program {name!r}"
     if kind not in ("static", "actuated"):
         raise InputError(f"{place}: type {kind!r} is not static or actuated")
     phases = tuple(
-        _phase(one, f"{place}, phase {number}", actuated=kind == "actuated")
+        _read_phase(one, f"{place}, phase {number}", actuated=kind == "actuated")
         for number, one in enumerate(element.iterfind("phase"))
     )
     if not phases or len({len(phase.state) for phase in phases}) != 1:
         raise InputError(f"{place}: there are no phases, or their states have different lengths")
-    values = {one.get("key", ""): one.get("value", "") for one in element.iterfind("param")}
-    conditions = {one.get("id", ""): one.get("value", "") for one in element.iterfind("condition")}
-    offset = _number(element, "offset", 0.0)
+    values = {
+        element.get("key", ""): element.get("value", "") for element in element.iterfind("param")
+    }
+    conditions = {
+        element.get("id", ""): element.get("value", "") for element in element.iterfind("condition")
+    }
+    offset = _read_number(element, "offset", 0.0)
     return FileProgram(light, name, kind, offset, phases, values, conditions)
 
 
-def _phase(element: etree._Element, place: str, *, actuated: bool) -> FilePhase:
+def _read_phase(element: etree._Element, place: str, *, actuated: bool) -> FilePhase:
     state = element.get("state", "")
     if wrong := sorted(set(state) - _LETTERS):
         raise InputError(
             f"{place}: letter {wrong[0]!r} of state {state!r} is not one of G, g, y, r, u"
         )
-    seconds = _number(element, "duration", None, place)
-    least = _number(element, "minDur", seconds, place) if actuated else seconds
-    most = _number(element, "maxDur", max(seconds, least), place) if actuated else seconds
+    seconds = _read_number(element, "duration", None, place)
+    least = _read_number(element, "minDur", seconds, place) if actuated else seconds
+    most = _read_number(element, "maxDur", max(seconds, least), place) if actuated else seconds
     state = state.replace("Y", "y").replace("R", "r").replace("u", "r")
-    following = tuple(int(one) for one in element.get("next", "").split() if one.isdigit())
+    following = tuple(int(part) for part in element.get("next", "").split() if part.isdigit())
     return FilePhase(
         seconds,
         state,
@@ -153,23 +162,23 @@ def _phase(element: etree._Element, place: str, *, actuated: bool) -> FilePhase:
     )
 
 
-def _loop(element: etree._Element) -> FileLoop:
+def _read_loop(element: etree._Element) -> FileLoop:
     names = [
-        one.get("value", "")
-        for one in element.iterfind("param")
-        if one.get("key") == DETECTOR_PARAM
+        element.get("value", "")
+        for element in element.iterfind("param")
+        if element.get("key") == DETECTOR_PARAM
     ]
     return FileLoop(
         element.get("id", ""),
         element.get("lane", ""),
-        _number(element, "pos", 0.0),
-        _number(element, "length", 0.0),
+        _read_number(element, "pos", 0.0),
+        _read_number(element, "length", 0.0),
         bool(element.get("detectPersons")),
         names[0] if names else "",
     )
 
 
-def _number(
+def _read_number(
     element: etree._Element, key: str, default: float | None = None, place: str = ""
 ) -> float:
     text = element.get(key)

@@ -38,7 +38,7 @@ def taken_loops(loops: Iterable[FileLoop], light: SumoLight, net: RoadNet) -> di
     for loop in loops:
         if loop.persons or loop.lane not in net.lanes:
             continue
-        way = _way(loop, movements, net)
+        way = _way_to_stop_line(loop, movements, net)
         if way is not None:
             lane, metres = way
             length = max(loop.length, _LEAST)
@@ -48,7 +48,7 @@ def taken_loops(loops: Iterable[FileLoop], light: SumoLight, net: RoadNet) -> di
     return found
 
 
-def _way(
+def _way_to_stop_line(
     loop: FileLoop, stop_lines: Mapping[str, object], net: RoadNet
 ) -> tuple[str, float] | None:
     """Lane at the stop line that a loop leads to, and the metres from its front end to there."""
@@ -100,12 +100,12 @@ def taken_detectors(
             else [light.movements[loops[name].movements[0]].lanes[0] for name in names]
         )
         for place in places:
-            one = {"before": before, "length": length, "stages": list(stages), "gap": gap}
-            found.append({"id": _fresh(own, taken), "at": place, **one})
+            row = {"before": before, "length": length, "stages": list(stages), "gap": gap}
+            found.append({"id": _fresh_name(own, taken), "at": place, **row})
     return found
 
 
-def _fresh(name: str, taken: set[str]) -> str:
+def _fresh_name(name: str, taken: set[str]) -> str:
     plain = _NAME.sub("-", name).strip("-.") or "D"
     own, number = plain[:60], 1
     while own in taken:

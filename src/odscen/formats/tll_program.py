@@ -94,18 +94,18 @@ class _Taking:
     def timing(self) -> tuple[JunctionTiming, tuple[str, ...]]:
         design: dict[str, Any] = {
             "junction": self._light.names[0],
-            "control": "actuated" if self._actuated() else "fixed",
+            "control": "actuated" if self._is_actuated() else "fixed",
             "groups": self._designed_groups(),
             **self._designed_stages(),
         }
         if detectors := taken_detectors(self._ended_by(), self._loops, self._light):
             design["detectors"] = detectors
-        design["intergreens"] = self._intergreens(design)
-        timing = _made(design)
-        self._compare(timing)
+        design["intergreens"] = self._intergreen_rows(design)
+        timing = _validate_design(design)
+        self._compare_with_file(timing)
         return timing, tuple(dict.fromkeys(self._notes))
 
-    def _actuated(self) -> bool:
+    def _is_actuated(self) -> bool:
         said = self._plans[0].program.params.get(CONTROL_PARAM)
         longer = any(stage.most > stage.least for stages in self._cycles for stage in stages)
         return longer if said is None else said == "actuated"
@@ -118,7 +118,7 @@ class _Taking:
             for stage in stages:
                 gaps = found.setdefault(stage.id, {})
                 gaps.update(stage.gaps)
-                prolonged = stage.most > stage.least or (stage.held and self._actuated())
+                prolonged = stage.most > stage.least or (stage.held and self._is_actuated())
                 if prolonged and not stage.gaps:
                     green = {n for n, letter in enumerate(stage.state) if letter in "Gg"}
                     for name, loop in self._loops.items():
@@ -126,7 +126,7 @@ class _Taking:
                             gaps[name] = float(own.get("max-gap", 3.0))
         return found
 
-    def _phases(self) -> Iterator[FilePhase]:
+    def _all_phases(self) -> Iterator[FilePhase]:
         for plan in self._plans:
             yield from plan.program.phases
 
@@ -140,7 +140,7 @@ class _Taking:
         for n, one in enumerate(self._light.movements):
             if not one.turn:
                 continue
-            letters = tuple(phase.state[n].lower() for phase in self._phases())
+            letters = tuple(phase.state[n].lower() for phase in self._all_phases())
             key = (one.walk, one.approach, *letters)
             columns.setdefault(key, []).append(n)
         found = {}
@@ -171,7 +171,7 @@ class _Taking:
                 "movements": list(shortest_names(links, self._light.movements)),
             }
             known = max(self._light.movements[n].yellow for n in links)
-            yellow = self._yellow(links)
+            yellow = self._yellow_of_group(links)
             if yellow is not None and yellow != known:
                 group["yellow"] = yellow
             covered = {
@@ -185,7 +185,7 @@ class _Taking:
             result.append(group)
         return result
 
-    def _yellow(self, links: tuple[int, ...]) -> float | None:
+    def _yellow_of_group(self, links: tuple[int, ...]) -> float | None:
         """Seconds of yellow of a group; ``None`` if it never ends."""
         found: set[float] = set()
         for plan, stages in zip(self._plans, self._cycles, strict=True):
@@ -196,7 +196,7 @@ class _Taking:
             ]
             found |= set(_yellow_lengths(letters))
             if len(found) > 1:
-                times = " and ".join(f"{one:g} s" for one in sorted(found))
+                times = " and ".join(f"{value:g} s" for value in sorted(found))
                 raise InputError(
                     f"{plan.program.place}: letters {list(links)} have yellow of {times}; say one"
                 )
@@ -223,27 +223,27 @@ class _Taking:
         default = [stage["id"] for stage in made]
         result: dict[str, Any] = {"stages": made}
         if len(self._plans) == 1:
-            return result | self._offset(0)
+            return result | self._offset_and_cycle(0)
         plans = []
         known = {stage["id"]: stage for stage in made}
         for number, (plan, cycle) in enumerate(zip(self._plans, self._cycles, strict=True)):
-            one: dict[str, Any] = {"id": plan.id, "times": list(plan.times)}
-            one |= self._offset(number)
+            row: dict[str, Any] = {"id": plan.id, "times": list(plan.times)}
+            row |= self._offset_and_cycle(number)
             if order[number] != default:
-                one["stages"] = order[number]
-            one |= _differing(cycle, known)
-            plans.append(one)
+                row["stages"] = order[number]
+            row |= _differing_times(cycle, known)
+            plans.append(row)
         result["plans"] = plans
         return result
 
-    def _offset(self, number: int) -> dict[str, float]:
+    def _offset_and_cycle(self, number: int) -> dict[str, float]:
         """Offset, for what SUMO starts with (it counts all phases as one cycle), and cycle."""
         program, stages = self._plans[number].program, self._cycles[number]
         cycle = sum(s.seconds + sum(step.seconds for step in s.steps) for s in stages)
         if program.params.get("coordinated") == "true":
             kept = float(program.params.get("cycleTime", cycle))
             offset = {"offset": (program.offset - stages[0].seconds) % kept}
-            return offset | ({"cycle": kept} if self._actuated() else {})
+            return offset | ({"cycle": kept} if self._is_actuated() else {})
         total = sum(phase.seconds for phase in program.phases)
         start = -program.offset % total
         return {"offset": (first_stage_at(program) - start) % cycle}
@@ -268,12 +268,14 @@ class _Taking:
 
     # Intergreens
 
-    def _intergreens(self, design: dict[str, Any]) -> list[list[object]]:
+    def _intergreen_rows(self, design: dict[str, Any]) -> list[list[object]]:
         """Rows for the intergreens that differ from what follows from the paths."""
         rows: dict[tuple[str, str], float] = {}
         for _ in range(len(self._groups) ** 2):
             program = DesignedProgram(
-                _made({**design, "intergreens": [[*pair, s] for pair, s in rows.items()]}),
+                _validate_design(
+                    {**design, "intergreens": [[*pair, s] for pair, s in rows.items()]}
+                ),
                 self._light,
                 "fixed",
             )
@@ -285,12 +287,12 @@ class _Taking:
                     beginning = sorted(beginning_groups(one, other))
                     for name in sorted(one.groups - other.groups):
                         wanted = shown_need(self._groups[name], shown)
-                        changed |= _fit(program, rows, name, beginning, wanted)
+                        changed |= _fit_row(program, rows, name, beginning, wanted)
             if not changed:
                 break
         return [[*pair, seconds] for pair, seconds in sorted(rows.items())]
 
-    def _compare(self, timing: JunctionTiming) -> None:
+    def _compare_with_file(self, timing: JunctionTiming) -> None:
         """Make sure that the stages give what the file shows; note where only ``g`` differs."""
         program = DesignedProgram(timing, self._light, "fixed")
         for taken, plan, cycle in zip(self._plans, program.plans(), self._cycles, strict=True):
@@ -309,12 +311,14 @@ class _Taking:
         ours: list[tuple[float, str]],
         theirs: list[tuple[float, str]],
     ) -> None:
-        ours, theirs = ([(s, self._used(state)) for s, state in one] for one in (ours, theirs))
-        plain = [[(s, state.lower()) for s, state in one] for one in (ours, theirs)]
+        ours, theirs = (
+            [(s, self._blank_unconnected(state)) for s, state in rows] for rows in (ours, theirs)
+        )
+        plain = [[(s, state.lower()) for s, state in rows] for rows in (ours, theirs)]
         if plain[0] != plain[1]:
             said, made = (
-                ", ".join(f"{seconds:g} s {state}" for seconds, state in one)
-                for one in (theirs, ours)
+                ", ".join(f"{seconds:g} s {state}" for seconds, state in rows)
+                for rows in (theirs, ours)
             )
             raise InputError(
                 f"{program.place}: {where} it shows {said}, which stages and intergreens cannot "
@@ -329,7 +333,7 @@ class _Taking:
                     )
                     self._notes.append(f"{program.place}: {name} shows {letter} for {was}: {why}")
 
-    def _used(self, state: str) -> str:
+    def _blank_unconnected(self, state: str) -> str:
         """A state whose letters for no connection are red: nobody sees them."""
         movements = self._light.movements
         return "".join(
@@ -337,7 +341,7 @@ class _Taking:
         )
 
 
-def _differing(
+def _differing_times(
     cycle: Sequence[FileStage], known: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, dict[str, float]]:
     """Times of stages in a plan that are not those of the program."""
@@ -367,11 +371,11 @@ def _yellow_lengths(letters: Sequence[tuple[float, str]]) -> Iterator[float]:
         yield seconds
 
 
-def _made(design: dict[str, Any]) -> JunctionTiming:
+def _validate_design(design: dict[str, Any]) -> JunctionTiming:
     return validated(JunctionTiming, design)
 
 
-def _fit(
+def _fit_row(
     program: DesignedProgram,
     rows: dict[tuple[str, str], float],
     name: str,

@@ -80,7 +80,7 @@ def first_stage_at(program: FileProgram) -> float:
     order = main_phases(program)
     lead = 0.0
     for at, before in zip(order, (order[-1], *order), strict=False):
-        if _begins(program.phases[before].state, program.phases[at].state):
+        if _something_begins(program.phases[before].state, program.phases[at].state):
             return lead
         lead += program.phases[at].seconds
     return 0.0
@@ -106,7 +106,7 @@ def main_phases(program: FileProgram) -> list[int]:
     return order
 
 
-def _begins(before: str, after: str) -> bool:
+def _something_begins(before: str, after: str) -> bool:
     """Whether something begins, or no longer gives way."""
     return any(
         (new in "Gg" and old not in "Gg") or (new == "G" and old == "g")
@@ -125,7 +125,7 @@ def file_stages(program: FileProgram) -> list[FileStage]:
     order = main_phases(program)
     phases = [program.phases[n] for n in order]
     states = [phase.state for phase in phases]
-    firsts = [n for n in range(len(phases)) if _begins(states[n - 1], states[n])]
+    firsts = [n for n in range(len(phases)) if _something_begins(states[n - 1], states[n])]
     if not firsts:
         raise InputError(f"{program.place}: nothing ever begins to have green")
     held = next((n for n, phase in enumerate(phases) if phase.held), firsts[0])
@@ -143,14 +143,14 @@ def file_stages(program: FileProgram) -> list[FileStage]:
                     phase.seconds,
                     phase.least,
                     phase.most,
-                    _called(program, order, n),
-                    _gaps(program, order[(n + 1) % len(order)]),
+                    _is_called(program, order, n),
+                    _gap_times(program, order[(n + 1) % len(order)]),
                     phase.held,
                 )
             )
         elif phase.state == stages[-1].state and not stages[-1].steps:
             stages[-1].lengthen(phase)
-            stages[-1].gaps = _gaps(program, order[(n + 1) % len(order)])
+            stages[-1].gaps = _gap_times(program, order[(n + 1) % len(order)])
         elif phase.most > phase.least:
             raise InputError(
                 f"{program.place}: phase {order[n]} is prolonged, but nothing begins in it"
@@ -163,27 +163,27 @@ def file_stages(program: FileProgram) -> list[FileStage]:
     return stages
 
 
-def _gaps(program: FileProgram, at: int) -> dict[str, float]:
+def _gap_times(program: FileProgram, at: int) -> dict[str, float]:
     """Loops whose gaps let a phase come, and the seconds."""
     words = program.phases[at].early.split()
     text = " ".join(program.conditions.get(word, word) for word in words)
     return {name: float(gap) for name, gap in GAP.findall(text)}
 
 
-def _called(program: FileProgram, order: Sequence[int], n: int) -> bool:
+def _is_called(program: FileProgram, order: Sequence[int], n: int) -> bool:
     """Whether a stage comes only if its way is chosen."""
     return any(
         len(program.phases[at].following) > 1
         and any(
             SEEN.search(program.conditions.get(word, ""))
-            for word in _condition(program, at).split()
+            for word in _condition_of_phase(program, at).split()
         )
         for at in order
         if _leads_to(program, order, at, order[n])
     )
 
 
-def _condition(program: FileProgram, at: int) -> str:
+def _condition_of_phase(program: FileProgram, at: int) -> str:
     return program.phases[program.phases[at].following[0]].final
 
 
@@ -193,7 +193,7 @@ def _leads_to(program: FileProgram, order: Sequence[int], at: int, stage: int) -
     states = [program.phases[n].state for n in order]
     for step in range(1, len(order) + 1):
         now = (place + step) % len(order)
-        if _begins(states[now - 1], states[now]):
+        if _something_begins(states[now - 1], states[now]):
             return order[now] == stage
     return False
 
@@ -208,7 +208,7 @@ def refuse_repeated(place: str, cycle: Sequence[FileStage], *, known: int) -> No
     """
     if len(cycle) != known:
         ids = [stage.id for stage in cycle]
-        twice = next((one for one in ids if ids.count(one) > 1), "")
+        twice = next((name for name in ids if ids.count(name) > 1), "")
         raise InputError(
             f"{place}: stage {twice!r} comes twice in a cycle; a plan has each stage once"
         )

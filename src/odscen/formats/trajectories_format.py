@@ -112,7 +112,7 @@ def trajectory_rows(
         if one[0] == other[0]:
             raise InputError(f"two rows at {one[0]:g} s")
     begin = rows[0][0]
-    headings = [row[3] for row in rows] if len(names) > len(_NEEDED) else _headings(rows)
+    headings = [row[3] for row in rows] if len(names) > len(_NEEDED) else _headings_of_motion(rows)
     return begin, tuple(
         (round(row[0] - begin, 6), row[1], row[2], math.remainder(hdg, math.tau))
         for row, hdg in zip(rows, headings, strict=True)
@@ -141,7 +141,7 @@ def _rows_of(table: pl.DataFrame, of: str | None) -> pl.DataFrame:
     return table.filter(pl.col("id").cast(pl.String) == (ids[0] if of is None else of))
 
 
-def _headings(rows: Sequence[tuple[float, ...]]) -> list[float]:
+def _headings_of_motion(rows: Sequence[tuple[float, ...]]) -> list[float]:
     """Direction of motion at each row, that of before or after while there is none."""
     found: list[float | None] = [None] * len(rows)
     before = 0

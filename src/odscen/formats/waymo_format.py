@@ -53,12 +53,12 @@ def write_waymo_scenarios(source: ExportSource) -> ExportFiles:
     number = {name: row + 1 for row, name in enumerate(recording.tracks.ids)}
     features = _map_features(recording.elements)
     records, listed = [], []
-    for first in _windows(len(recording.times)):
+    for first in _window_starts(len(recording.times)):
         tracks = recording.tracks.part(first, first + STEPS)
         if not tracks.ids:
             continue
         name = f"{recording.name}-{first:06d}"
-        records.append(_scenario(recording, tracks, first, name, number, features))
+        records.append(_encode_scenario(recording, tracks, first, name, number, features))
         listed.append(
             {"scenario_id": name, "begin": float(recording.times[first]), "tracks": len(tracks.ids)}
         )
@@ -79,14 +79,14 @@ def write_waymo_scenarios(source: ExportSource) -> ExportFiles:
     }
 
 
-def _windows(instants: int) -> Iterator[int]:
+def _window_starts(instants: int) -> Iterator[int]:
     """First instant of each scenario; the last begins earlier where it would be cut off."""
     last = max(instants - STEPS, 0)
     yield from range(0, last, STEPS)
     yield last
 
 
-def _scenario(
+def _encode_scenario(
     recording: RunRecording,
     tracks: Tracks,
     first: int,
@@ -101,10 +101,13 @@ def _scenario(
     return b"".join(
         [
             *(double(1, time) for time in times),
-            *(message(2, _track(tracks, row, number[one])) for row, one in enumerate(tracks.ids)),
+            *(
+                message(2, _encode_track(tracks, row, number[one]))
+                for row, one in enumerate(tracks.ids)
+            ),
             text(5, name),
             whole(6, leading),
-            *(message(7, one) for one in _light_states(recording, first)),
+            *(message(7, light_state) for light_state in _light_states(recording, first)),
             features,
             whole(10, PRESENT),
             *(message(11, whole(1, row) + whole(2, 1)) for row in _to_predict(tracks, leading)),
@@ -112,7 +115,7 @@ def _scenario(
     )
 
 
-def _track(tracks: Tracks, row: int, number: int) -> bytes:
+def _encode_track(tracks: Tracks, row: int, number: int) -> bytes:
     import numpy as np
 
     from odscen.formats.recordings.protobuf_wire import packed_messages, whole
@@ -156,7 +159,7 @@ def _light_states(recording: RunRecording, first: int) -> Iterator[bytes]:
 
     signals = recording.signals
     lanes = (signals.lane + 1).tolist()
-    stops = [message(3, _point(stop)) for stop in signals.stop]
+    stops = [message(3, _encode_point(stop)) for stop in signals.stop]
     for instant in range(first, first + STEPS):
         if instant >= len(recording.times):
             yield b""
@@ -169,7 +172,7 @@ def _light_states(recording: RunRecording, first: int) -> Iterator[bytes]:
         )
 
 
-def _point(xyz: FloatArray) -> bytes:
+def _encode_point(xyz: FloatArray) -> bytes:
     from odscen.formats.recordings.protobuf_wire import double
 
     return b"".join(double(field, float(value)) for field, value in enumerate(xyz, start=1))
@@ -179,17 +182,19 @@ def _map_features(elements: MapElements) -> bytes:
     """Lanes are features 1, 2, ... in their order; then lines, edges and crosswalks."""
     from odscen.formats.recordings.protobuf_wire import message, whole
 
-    found = [(3, _lane(lane, elements)) for lane in elements.lanes]
-    found += [(4, whole(1, line_type(line)) + _points(2, line.points)) for line in elements.lines]
-    found += [(5, whole(1, 1) + _points(2, edge)) for edge in elements.edges]
-    found += [(8, _points(1, one.corners)) for one in elements.crosswalks]
+    found = [(3, _encode_lane(lane, elements)) for lane in elements.lanes]
+    found += [
+        (4, whole(1, line_type(line)) + _encode_points(2, line.points)) for line in elements.lines
+    ]
+    found += [(5, whole(1, 1) + _encode_points(2, edge)) for edge in elements.edges]
+    found += [(8, _encode_points(1, crosswalk.corners)) for crosswalk in elements.crosswalks]
     return b"".join(
         message(8, whole(1, number) + message(field, content))
         for number, (field, content) in enumerate(found, start=1)
     )
 
 
-def _lane(lane: LaneElement, elements: MapElements) -> bytes:
+def _encode_lane(lane: LaneElement, elements: MapElements) -> bytes:
     from odscen.formats.recordings.protobuf_wire import double, whole
 
     known = math.isfinite(lane.speed_limit)
@@ -199,16 +204,16 @@ def _lane(lane: LaneElement, elements: MapElements) -> bytes:
             limit,
             whole(2, 1 if lane.road_type == "motorway" else 2),
             whole(3, bool(lane.junction)),
-            _points(8, lane.centre),
+            _encode_points(8, lane.centre),
             *(whole(9, row + 1) for row in lane.entries),
             *(whole(10, row + 1) for row in lane.exits),
-            _neighbour(11, lane, lane.left_lane, elements),
-            _neighbour(12, lane, lane.right_lane, elements),
+            _encode_neighbour(11, lane, lane.left_lane, elements),
+            _encode_neighbour(12, lane, lane.right_lane, elements),
         ]
     )
 
 
-def _neighbour(field: int, lane: LaneElement, row: int, elements: MapElements) -> bytes:
+def _encode_neighbour(field: int, lane: LaneElement, row: int, elements: MapElements) -> bytes:
     from odscen.formats.recordings.protobuf_wire import message, whole
 
     if row < 0:
@@ -220,7 +225,7 @@ def _neighbour(field: int, lane: LaneElement, row: int, elements: MapElements) -
     )
 
 
-def _points(field: int, xyz: FloatArray) -> bytes:
+def _encode_points(field: int, xyz: FloatArray) -> bytes:
     from odscen.formats.recordings.protobuf_wire import packed_messages
 
     return packed_messages(field, {k + 1: ("d", xyz[:, k]) for k in range(3)})

@@ -70,11 +70,11 @@ def check_map_graph(graph: MapGraph) -> MapGraph:
     _same_length("segments", count, segments.kinds, segments.parts, segments.lengths)
     _in_range("segment adjacency", segments.adjacency, 0, count)
     if segments.adjacency.ndim != 2 or segments.adjacency.shape[1:] != (2,):
-        _fail("segment adjacency", f"shape is {segments.adjacency.shape}, not (A, 2)")
+        _refuse_column("segment adjacency", f"shape is {segments.adjacency.shape}, not (A, 2)")
     if not set(segments.kinds) <= {"road", "junction"}:
-        _fail("segments", "a kind is neither road nor junction")
+        _refuse_column("segments", "a kind is neither road nor junction")
     if not (np.isfinite(lanes.spacing) and lanes.spacing > 0):
-        _fail("spacing", f"{lanes.spacing} is not a positive number")
+        _refuse_column("spacing", f"{lanes.spacing} is not a positive number")
     _check_lanes(graph, count)
     _check_walks(graph, count)
     for what, source, target, nodes in (
@@ -96,7 +96,7 @@ def _check_lanes(graph: MapGraph, segments: int) -> None:
     _same_length("nodes", nodes, lanes.lane, lanes.left_lane, lanes.right_lane, *columns)
     _same_length("nodes", nodes, lanes.segment)
     if not np.array_equal(lanes.lane, np.repeat(np.arange(rows), np.diff(table.first_node))):
-        _fail("nodes", "they are not in the order of their lanes")
+        _refuse_column("nodes", "they are not in the order of their lanes")
     _in_range("left_lane", lanes.left_lane, -1, rows)
     _in_range("right_lane", lanes.right_lane, -1, rows)
     _in_range("segment of a node", lanes.segment, 0, segments)
@@ -113,7 +113,7 @@ def _check_walks(graph: MapGraph, segments: int) -> None:
     columns = [getattr(walks, name) for name in WALK_NODE_COLUMNS]
     _same_length("pedestrian nodes", nodes, walks.lane, walks.segment, *columns)
     if not np.array_equal(walks.lane, np.repeat(np.arange(rows), np.diff(walks.first_node))):
-        _fail("pedestrian nodes", "they are not in the order of their walks")
+        _refuse_column("pedestrian nodes", "they are not in the order of their walks")
     _in_range("segment of a pedestrian node", walks.segment, 0, segments)
     columns = [getattr(walks, name) for name in WALK_EDGE_COLUMNS]
     _same_length("pedestrian edges", len(walks.source), walks.crosswalk, *columns)
@@ -123,20 +123,20 @@ def _check_walks(graph: MapGraph, segments: int) -> None:
 def _check_first_node(what: str, first_node: Int32Array, rows: int) -> int:
     _same_length(f"first_node of {what}", rows + 1, first_node)
     if first_node[0] != 0 or np.any(np.diff(first_node) < 0):
-        _fail(f"first_node of {what}", "does not grow from 0")
+        _refuse_column(f"first_node of {what}", "does not grow from 0")
     return int(first_node[-1])
 
 
 def _same_length(what: str, count: int, *columns: Any) -> None:
     lengths = sorted({len(column) for column in columns} | {count})
     if len(lengths) != 1:
-        _fail(what, f"columns have different lengths: {', '.join(map(str, lengths))}")
+        _refuse_column(what, f"columns have different lengths: {', '.join(map(str, lengths))}")
 
 
 def _in_range(what: str, values: Int32Array | FloatArray | Array, low: int, end: int) -> None:
     if len(values) and not (values.min() >= low and values.max() < end):
-        _fail(what, f"{values.min()} to {values.max()} is not within {low} to {end - 1}")
+        _refuse_column(what, f"{values.min()} to {values.max()} is not within {low} to {end - 1}")
 
 
-def _fail(what: str, problem: str) -> None:
+def _refuse_column(what: str, problem: str) -> None:
     raise GraphFormatError(problem, element=what)

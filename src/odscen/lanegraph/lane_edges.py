@@ -79,7 +79,7 @@ def _along_lanes(nodes: NodeTable) -> Edges:
     """From each node to the next one of its lane."""
     source = np.flatnonzero(nodes.lane[:-1] == nodes.lane[1:])
     length = nodes.offset[source + 1] - nodes.offset[source]
-    return _edges(source, source + 1, Relation.SUCCESSOR, length)
+    return _make_edges(source, source + 1, Relation.SUCCESSOR, length)
 
 
 def _across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
@@ -91,14 +91,14 @@ def _across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
         (lane, after, between)
         for lane in range(len(lengths))
         if not empty[lane]
-        for after, between in _following(lane, follow, lengths, empty)
+        for after, between in _lanes_following(lane, follow, lengths, empty)
     ]
     table = np.array(pairs, dtype=np.float64).reshape(-1, 3)
     lane, after = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
     source, target = nodes.first[lane + 1] - 1, nodes.first[after]
     rest = nodes.lines.lengths[lane] - nodes.offset[source]
     length = rest + table[:, 2] + nodes.offset[target]
-    return _edges(source, target, Relation.SUCCESSOR, length)
+    return _make_edges(source, target, Relation.SUCCESSOR, length)
 
 
 def _at_sides(nodes: NodeTable, number: Mapping[LaneKey, int], sides: Sequence[SideLink]) -> Edges:
@@ -125,10 +125,10 @@ def _at_sides(nodes: NodeTable, number: Mapping[LaneKey, int], sides: Sequence[S
                 pairs.append((end - 1, behind[0], rest + float(nodes.offset[behind[0]]) - place))
     table = np.array(pairs, dtype=np.float64).reshape(-1, 3)
     source, target = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
-    return _edges(source, target, Relation.SUCCESSOR, table[:, 2])
+    return _make_edges(source, target, Relation.SUCCESSOR, table[:, 2])
 
 
-def _following(
+def _lanes_following(
     lane: int, follow: list[list[int]], lengths: list[float], empty: list[bool]
 ) -> Iterator[tuple[int, float]]:
     """Lanes with nodes that follow ``lane``, and the metres of lanes without nodes in between."""
@@ -154,7 +154,7 @@ def _to_the_side(nodes: NodeTable, follow: list[list[int]], relation: Relation) 
         (CHANGE_LEFT, nodes.left) if relation is Relation.LEFT else (CHANGE_RIGHT, nodes.right)
     )
     source = np.flatnonzero(nodes.lane_change & bit)
-    goal, k = _ahead(nodes, follow, beside[source], nodes.s[source])
+    goal, k = _nodes_ahead(nodes, follow, beside[source], nodes.s[source])
     source, goal, k = source[goal >= 0], goal[goal >= 0], k[goal >= 0]
     target = nodes.kept[nodes.planned[goal] + k]
     source, target = source[target >= 0], target[target >= 0]
@@ -163,10 +163,10 @@ def _to_the_side(nodes: NodeTable, follow: list[list[int]], relation: Relation) 
     dz = nodes.z[target] - nodes.z[source]
     onward = dx * np.cos(nodes.hdg[source]) + dy * np.sin(nodes.hdg[source]) > 0
     length = np.sqrt(dx * dx + dy * dy + dz * dz)
-    return _edges(source[onward], target[onward], relation, length[onward])
+    return _make_edges(source[onward], target[onward], relation, length[onward])
 
 
-def _ahead(
+def _nodes_ahead(
     nodes: NodeTable, follow: list[list[int]], lane: IntArray, s: FloatArray
 ) -> tuple[IntArray, IntArray]:
     """Planned node nearest to one spacing ahead of s on each lane, as lane (or -1) and k on it.
@@ -190,5 +190,7 @@ def _ahead(
     return goal, k
 
 
-def _edges(source: IntArray, target: IntArray, relation: Relation, length: FloatArray) -> Edges:
+def _make_edges(
+    source: IntArray, target: IntArray, relation: Relation, length: FloatArray
+) -> Edges:
     return Edges(source, target, np.full(len(source), relation, dtype=np.uint8), length)

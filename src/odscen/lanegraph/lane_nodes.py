@@ -79,7 +79,7 @@ def place_nodes(table: RoadTable, spacing: float, *, most: float = MOST_LANES) -
     lane, s, offset = lane[wide], s[wide], offset[wide]
     ahead = forward[lane]
     sign = np.where(ahead, 1.0, -1.0)
-    left, right, lane_change = _beside(table, rows, lane, s)
+    left, right, lane_change = _lanes_beside(table, rows, lane, s)
     return NodeTable(
         lines=lines,
         spacing=spacing,
@@ -107,7 +107,7 @@ def wrapped(angle: FloatArray) -> FloatArray:
     return np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
 
 
-def _beside(
+def _lanes_beside(
     table: RoadTable, rows: IntArray, lane: IntArray, s: FloatArray
 ) -> tuple[IntArray, IntArray, ByteArray]:
     """Left and right lane of each node, and which changes the road marks permit.
@@ -119,8 +119,12 @@ def _beside(
     upper, lower = _adjacent_rows(table)
     ahead = table.lane_forward[rows][lane]
     row = rows[lane]
-    left, change_left = _neighbour(table, number, row, np.where(ahead, upper[row], lower[row]), s)
-    right, change_right = _neighbour(table, number, row, np.where(ahead, lower[row], upper[row]), s)
+    left, change_left = _neighbour_lane(
+        table, number, row, np.where(ahead, upper[row], lower[row]), s
+    )
+    right, change_right = _neighbour_lane(
+        table, number, row, np.where(ahead, lower[row], upper[row]), s
+    )
     permitted = change_left * CHANGE_LEFT + change_right * CHANGE_RIGHT
     return left, right, permitted.astype(np.uint8)
 
@@ -134,13 +138,13 @@ def _adjacent_rows(table: RoadTable) -> tuple[IntArray, IntArray]:
     count = len(table.lane_keys)
     upper = np.full(count, -1, dtype=np.int64)
     lower = np.full(count, -1, dtype=np.int64)
-    one = np.flatnonzero(beside).astype(np.int64)
-    upper[one] = one + 1
-    lower[one + 1] = one
+    array = np.flatnonzero(beside).astype(np.int64)
+    upper[array] = array + 1
+    lower[array + 1] = array
     return upper, lower
 
 
-def _neighbour(
+def _neighbour_lane(
     table: RoadTable, number: IntArray, row: IntArray, beside: IntArray, s: FloatArray
 ) -> tuple[IntArray, BoolArray]:
     """Lane number of the lane in table row ``beside`` or -1, and whether one may change to it.

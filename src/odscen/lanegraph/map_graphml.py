@@ -81,9 +81,9 @@ def to_graphml(graph: MapGraph) -> bytes:
     names = [*segment_names, *lane_names, *walk_names]
     if len(set(names)) != len(names):
         raise GraphFormatError("two nodes would have the same id", file=graph.map_name)
-    segments, lanes, walks = map(_escaped, (segment_names, lane_names, walk_names))
+    segments, lanes, walks = map(_escape_texts, (segment_names, lane_names, walk_names))
     parts = [
-        _head(graph),
+        _write_head(graph),
         *_segment_nodes(graph.segments, segments),
         *_lane_nodes(graph, lanes),
         *_walk_nodes(graph, walks),
@@ -95,14 +95,14 @@ def to_graphml(graph: MapGraph) -> bytes:
     return "".join(parts).encode()
 
 
-def _key(kind: str, name: str) -> str:
+def _data_key(kind: str, name: str) -> str:
     """Id of a data key: short, because it is written a million times."""
     return f"{kind[0]}{list(_KEYS[kind]).index(name)}"
 
 
-def _head(graph: MapGraph) -> str:
+def _write_head(graph: MapGraph) -> str:
     keys = [
-        f'<key id="{_key(kind, name)}" for="{kind}" attr.name="{name}" attr.type="{type_}"/>\n'
+        f'<key id="{_data_key(kind, name)}" for="{kind}" attr.name="{name}" attr.type="{type_}"/>\n'
         for kind, names in _KEYS.items()
         for name, type_ in names.items()
     ]
@@ -111,11 +111,11 @@ def _head(graph: MapGraph) -> str:
         str(VERSION),
         escape(graph.map_name),
         escape(graph.map_sha256),
-        _number(graph.lanes.spacing),
-        _number(graph.walks.spacing),
+        _format_number(graph.lanes.spacing),
+        _format_number(graph.walks.spacing),
     )
     data = [
-        f'<data key="{_key("graph", name)}">{value}</data>\n'
+        f'<data key="{_data_key("graph", name)}">{value}</data>\n'
         for name, value in zip(GRAPH_KEYS, values, strict=True)
     ]
     return (
@@ -129,116 +129,118 @@ def _segment_nodes(segments: Segments, names: Sequence[str]) -> Iterable[str]:
     parts = [[(part.road, part.s_from, part.s_to) for part in of] for of in segments.parts]
     columns = {
         "segment_kind": segments.kinds,
-        "length": _numbers(segments.lengths),
+        "length": _format_numbers(segments.lengths),
         "parts": [escape(json.dumps(of)) for of in parts],
     }
-    return _nodes("segment", names, columns)
+    return _write_nodes("segment", names, columns)
 
 
 def _lane_nodes(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     lanes, table = graph.lanes, graph.lanes.lanes
-    lane_names = [*_escaped(list(map(str, table.keys))), ""]  # -1 is no lane
+    lane_names = [*_escape_texts(list(map(str, table.keys))), ""]  # -1 is no lane
     of_lane = lanes.lane.tolist()
     columns = {
-        **{name: _numbers(getattr(lanes, name)) for name in NODE_COLUMNS},
-        "lane_type": _pick(_escaped(table.types), of_lane),
-        "junction": _pick(_escaped([name or "" for name in table.junctions]), of_lane),
-        "lane_length": _pick(_numbers(table.lengths), of_lane),
-        "forward": _pick(_booleans(table.forward), of_lane),
-        "left_lane": _pick(lane_names, lanes.left_lane.tolist()),
-        "right_lane": _pick(lane_names, lanes.right_lane.tolist()),
-        "segment": _pick(_escaped(graph.segments.ids), lanes.segment.tolist()),
+        **{name: _format_numbers(getattr(lanes, name)) for name in NODE_COLUMNS},
+        "lane_type": _pick_rows(_escape_texts(table.types), of_lane),
+        "junction": _pick_rows(_escape_texts([name or "" for name in table.junctions]), of_lane),
+        "lane_length": _pick_rows(_format_numbers(table.lengths), of_lane),
+        "forward": _pick_rows(_format_booleans(table.forward), of_lane),
+        "left_lane": _pick_rows(lane_names, lanes.left_lane.tolist()),
+        "right_lane": _pick_rows(lane_names, lanes.right_lane.tolist()),
+        "segment": _pick_rows(_escape_texts(graph.segments.ids), lanes.segment.tolist()),
     }
-    return _nodes("vehicle", names, columns)
+    return _write_nodes("vehicle", names, columns)
 
 
 def _walk_nodes(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     walks = graph.walks
     columns = {
-        **{name: _numbers(getattr(walks, name)) for name in WALK_NODE_COLUMNS},
-        "roadside": _pick(_booleans(walks.roadside), walks.lane.tolist()),
-        "segment": _pick(_escaped(graph.segments.ids), walks.segment.tolist()),
+        **{name: _format_numbers(getattr(walks, name)) for name in WALK_NODE_COLUMNS},
+        "roadside": _pick_rows(_format_booleans(walks.roadside), walks.lane.tolist()),
+        "segment": _pick_rows(_escape_texts(graph.segments.ids), walks.segment.tolist()),
     }
-    return _nodes("pedestrian", names, columns)
+    return _write_nodes("pedestrian", names, columns)
 
 
 def _lane_edges(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     lanes = graph.lanes
     words = [relation.name.lower() for relation in Relation]
     columns = {
-        "relation": _pick(words, lanes.relation.tolist()),
-        "length": _numbers(lanes.length),
+        "relation": _pick_rows(words, lanes.relation.tolist()),
+        "length": _format_numbers(lanes.length),
     }
     sources, targets = lanes.source.tolist(), lanes.target.tolist()
-    return _edges(_pick(names, sources), _pick(names, targets), columns)
+    return _write_edges(_pick_rows(names, sources), _pick_rows(names, targets), columns)
 
 
 def _walk_edges(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     walks = graph.walks
     words = [kind.name.lower() for kind in WalkKind]
     columns = {
-        "relation": _pick(words, walks.kind.tolist()),
-        "length": _numbers(walks.length),
-        "crosswalk": _escaped(walks.crosswalk),
+        "relation": _pick_rows(words, walks.kind.tolist()),
+        "length": _format_numbers(walks.length),
+        "crosswalk": _escape_texts(walks.crosswalk),
     }
     sources, targets = walks.source.tolist(), walks.target.tolist()
-    return _edges(_pick(names, sources), _pick(names, targets), columns)
+    return _write_edges(_pick_rows(names, sources), _pick_rows(names, targets), columns)
 
 
 def _segment_edges(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     pairs = graph.segments.adjacency
     columns = {"relation": ["adjacent"] * len(pairs)}
     sources, targets = pairs[:, 0].tolist(), pairs[:, 1].tolist()
-    return _edges(_pick(names, sources), _pick(names, targets), columns)
+    return _write_edges(_pick_rows(names, sources), _pick_rows(names, targets), columns)
 
 
-def _nodes(kind: str, names: Sequence[str], columns: Mapping[str, Sequence[str]]) -> Iterable[str]:
-    about = f'"><data key="{_key("node", "kind")}">{kind}</data>'
-    return _elements([[f'<node id="{name}{about}' for name in names]], "node", columns)
+def _write_nodes(
+    kind: str, names: Sequence[str], columns: Mapping[str, Sequence[str]]
+) -> Iterable[str]:
+    about = f'"><data key="{_data_key("node", "kind")}">{kind}</data>'
+    return _finish_elements([[f'<node id="{name}{about}' for name in names]], "node", columns)
 
 
-def _edges(
+def _write_edges(
     sources: Sequence[str], targets: Sequence[str], columns: Mapping[str, Sequence[str]]
 ) -> Iterable[str]:
     ends = [
         f'<edge source="{source}" target="{target}">'
         for source, target in zip(sources, targets, strict=True)
     ]
-    return _elements([ends], "edge", columns)
+    return _finish_elements([ends], "edge", columns)
 
 
-def _elements(
+def _finish_elements(
     heads: list[list[str]], kind: str, columns: Mapping[str, Sequence[str]]
 ) -> Iterable[str]:
     """Finish nodes or edges; an empty text is left out, readers take it for granted."""
     parts: list[list[str]] = heads
     for name, values in columns.items():
-        start = f'<data key="{_key(kind, name)}">'
+        start = f'<data key="{_data_key(kind, name)}">'
         parts.append([f"{start}{value}</data>" if value else "" for value in values])
     parts.append([f"</{kind}>\n"] * len(heads[0]))
     return map("".join, zip(*parts, strict=True))
 
 
-def _pick(values: Sequence[str], rows: Sequence[int]) -> list[str]:
+def _pick_rows(values: Sequence[str], rows: Sequence[int]) -> list[str]:
     return [values[row] for row in rows]
 
 
-def _escaped(values: Sequence[str]) -> list[str]:
+def _escape_texts(values: Sequence[str]) -> list[str]:
     text = "".join(values)
     if any(character in text for character in _SPECIAL):
         return [escape(value, _ENTITIES) for value in values]
     return list(values)
 
 
-def _booleans(values: Array) -> list[str]:
+def _format_booleans(values: Array) -> list[str]:
     return ["true" if value else "false" for value in values.tolist()]
 
 
-def _number(value: float) -> str:
-    return _numbers(np.array([value]))[0]
+def _format_number(value: float) -> str:
+    return _format_numbers(np.array([value]))[0]
 
 
-def _numbers(values: Array) -> list[str]:
+def _format_numbers(values: Array) -> list[str]:
     """Shortest text that reads back as the same number, in the words of XML Schema."""
     texts = list(map(repr, values.tolist()))
     if values.dtype.kind == "f" and not np.isfinite(values).all():

@@ -59,7 +59,7 @@ def from_graphml(data: bytes, *, file: str | None = None) -> MapGraph:
     from lxml import etree
 
     try:
-        return check_map_graph(_map_graph(_parse(data)))
+        return check_map_graph(_map_graph(_parse_document(data)))
     except GraphFormatError as error:
         error.file = error.file or file
         raise
@@ -67,7 +67,7 @@ def from_graphml(data: bytes, *, file: str | None = None) -> MapGraph:
         raise GraphFormatError(f"it is not XML: {err.msg}", file=file) from err
 
 
-def _parse(data: bytes) -> _GraphmlDocument:
+def _parse_document(data: bytes) -> _GraphmlDocument:
     from lxml import etree
 
     document = _GraphmlDocument()
@@ -88,7 +88,7 @@ def _parse(data: bytes) -> _GraphmlDocument:
         if tag == "graph":
             document.about = values
             continue
-        _take(document, tag, element, values)
+        _take_element(document, tag, element, values)
         element.clear()
         parent = element.getparent()
         while parent is not None and parent[0] is not element and parent[0].tag in tags[1:3]:
@@ -96,7 +96,7 @@ def _parse(data: bytes) -> _GraphmlDocument:
     return document
 
 
-def _take(document: _GraphmlDocument, tag: str, element: Any, values: Attributes) -> None:
+def _take_element(document: _GraphmlDocument, tag: str, element: Any, values: Attributes) -> None:
     if tag == "edge":
         values["source"] = element.get("source", "")
         values["target"] = element.get("target", "")
@@ -105,7 +105,7 @@ def _take(document: _GraphmlDocument, tag: str, element: Any, values: Attributes
     values["id"] = element.get("id", "")
     kind = values.get("kind", "")
     if kind not in document.nodes:
-        _fail(f"node {values['id']}", f"its kind is {kind!r}")
+        _refuse_place(f"node {values['id']}", f"its kind is {kind!r}")
     document.nodes[kind].append(values)
 
 
@@ -126,11 +126,11 @@ def _map_graph(document: _GraphmlDocument) -> MapGraph:
         for row, node in enumerate(document.nodes["segment"])
     }
     return MapGraph(
-        map_name=_text(about, "map_name", "graph"),
-        map_sha256=_text(about, "map_sha256", "graph"),
-        segments=_segments(document.nodes["segment"], edges),
+        map_name=_read_text(about, "map_name", "graph"),
+        map_sha256=_read_text(about, "map_sha256", "graph"),
+        segments=_read_segments(document.nodes["segment"], edges),
         lanes=_lane_graph(document, segment_rows, edges),
-        walks=_walks(document, segment_rows, edges),
+        walks=_read_walks(document, segment_rows, edges),
     )
 
 
@@ -149,29 +149,34 @@ class _EdgeRows:
             place = f"edge {edge['source']} -> {edge['target']}"
             kind, code = codes.get(edge.get("relation", ""), ("", 0))
             if not kind:
-                _fail(place, f"its relation is {edge.get('relation', '')!r}")
-            source, target = self._end(edge["source"], kind), self._end(edge["target"], kind)
+                _refuse_place(place, f"its relation is {edge.get('relation', '')!r}")
+            source, target = (
+                self._end_row(edge["source"], kind),
+                self._end_row(edge["target"], kind),
+            )
             self._of.setdefault(kind, []).append((source, target, code, edge))
 
-    def _end(self, name: str, kind: str) -> int:
+    def _end_row(self, name: str, kind: str) -> int:
         actual, row = self._index.get(name, ("", 0))
         if actual != kind:
-            _fail(f"node {name}", f"an edge needs it as {kind}; it is {actual or 'not there'}")
+            _refuse_place(
+                f"node {name}", f"an edge needs it as {kind}; it is {actual or 'not there'}"
+            )
         return row
 
     def directed(self, kind: str) -> tuple[Int32Array, Int32Array, Array, list[Attributes]]:
         """Source, target, code and attributes, sorted by (source, code, target)."""
         rows = sorted(self._of.get(kind, []), key=lambda row: (row[0], row[2], row[1]))
-        return _transposed(rows)
+        return _transpose_rows(rows)
 
     def undirected(self, kind: str) -> tuple[Int32Array, Int32Array, Array, list[Attributes]]:
         """Return the same with source < target, sorted by (source, target)."""
         rows = [(min(i, j), max(i, j), code, edge) for i, j, code, edge in self._of.get(kind, [])]
         rows.sort(key=lambda row: row[:3])
-        return _transposed(rows)
+        return _transpose_rows(rows)
 
 
-def _transposed(
+def _transpose_rows(
     rows: list[tuple[int, int, int, Attributes]],
 ) -> tuple[Int32Array, Int32Array, Array, list[Attributes]]:
     return (
@@ -182,27 +187,27 @@ def _transposed(
     )
 
 
-def _segments(nodes: list[Attributes], edges: _EdgeRows) -> Segments:
+def _read_segments(nodes: list[Attributes], edges: _EdgeRows) -> Segments:
     source, target, _, _ = edges.undirected("segment")
-    kinds: Any = tuple(_text(node, "segment_kind", node["id"]) for node in nodes)
+    kinds: Any = tuple(_read_text(node, "segment_kind", node["id"]) for node in nodes)
     return Segments(
         ids=tuple(SegmentId(node["id"].removeprefix(SEGMENT_PREFIX)) for node in nodes),
         kinds=kinds,
-        parts=tuple(_parts(node) for node in nodes),
-        lengths=_column(nodes, "length", np.float64),
+        parts=tuple(_read_parts(node) for node in nodes),
+        lengths=_read_column(nodes, "length", np.float64),
         adjacency=np.stack([source, target], axis=1),
     )
 
 
-def _parts(node: Attributes) -> tuple[SegmentPart, ...]:
-    text = _text(node, "parts", node["id"])
+def _read_parts(node: Attributes) -> tuple[SegmentPart, ...]:
+    text = _read_text(node, "parts", node["id"])
     try:
         return tuple(
             SegmentPart(RoadId(str(road)), float(s_from), float(s_to))
             for road, s_from, s_to in json.loads(text)
         )
     except (ValueError, TypeError, RecursionError):
-        _fail(f"node {node['id']}", f"its parts are {text[:60]!r}")
+        _refuse_place(f"node {node['id']}", f"its parts are {text[:60]!r}")
 
 
 def _lane_graph(
@@ -214,28 +219,28 @@ def _lane_graph(
     lane_rows = {"": -1, **{str(key): row for row, key in enumerate(keys)}}
     source, target, relation, of_edges = edges.directed("vehicle")
     return LaneGraph(
-        spacing=_spacing(document.about, "spacing"),
+        spacing=_read_spacing(document.about, "spacing"),
         lanes=Lanes(
             keys=keys,
-            types=tuple(_text(node, "lane_type", node["id"]) for node in heads),
+            types=tuple(_read_text(node, "lane_type", node["id"]) for node in heads),
             junctions=tuple(JunctionId(node.get("junction", "")) or None for node in heads),
-            lengths=_column(heads, "lane_length", np.float64),
-            forward=_column(heads, "forward", np.bool_),
+            lengths=_read_column(heads, "lane_length", np.float64),
+            forward=_read_column(heads, "forward", np.bool_),
             first_node=first_node,
         ),
         lane=np.repeat(np.arange(len(keys), dtype=np.int32), np.diff(first_node)),
-        left_lane=_rows(nodes, "left_lane", lane_rows),
-        right_lane=_rows(nodes, "right_lane", lane_rows),
-        segment=_rows(nodes, "segment", segment_rows),
+        left_lane=_read_rows(nodes, "left_lane", lane_rows),
+        right_lane=_read_rows(nodes, "right_lane", lane_rows),
+        segment=_read_rows(nodes, "segment", segment_rows),
         source=source,
         target=target,
         relation=relation,
-        length=_column(of_edges, "length", np.float64),
-        **{name: _column(nodes, name, kind) for name, kind in NODE_COLUMNS.items()},
+        length=_read_column(of_edges, "length", np.float64),
+        **{name: _read_column(nodes, name, kind) for name, kind in NODE_COLUMNS.items()},
     )
 
 
-def _walks(
+def _read_walks(
     document: _GraphmlDocument, segment_rows: dict[str, int], edges: _EdgeRows
 ) -> PedestrianGraph:
     nodes = document.nodes["pedestrian"]
@@ -243,18 +248,18 @@ def _walks(
     heads = [nodes[row] for row in first_node[:-1].tolist()]
     source, target, kind, of_edges = edges.undirected("pedestrian")
     return PedestrianGraph(
-        spacing=_spacing(document.about, "walk_spacing"),
+        spacing=_read_spacing(document.about, "walk_spacing"),
         lane_keys=keys,
-        roadside=_column(heads, "roadside", np.bool_),
+        roadside=_read_column(heads, "roadside", np.bool_),
         first_node=first_node,
         lane=np.repeat(np.arange(len(keys), dtype=np.int32), np.diff(first_node)),
-        segment=_rows(nodes, "segment", segment_rows),
+        segment=_read_rows(nodes, "segment", segment_rows),
         source=source,
         target=target,
         kind=kind,
-        length=_column(of_edges, "length", np.float64),
+        length=_read_column(of_edges, "length", np.float64),
         crosswalk=tuple(edge.get("crosswalk", "") for edge in of_edges),
-        **{name: _column(nodes, name, type_) for name, type_ in WALK_NODE_COLUMNS.items()},
+        **{name: _read_column(nodes, name, type_) for name, type_ in WALK_NODE_COLUMNS.items()},
     )
 
 
@@ -267,14 +272,14 @@ def _lanes_of(nodes: Sequence[Attributes], prefix: str) -> tuple[tuple[LaneKey, 
         try:
             key, k = split_node_id(name.removeprefix(prefix))
         except ValueError:
-            _fail(f"node {name}", f"its id is not {prefix}road.section.lane.k")
+            _refuse_place(f"node {name}", f"its id is not {prefix}road.section.lane.k")
         if k == 0:
             keys.append(key)
             first.append(row)
         elif not keys or key != keys[-1] or k != row - first[-1]:
-            _fail(f"node {name}", "it does not follow the node before it on its lane")
+            _refuse_place(f"node {name}", "it does not follow the node before it on its lane")
     if len(set(keys)) != len(keys):
-        _fail("nodes", "a lane occurs twice")
+        _refuse_place("nodes", "a lane occurs twice")
     return tuple(keys), np.array([*first, len(nodes)], dtype=np.int32)
 
 
@@ -285,36 +290,36 @@ _PARSERS: dict[type, Callable[[str], Any]] = {
 }
 
 
-def _column(rows: Sequence[Attributes], name: str, kind: type) -> Any:
+def _read_column(rows: Sequence[Attributes], name: str, kind: type) -> Any:
     try:
         texts = [row[name] for row in rows]
     except KeyError:
-        _fail("data", f"{name!r} is missing at some nodes or edges")
+        _refuse_place("data", f"{name!r} is missing at some nodes or edges")
     try:
         return np.array(list(map(_PARSERS[kind], texts)), dtype=kind)
     except (ValueError, KeyError, OverflowError) as err:
-        _fail("data", f"{name!r} has a value of the wrong type: {err}")
+        _refuse_place("data", f"{name!r} has a value of the wrong type: {err}")
 
 
-def _rows(nodes: Sequence[Attributes], name: str, known: dict[str, int]) -> Int32Array:
+def _read_rows(nodes: Sequence[Attributes], name: str, known: dict[str, int]) -> Int32Array:
     try:
         return np.array([known[node.get(name, "")] for node in nodes], dtype=np.int32)
     except KeyError as err:
-        _fail("data", f"{name!r} names {err.args[0]!r}, which is not there")
+        _refuse_place("data", f"{name!r} names {err.args[0]!r}, which is not there")
 
 
-def _spacing(about: Attributes, name: str) -> float:
+def _read_spacing(about: Attributes, name: str) -> float:
     try:
-        return float(_text(about, name, "graph"))
+        return float(_read_text(about, name, "graph"))
     except ValueError:
-        _fail("graph", f"{name} is {about[name]!r}")
+        _refuse_place("graph", f"{name} is {about[name]!r}")
 
 
-def _text(values: Attributes, name: str, place: str) -> str:
+def _read_text(values: Attributes, name: str, place: str) -> str:
     if name not in values:
-        _fail(place, f"{name!r} is missing")
+        _refuse_place(place, f"{name!r} is missing")
     return values[name]
 
 
-def _fail(place: str, problem: str) -> NoReturn:
+def _refuse_place(place: str, problem: str) -> NoReturn:
     raise GraphFormatError(problem, element=place)

@@ -85,7 +85,7 @@ def map_statistics(
         If given, its lane lengths are used and not measured again.
     """
     drivable = np.flatnonzero([kind in DRIVABLE_TYPES for kind in table.lane_type])
-    length, bounds = _lanes(table, drivable)
+    length, bounds = _measure_lanes(table, drivable)
     if graph is not None:
         length = float(graph.lanes.lanes.lengths.sum())
     signals = [signal for road in odr.roads.values() for signal in road.signals]
@@ -112,7 +112,7 @@ def map_statistics(
     )
 
 
-def _lanes(table: RoadTable, rows: NDArray[np.int64]) -> tuple[float, Bounds]:
+def _measure_lanes(table: RoadTable, rows: NDArray[np.int64]) -> tuple[float, Bounds]:
     """Length of the centre lines and bounds of the borders, sampled about every metre."""
     if len(rows) == 0:
         return 0.0, (0.0, 0.0, 0.0, 0.0)
@@ -156,22 +156,26 @@ def map_semantics(odr: OpenDrive, table: RoadTable) -> dict[str, list[dict[str, 
             {
                 "id": f"{walk.road}:{walk.object_id}",
                 "road": walk.road,
-                "polygon": _rounded(walk.polygon),
-                "from": _rounded(walk.axis)[0],
-                "to": _rounded(walk.axis)[1],
+                "polygon": _round_points(walk.polygon),
+                "from": _round_points(walk.axis)[0],
+                "to": _round_points(walk.axis)[1],
                 "width": round(float(walk.width), 3),
             }
             for walk in crosswalks(odr, table)
         ],
         "stop_lines": [
-            {"id": f"{line.road}:{line.object_id}", "road": line.road, "ends": _rounded(line.ends)}
+            {
+                "id": f"{line.road}:{line.object_id}",
+                "road": line.road,
+                "ends": _round_points(line.ends),
+            }
             for line in stop_lines(odr, table)
         ],
-        "signals": _signals(odr, table),
+        "signals": _list_signals(odr, table),
     }
 
 
-def _signals(odr: OpenDrive, table: RoadTable) -> list[dict[str, Any]]:
+def _list_signals(odr: OpenDrive, table: RoadTable) -> list[dict[str, Any]]:
     found = [(name, signal) for name, road in odr.roads.items() for signal in road.signals]
     known = [(name, signal, signal_kind(signal)) for name, signal in found]
     known = [item for item in known if item[2] != "other"]
@@ -198,6 +202,6 @@ def _signals(odr: OpenDrive, table: RoadTable) -> list[dict[str, Any]]:
     ]
 
 
-def _rounded(points: NDArray[np.float64]) -> list[list[float]]:
+def _round_points(points: NDArray[np.float64]) -> list[list[float]]:
     rows: list[list[float]] = np.round(np.asarray(points, dtype=np.float64), 3).tolist()
     return rows

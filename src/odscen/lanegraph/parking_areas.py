@@ -124,7 +124,7 @@ def map_parking(
         cut = list(beside.cut(outline))
         reached += cut
         unreached += not cut
-    return MapParking(tuple(_grouped(lanes, reached)), unreached)
+    return MapParking(tuple(_group_places(lanes, reached)), unreached)
 
 
 def _places_of(outline: FloatArray) -> Iterator[ParkingPlace]:
@@ -191,9 +191,9 @@ class _Beside:
         on_it = np.abs(across) <= lanes.width[nodes] / 2.0
         order = np.lexsort((np.abs(along), np.round(np.abs(across), 2), on_it, ~good))
         best = int(order[0])
-        return self._entered(int(nodes[best]), place, bool(across[best] > 0.0))
+        return self._turn_to_entry(int(nodes[best]), place, bool(across[best] > 0.0))
 
-    def _entered(self, node: int, place: ParkingPlace, left: bool) -> _Reached:
+    def _turn_to_entry(self, node: int, place: ParkingPlace, left: bool) -> _Reached:
         """Turn a place so that cars enter it forwards."""
         hdg = float(self._lanes.hdg[node])
         inwards = hdg + (math.pi / 2.0 if left else -math.pi / 2.0)
@@ -207,16 +207,16 @@ class _Beside:
         import shapely
 
         polygon = shapely.make_valid(shapely.polygons(outline))
-        hits = self._hits(outline, polygon)
+        hits = self._nodes_hitting(outline, polygon)
         if hits is None:
             return
         nodes, left, near, far = hits
         rows = self._lanes.lane[nodes] * 2 + left
         best = min(np.unique(rows).tolist(), key=lambda row: float(np.median(near[rows == row])))
         mine = rows == best
-        yield from self._row(nodes[mine], bool(best % 2), near[mine], far[mine])
+        yield from self._row_places(nodes[mine], bool(best % 2), near[mine], far[mine])
 
-    def _hits(
+    def _nodes_hitting(
         self, outline: FloatArray, polygon: shapely.Geometry
     ) -> tuple[Int32Array, BoolArray, FloatArray, FloatArray] | None:
         """Nodes from which a line to the side meets the lane: side, and where it begins and ends.
@@ -250,7 +250,7 @@ class _Beside:
         kept = np.flatnonzero(some)[good]
         return nodes[kept].astype(np.int32), left[kept], near[good], far[good]
 
-    def _row(
+    def _row_places(
         self, nodes: Int32Array, left: bool, near: FloatArray, far: FloatArray
     ) -> Iterator[_Reached]:
         """Places of stretches of consecutive nodes."""
@@ -267,9 +267,9 @@ class _Beside:
                 at = run[min(int((number + 0.5) * pitch / spacing), len(run) - 1)]
                 ahead = ((number + 0.5) * pitch / spacing - 0.5 - (at - run[0])) * spacing
                 middle = float(near[at] + far[at]) / 2.0
-                yield self._stood(int(nodes[at]), left, ahead, middle, across, width, pitch)
+                yield self._place_beside(int(nodes[at]), left, ahead, middle, across, width, pitch)
 
-    def _stood(
+    def _place_beside(
         self, node: int, left: bool, ahead: float, aside: float, across: bool, width: float,
         pitch: float,
     ) -> _Reached:  # fmt: skip
@@ -283,32 +283,41 @@ class _Beside:
         return _Reached(node, left, place._replace(hdg=math.remainder(place.hdg, 2 * math.pi)))
 
 
-def _grouped(lanes: LaneGraph, reached: Sequence[_Reached]) -> Iterator[ParkingArea]:
+def _group_places(lanes: LaneGraph, reached: Sequence[_Reached]) -> Iterator[ParkingArea]:
     """Yield areas of places on the same lane and side, near each other."""
     ordered = sorted(
-        reached, key=lambda one: (int(lanes.lane[one.node]), one.left, one.node, one.place)
+        reached,
+        key=lambda reached: (
+            int(lanes.lane[reached.node]),
+            reached.left,
+            reached.node,
+            reached.place,
+        ),
     )
     group: list[_Reached] = []
     number = 0
     for one in ordered:
-        if group and not _together(lanes, group, one):
+        if group and not _belong_together(lanes, group, one):
             number += 1
-            yield _area(number, group)
+            yield _make_area(number, group)
             group = []
         group.append(one)
     if group:
-        yield _area(number + 1, group)
+        yield _make_area(number + 1, group)
 
 
-def _together(lanes: LaneGraph, group: Sequence[_Reached], one: _Reached) -> bool:
+def _belong_together(lanes: LaneGraph, group: Sequence[_Reached], reached: _Reached) -> bool:
     first, last = group[0], group[-1]
-    if lanes.lane[first.node] != lanes.lane[one.node] or first.left != one.left:
+    if lanes.lane[first.node] != lanes.lane[reached.node] or first.left != reached.left:
         return False
     offset = lanes.offset
-    gap, length = offset[one.node] - offset[last.node], offset[one.node] - offset[first.node]
+    gap, length = (
+        offset[reached.node] - offset[last.node],
+        offset[reached.node] - offset[first.node],
+    )
     return bool(gap <= AREA_GAP and length <= AREA_LENGTH)
 
 
-def _area(number: int, group: Sequence[_Reached]) -> ParkingArea:
-    nodes, places = (tuple(getattr(one, key) for one in group) for key in ("node", "place"))
+def _make_area(number: int, group: Sequence[_Reached]) -> ParkingArea:
+    nodes, places = (tuple(getattr(reached, key) for reached in group) for key in ("node", "place"))
     return ParkingArea(f"P{number}", nodes, places)

@@ -82,14 +82,14 @@ class PathFinder:
     def distances(self, source: int) -> FloatArray:
         """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
         result = np.full(len(self.mask), np.inf)
-        result[self.nodes] = self._from(source).distances
+        result[self.nodes] = self._tree_from(source).distances
         return result
 
     def distance(self, source: int, target: int) -> float:
         """Metres from one node to another one; inf if it cannot be reached."""
-        if (way := self._way(source, target)) is not None:
+        if (way := self._find_way(source, target)) is not None:
             return way.metres
-        distances = self._from(source).distances
+        distances = self._tree_from(source).distances
         return float(distances[self._local[target]]) if self.mask[target] else math.inf
 
     def reachable(self, source: int) -> BoolArray:
@@ -98,9 +98,9 @@ class PathFinder:
 
     def path(self, source: int, target: int) -> Int32Array:
         """Nodes of the shortest path, both ends included; empty if there is none."""
-        if (way := self._way(source, target)) is not None:
+        if (way := self._find_way(source, target)) is not None:
             return self.nodes[way.nodes].astype(np.int32)
-        distances, predecessors = self._from(source)
+        distances, predecessors = self._tree_from(source)
         if not self.mask[target] or not np.isfinite(distances[self._local[target]]):
             return np.empty(0, dtype=np.int32)
         step, item = int(self._local[target]), predecessors.item
@@ -109,11 +109,11 @@ class PathFinder:
             steps.append(step)
         return self.nodes[steps[::-1]].astype(np.int32)
 
-    def _way(self, source: int, target: int) -> Way | None:
+    def _find_way(self, source: int, target: int) -> Way | None:
         """Find the shortest path in its corridor; ``None`` where it is in a tree sooner."""
-        if len(self.nodes) < _LARGE or self._searched < _TREES or self._corridors is None:
+        if len(self.nodes) < _LARGE or self._searched < _TREES or self._corridor_paths is None:
             return None
-        if not (self._holds(source) and self._holds(target)):
+        if not (self._holds_node(source) and self._holds_node(target)):
             return None
         if KEPT_TREES.get(self._number, source) is not None:
             return None
@@ -122,17 +122,17 @@ class PathFinder:
         ways = self._ways.setdefault(source, {})
         if target not in ways and len(ways) < _TO_ONE_BY_ONE:
             ends = (int(self._local[node]) for node in (source, target))
-            ways[target] = self._corridors.find(*ends)
+            ways[target] = self._corridor_paths.find(*ends)
         return ways.get(target)
 
     @cached_property
-    def _corridors(self) -> CorridorPaths | None:
-        return None if self._blocks is None else CorridorPaths(self._blocks)
+    def _corridor_paths(self) -> CorridorPaths | None:
+        return None if self._graph_blocks is None else CorridorPaths(self._graph_blocks)
 
     @cached_property
-    def _blocks(self) -> Blocks | None:
+    def _graph_blocks(self) -> Blocks | None:
         """The graph in blocks; ``None`` if they are of no use."""
-        found = Blocks(self._both_ways, self._cuts(self._both_ways.tocoo()))
+        found = Blocks(self._both_ways, self._block_cuts(self._both_ways.tocoo()))
         return found if found.are_of_use else None
 
     @cached_property
@@ -145,14 +145,14 @@ class PathFinder:
         columns = np.concatenate([edges.col, edges.row])
         return shortest_edges(len(self.nodes), rows, columns, np.tile(edges.data, 2))
 
-    def _cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
+    def _block_cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
         """Whether a block ends at each edge between two nodes of the region; shape ``(E,)``."""
         return np.asarray(self._lane[edges.row] != self._lane[edges.col], dtype=np.bool_)
 
     def paths_to(self, target: int) -> PathsTo:
         """Shortest paths from everywhere to one node, for many sources with the same target."""
         distances, nexts = csgraph.dijkstra(
-            self._reversed,
+            self._reversed_matrix,
             directed=self._directed,
             indices=np.asarray(self._local[target]),
             return_predecessors=True,
@@ -160,7 +160,7 @@ class PathFinder:
         return PathsTo(self.nodes, self._local, distances, nexts)
 
     @cached_property
-    def _reversed(self) -> sparse.csr_matrix[np.float64]:
+    def _reversed_matrix(self) -> sparse.csr_matrix[np.float64]:
         return self._matrix.T.tocsr()
 
     def leads(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
@@ -170,7 +170,7 @@ class PathFinder:
         """
         if self._directed and len(sources) <= _FEW:
             return self._lead_few(sources, targets)
-        return self._parts.lead(self._local[sources], self._local[targets])
+        return self._connected_parts.lead(self._local[sources], self._local[targets])
 
     def _lead_few(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
         """The same, each source by itself."""
@@ -194,7 +194,7 @@ class PathFinder:
         For each source, shape ``(S,)``, a row of the table, shape ``(R, T)``: sources from which
         the same can be reached share one. A node counts as reached from itself.
         """
-        return self._parts.reach(self._local[sources], self._local[targets])
+        return self._connected_parts.reach(self._local[sources], self._local[targets])
 
     def has_goals(self, spawn: int) -> bool:
         """Whether there is any goal candidate: whether anything can be reached."""
@@ -211,11 +211,11 @@ class PathFinder:
         InputError
             If ``spawn`` is outside the region.
         """
-        distances = self._from(spawn).distances  # refuses a spawn outside
+        distances = self._tree_from(spawn).distances  # refuses a spawn outside
         if not self.has_goals(spawn):
             return np.empty(0, dtype=np.int32)
         if not self._reaches_end(spawn):
-            return self._one_per_lane(self._farthest(spawn, distances))
+            return self._one_per_lane(self._farthest_rows(spawn, distances))
         ends = np.isfinite(distances) & self._is_end
         ends[self._local[spawn]] = False
         return self.nodes[ends].astype(np.int32)
@@ -234,9 +234,14 @@ class PathFinder:
         ends = self._ends_from(spawns) if is_much else {}
         for spawn in spawns:
             goals = ends.get(spawn)
-            allowed = among(spawn) if among is not None and self._holds(spawn) else None
-            if goals is None and is_much and self._rings is not None and self._is_closed(spawn):
-                yield self._rings.of(int(self._local[spawn]), allowed)
+            allowed = among(spawn) if among is not None and self._holds_node(spawn) else None
+            if (
+                goals is None
+                and is_much
+                and self._ring_goals is not None
+                and self._is_closed(spawn)
+            ):
+                yield self._ring_goals.of(int(self._local[spawn]), allowed)
                 continue
             goals = self.goal_candidates(spawn) if goals is None else goals[goals != spawn]
             yield goals if allowed is None else goals[allowed[goals]]
@@ -249,29 +254,34 @@ class PathFinder:
         for place in sorted(range(len(spawns)), key=spawns.__getitem__):
             spawn, goal = spawns[place], goals[place]
             known: bool | None = None
-            if is_much and self._rings is not None and self._is_closed(spawn) and self._holds(goal):
-                known = self._rings.is_goal(*self._local[[spawn, goal]].tolist())
+            if (
+                is_much
+                and self._ring_goals is not None
+                and self._is_closed(spawn)
+                and self._holds_node(goal)
+            ):
+                known = self._ring_goals.is_goal(*self._local[[spawn, goal]].tolist())
             found[place] = self.is_candidate(spawn, goal) if known is None else known
         return found
 
     def _ends_from(self, spawns: Sequence[int]) -> dict[int, Int32Array]:
         """Ends that each spawn reaches, itself among them if it is one; if it reaches others."""
-        starts = [one for one in dict.fromkeys(spawns) if self._holds(one)]
-        starts = [one for one in starts if self._reaches_end(one)]
+        starts = [fromkey for fromkey in dict.fromkeys(spawns) if self._holds_node(fromkey)]
+        starts = [start for start in starts if self._reaches_end(start)]
         ends = self.nodes[self._is_end].astype(np.int32)
         row, table = self.reach(np.array(starts, dtype=np.int32), ends)
         reached = [ends[ahead] for ahead in table]
         return {spawn: reached[number] for spawn, number in zip(starts, row.tolist(), strict=True)}
 
     @cached_property
-    def _rings(self) -> RingGoals | None:
+    def _ring_goals(self) -> RingGoals | None:
         """Goals of spawns that reach no end; ``None`` where they are found by a search of all."""
-        if self._blocks is None:
+        if self._graph_blocks is None:
             return None
         return RingGoals(
             self._both_ways,
-            self._parts.of,
-            FarthestNodes(self._blocks, self._lane_starts),
+            self._connected_parts.of,
+            FarthestNodes(self._graph_blocks, self._lane_starts),
             nodes=self.nodes,
             is_road=self._are_roads(self.nodes[self._lane_starts]),
             searched=self.goal_candidates,
@@ -283,7 +293,7 @@ class PathFinder:
 
     def _is_closed(self, spawn: int) -> bool:
         """Whether a node lies in the region, and no end can be reached from it, but other nodes."""
-        return self._holds(spawn) and self.has_goals(spawn) and not self._reaches_end(spawn)
+        return self._holds_node(spawn) and self.has_goals(spawn) and not self._reaches_end(spawn)
 
     def is_candidate(self, spawn: int, goal: int) -> bool:
         """Whether ``goal``, which can be reached, is among the candidates of ``spawn``."""
@@ -296,7 +306,7 @@ class PathFinder:
         return np.asarray(self.out_degree <= self.end_degree, dtype=np.bool_)
 
     @cached_property
-    def _parts(self) -> ConnectedParts:
+    def _connected_parts(self) -> ConnectedParts:
         return ConnectedParts(self._matrix, directed=self._directed)
 
     @cached_property
@@ -304,7 +314,7 @@ class PathFinder:
         """At least how many ends, itself included, can be reached from each node of the region."""
         ends = np.flatnonzero(self._is_end)
         if not self._directed:
-            part = self._parts.of
+            part = self._connected_parts.of
             per_part = np.bincount(part[ends], minlength=len(self.nodes))
             return per_part[part].astype(np.int32)
         if not len(ends):
@@ -316,9 +326,9 @@ class PathFinder:
         row = self._local[spawn]
         return bool(self._ends_ahead[row] > int(self._is_end[row]))
 
-    def _from(self, source: int) -> Tree:
-        if not self._holds(source):
-            raise InputError(f"{self._name(source)} is outside the region of interest")
+    def _tree_from(self, source: int) -> Tree:
+        if not self._holds_node(source):
+            raise InputError(f"{self._name_node(source)} is outside the region of interest")
         tree = KEPT_TREES.get(self._number, source)
         if tree is None:
             self._searched += 1
@@ -332,13 +342,13 @@ class PathFinder:
             KEPT_TREES.add(self._number, source, tree)
         return tree
 
-    def _holds(self, node: int) -> bool:
+    def _holds_node(self, node: int) -> bool:
         return 0 <= node < len(self.mask) and bool(self.mask[node])
 
-    def _name(self, node: int) -> str:
+    def _name_node(self, node: int) -> str:
         return f"node {node}"
 
-    def _farthest(self, spawn: int, distances: FloatArray) -> Int32Array:
+    def _farthest_rows(self, spawn: int, distances: FloatArray) -> Int32Array:
         """Rows of the farthest reachable nodes of each lane, where several are equally far all."""
         away = np.where(np.isfinite(distances), distances, -1.0)
         away[self._local[spawn]] = -1.0

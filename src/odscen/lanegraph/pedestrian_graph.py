@@ -124,18 +124,18 @@ def build_pedestrians(
     OpenDriveError
         If the walks are too long together, or too many lie on each other.
     """
-    walks = _walks(odr, table)
-    nodes = _place(table, walks, spacing, most)
+    walks = _choose_walks(odr, table)
+    nodes = _place_nodes(table, walks, spacing, most)
     check_density(table, walks.rows[nodes.lane], nodes.place.T)
     used = np.flatnonzero(np.diff(nodes.first))
     number = np.cumsum(np.diff(nodes.first) > 0) - 1
     keys = tuple(table.lane_keys[row] for row in walks.rows[used].tolist())
-    edges = _unique(
+    edges = _unique_edges(
         [
-            *_along(walks, nodes),
-            *_linked(table, walks, nodes, successors),
-            *_near(table, walks, nodes, vehicles),
-            *_crossings(nodes, crosswalks),
+            *_edges_along(walks, nodes),
+            *_linked_joints(table, walks, nodes, successors),
+            *_near_joints(table, walks, nodes, vehicles),
+            *_crosswalk_edges(nodes, crosswalks),
         ]
     )
     road = road_rows[table.lane_road[walks.rows]][nodes.lane]
@@ -160,7 +160,7 @@ def build_pedestrians(
     )
 
 
-def _walks(odr: OpenDrive, table: RoadTable) -> _Walks:
+def _choose_walks(odr: OpenDrive, table: RoadTable) -> _Walks:
     """Choose the walks, in the order of the table."""
     walkable = np.array([kind in WALKABLE_TYPES for kind in table.lane_type], dtype=np.bool_)
     drivable = np.array([kind in DRIVABLE_TYPES for kind in table.lane_type], dtype=np.bool_)
@@ -197,18 +197,18 @@ def _roadside_allowed(odr: OpenDrive, table: RoadTable) -> BoolArray:
     return allowed
 
 
-def _place(table: RoadTable, walks: _Walks, spacing: float, most: float) -> _WalkNodes:
+def _place_nodes(table: RoadTable, walks: _Walks, spacing: float, most: float) -> _WalkNodes:
     rows, roadside = walks
     across = np.where(roadside, 1.0, 0.5)
     growing = np.ones(len(rows), dtype=np.bool_)
     lines = CentreLines.of(table, rows, forward=growing, at=across, most=most)
     planned, lane, offset = node_offsets(lines.lengths, spacing, most=most)
     s = lines.s_at(lane, offset)
-    place, hdg, width = _points(table, walks, lane, s)
+    place, hdg, width = _points_on_walks(table, walks, lane, s)
     wide = width >= MIN_WALK_WIDTH
     ends = np.arange(len(rows))
-    begin, _, _ = _points(table, walks, ends, lines.s0)
-    end, _, _ = _points(table, walks, ends, lines.s1)
+    begin, _, _ = _points_on_walks(table, walks, ends, lines.s0)
+    end, _, _ = _points_on_walks(table, walks, ends, lines.s1)
     return _WalkNodes(
         first=np.concatenate([[0], np.cumsum(wide)])[planned].astype(np.int64),
         lane=lane[wide],
@@ -221,7 +221,7 @@ def _place(table: RoadTable, walks: _Walks, spacing: float, most: float) -> _Wal
     )
 
 
-def _points(
+def _points_on_walks(
     table: RoadTable, walks: _Walks, lane: IntArray, s: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Places ``(K, 3)``, headings and widths ``(K,)`` on the walks at road coordinates s."""
@@ -234,7 +234,7 @@ def _points(
     return np.stack([x, y, points.z], axis=1), points.hdg, width
 
 
-def _along(walks: _Walks, nodes: _WalkNodes) -> list[_Edge]:
+def _edges_along(walks: _Walks, nodes: _WalkNodes) -> list[_Edge]:
     source = np.flatnonzero(nodes.lane[:-1] == nodes.lane[1:])
     length = nodes.offset[source + 1] - nodes.offset[source]
     kinds = (WalkKind.SIDEWALK, WalkKind.ROADSIDE)
@@ -245,7 +245,7 @@ def _along(walks: _Walks, nodes: _WalkNodes) -> list[_Edge]:
     ]
 
 
-def _linked(
+def _linked_joints(
     table: RoadTable,
     walks: _Walks,
     nodes: _WalkNodes,
@@ -264,10 +264,12 @@ def _linked(
         for after in successors.get(key, ())
         if after in number
     ]
-    return _joints(nodes, pairs)
+    return _make_joints(nodes, pairs)
 
 
-def _near(table: RoadTable, walks: _Walks, nodes: _WalkNodes, vehicles: NodeTable) -> list[_Edge]:
+def _near_joints(
+    table: RoadTable, walks: _Walks, nodes: _WalkNodes, vehicles: NodeTable
+) -> list[_Edge]:
     """Joints between ends of different walks within reach of each other, not across a lane."""
     ends = nodes.ends.reshape(-1, 3)
     some = np.flatnonzero(np.repeat(np.diff(nodes.first) > 0, 2))  # ends of walks with nodes
@@ -278,7 +280,7 @@ def _near(table: RoadTable, walks: _Walks, nodes: _WalkNodes, vehicles: NodeTabl
     pairs = pairs[pairs[:, 0] // 2 != pairs[:, 1] // 2]
     middle = (ends[pairs[:, 0]] + ends[pairs[:, 1]]) / 2
     apart = pairs[~_on_lane(middle, vehicles)]
-    return _joints(nodes, [(one, other) for one, other in apart.tolist()])
+    return _make_joints(nodes, [(one, other) for one, other in apart.tolist()])
 
 
 def _on_lane(places: FloatArray, vehicles: NodeTable) -> BoolArray:
@@ -305,7 +307,7 @@ MARGIN = 0.2
 """Metres that a joint may reach into a drivable lane."""
 
 
-def _joints(nodes: _WalkNodes, pairs: Sequence[tuple[int, int]]) -> list[_Edge]:
+def _make_joints(nodes: _WalkNodes, pairs: Sequence[tuple[int, int]]) -> list[_Edge]:
     """Edges between ends of walks; end ``2 w`` is the start of walk w, ``2 w + 1`` its end."""
     edges: list[_Edge] = []
     for pair in pairs:
@@ -320,14 +322,16 @@ def _joints(nodes: _WalkNodes, pairs: Sequence[tuple[int, int]]) -> list[_Edge]:
     return edges
 
 
-def _crossings(nodes: _WalkNodes, crosswalks: Sequence[Crosswalk]) -> list[_Edge]:
+def _crosswalk_edges(nodes: _WalkNodes, crosswalks: Sequence[Crosswalk]) -> list[_Edge]:
     """Make an edge for each crosswalk that has a walk within reach at both of its ends."""
     edges: list[_Edge] = []
     if not len(nodes.place):
         return edges
     tree = cKDTree(nodes.place[:, :2])
     for crosswalk in crosswalks:
-        found = [_nearest(tree, nodes, axis_end, crosswalk.z) for axis_end in crosswalk.axis]
+        found = [
+            _nearest_on_level(tree, nodes, axis_end, crosswalk.z) for axis_end in crosswalk.axis
+        ]
         ends = sorted(node for node in found if node is not None)
         if len(ends) < 2 or nodes.lane[ends[0]] == nodes.lane[ends[1]]:
             continue  # a walk is missing, or both ends found the one on the same side
@@ -338,7 +342,7 @@ def _crossings(nodes: _WalkNodes, crosswalks: Sequence[Crosswalk]) -> list[_Edge
     return edges
 
 
-def _nearest(tree: cKDTree, nodes: _WalkNodes, place: FloatArray, z: float) -> int | None:
+def _nearest_on_level(tree: cKDTree, nodes: _WalkNodes, place: FloatArray, z: float) -> int | None:
     """Nearest node on the level of ``place``, shape ``(2,)``, or ``None``."""
     near = np.array(sorted(tree.query_ball_point(place, CROSSWALK_REACH)), dtype=np.int64)
     near = near[np.abs(nodes.place[near, 2] - z) <= LEVEL_HEIGHT]
@@ -348,7 +352,7 @@ def _nearest(tree: cKDTree, nodes: _WalkNodes, place: FloatArray, z: float) -> i
     return int(near[np.argmin(distance)])
 
 
-def _unique(edges: Sequence[_Edge]) -> list[_Edge]:
+def _unique_edges(edges: Sequence[_Edge]) -> list[_Edge]:
     """Sort the edges; of several between the same nodes the first kind found stays."""
     best: dict[tuple[int, int], _Edge] = {}
     for edge in edges:

@@ -72,7 +72,7 @@ def node_index(graph: MapGraph, name: str) -> int:
         If the map has no such node.
     """
     lanes = graph.lanes.lanes
-    return _index(name, name, lanes.keys, lanes.first_node)
+    return _index_on_lane(name, name, lanes.keys, lanes.first_node)
 
 
 def walk_node_id(graph: MapGraph, i: int) -> NodeId:
@@ -98,7 +98,7 @@ def walk_node_index(graph: MapGraph, name: str) -> int:
     if not name.startswith(WALK_PREFIX):
         raise NotFoundError("pedestrian node", name, [])
     bare = name.removeprefix(WALK_PREFIX)
-    return _index(name, bare, graph.walks.lane_keys, graph.walks.first_node)
+    return _index_on_lane(name, bare, graph.walks.lane_keys, graph.walks.first_node)
 
 
 def is_walk_node_id(name: str) -> bool:
@@ -249,7 +249,7 @@ def split_node_id(name: str) -> tuple[LaneKey, int]:
     return key, int(k)
 
 
-def _index(name: str, bare: str, keys: tuple[LaneKey, ...], first_node: Int32Array) -> int:
+def _index_on_lane(name: str, bare: str, keys: tuple[LaneKey, ...], first_node: Int32Array) -> int:
     what = "pedestrian node" if is_walk_node_id(name) else "node"
     try:
         key, k = split_node_id(bare)

@@ -102,7 +102,7 @@ def build_segments(odr: OpenDrive, *, target_length: float = TARGET_LENGTH) -> S
         Metres; see :data:`TARGET_LENGTH`.
     """
     owned = _roads_of_junctions(odr)
-    chains = _chains(odr, target_length)
+    chains = _find_chains(odr, target_length)
     rows = _SegmentRows([], [], [], {}, {})
     for chain in chains:
         rows.add_chain(chain, odr)
@@ -111,7 +111,7 @@ def build_segments(odr: OpenDrive, *, target_length: float = TARGET_LENGTH) -> S
     pairs = {*_inside_chains(chains, rows.places), *_across_links(odr, rows)}
     adjacency = sorted({(min(pair), max(pair)) for pair in pairs if pair[0] != pair[1]})
     segments = Segments(
-        ids=_distinct(rows.ids),
+        ids=_make_distinct(rows.ids),
         kinds=tuple("junction" if name.startswith("j") else "road" for name in rows.ids),
         parts=tuple(rows.parts),
         lengths=np.array(rows.lengths, dtype=np.float64),
@@ -139,10 +139,10 @@ class _SegmentRows:
     junctions: dict[JunctionId, int]
 
     def add_chain(self, chain: _RoadChain, odr: OpenDrive) -> None:
-        self.places.update(_places(chain, odr, base=len(self.ids)))
+        self.places.update(_place_segments(chain, odr, base=len(self.ids)))
         name = segment_name("road", chain.steps[0].road)
         self.ids += [name] if chain.count == 1 else [f"{name}-{k}" for k in range(chain.count)]
-        self.parts += _parts(chain, odr)
+        self.parts += _segment_parts(chain, odr)
         self.lengths += [chain.segment_length] * chain.count
 
     def add_junction(self, junction: JunctionId, roads: list[Road]) -> None:
@@ -163,7 +163,7 @@ def segment_name(kind: Literal["road", "junction"], own: str) -> str:
     return f"{kind[0]}{own.replace('>', '%3E')}"
 
 
-def _distinct(ids: list[str]) -> tuple[SegmentId, ...]:
+def _make_distinct(ids: list[str]) -> tuple[SegmentId, ...]:
     """Mark an id that occurs again (roads ``1`` and ``1-0``) with underscores."""
     seen: dict[str, None] = {}
     for name in ids:
@@ -183,22 +183,22 @@ def _roads_of_junctions(odr: OpenDrive) -> dict[JunctionId, list[Road]]:
     return {junction: roads for junction, roads in owned.items() if roads}
 
 
-def _link(road: Road, side: ContactPoint) -> RoadLink | None:
+def _link_at_side(road: Road, side: ContactPoint) -> RoadLink | None:
     return road.predecessor if side == "start" else road.successor
 
 
-def _opposite(end: _RoadEnd) -> _RoadEnd:
+def _opposite_end(end: _RoadEnd) -> _RoadEnd:
     return _RoadEnd(end.road, "end" if end.side == "start" else "start")
 
 
-def _joints(odr: OpenDrive) -> dict[_RoadEnd, _RoadEnd]:
+def _find_joints(odr: OpenDrive) -> dict[_RoadEnd, _RoadEnd]:
     """Find the ends of ordinary roads that name each other: each with the one that it meets."""
     named: dict[_RoadEnd, _RoadEnd] = {}
     for road in odr.roads.values():
         if road.junction is not None:
             continue
         for side in ("start", "end"):
-            link = _link(road, side)
+            link = _link_at_side(road, side)
             if link is None or link.element_type != "road" or link.contact_point is None:
                 continue
             other = odr.roads.get(RoadId(link.element_id))
@@ -207,9 +207,9 @@ def _joints(odr: OpenDrive) -> dict[_RoadEnd, _RoadEnd]:
     return {end: other for end, other in named.items() if named.get(other) == end}
 
 
-def _chains(odr: OpenDrive, target_length: float) -> list[_RoadChain]:
+def _find_chains(odr: OpenDrive, target_length: float) -> list[_RoadChain]:
     """Maximal chains of ordinary roads: open ones first, then loops, each in file order."""
-    joints = _joints(odr)
+    joints = _find_joints(odr)
     ordinary = [road.id for road in odr.roads.values() if road.junction is None]
     seen: set[RoadId] = set()
     chains: list[_RoadChain] = []
@@ -219,7 +219,7 @@ def _chains(odr: OpenDrive, target_length: float) -> list[_RoadChain]:
             start = next((end for end in starts if closed or end not in joints), None)
             if road in seen or start is None:
                 continue
-            steps = _walk(start, joints)
+            steps = _walk_roads(start, joints)
             seen.update(step.road for step in steps)
             length = sum(odr.roads[step.road].length for step in steps)
             count = max(1, round(length / target_length))
@@ -227,7 +227,7 @@ def _chains(odr: OpenDrive, target_length: float) -> list[_RoadChain]:
     return chains
 
 
-def _walk(start: _RoadEnd, joints: Mapping[_RoadEnd, _RoadEnd]) -> list[_RoadStep]:
+def _walk_roads(start: _RoadEnd, joints: Mapping[_RoadEnd, _RoadEnd]) -> list[_RoadStep]:
     """Roads met when one enters at ``start`` and continues to the end or once round the loop."""
     steps: list[_RoadStep] = []
     seen: set[RoadId] = set()
@@ -235,11 +235,11 @@ def _walk(start: _RoadEnd, joints: Mapping[_RoadEnd, _RoadEnd]) -> list[_RoadSte
     while entry is not None and entry.road not in seen:
         steps.append(_RoadStep(entry.road, entry.side == "start"))
         seen.add(entry.road)
-        entry = joints.get(_opposite(entry))
+        entry = joints.get(_opposite_end(entry))
     return steps
 
 
-def _places(
+def _place_segments(
     chain: _RoadChain, odr: OpenDrive, *, base: int
 ) -> Iterator[tuple[RoadId, _SegmentSpan]]:
     done = 0.0
@@ -250,7 +250,7 @@ def _places(
         done += length
 
 
-def _parts(chain: _RoadChain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
+def _segment_parts(chain: _RoadChain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
     """List the stretches of roads in each segment of the chain."""
     found: list[list[SegmentPart]] = [[] for _ in range(chain.count)]
     done = 0.0
@@ -285,7 +285,7 @@ def _across_links(odr: OpenDrive, rows: _SegmentRows) -> Iterator[tuple[int, int
     places = rows.places
     for road in odr.roads.values():
         for side in ("start", "end"):
-            link = _link(road, side)
+            link = _link_at_side(road, side)
             here = places[road.id].row(0.0 if side == "start" else road.length)
             if link is None:
                 continue

@@ -54,7 +54,7 @@ class Router(PathFinder):
         """Router of the same region by another cost of each edge, shape ``(E,)``."""
         return Router(self._graph, self.mask, costs=costs)
 
-    def _cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
+    def _block_cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
         """Blocks end where a junction is left."""
         inside = self._in_junction[self.nodes]
         return np.asarray(inside[edges.row] & ~inside[edges.col], dtype=np.bool_)
@@ -74,7 +74,7 @@ class Router(PathFinder):
         on_roads = nodes[~self._in_junction[nodes]]
         return on_roads if len(on_roads) else nodes
 
-    def _name(self, node: int) -> str:
+    def _name_node(self, node: int) -> str:
         inside_map = 0 <= node < len(self.mask)
         return f"node {node_id(self._graph, node) if inside_map else node}"
 
@@ -99,11 +99,11 @@ class WalkRouter(PathFinder):
         )
         self._graph = graph
 
-    def _cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
+    def _block_cuts(self, edges: sparse.coo_matrix[np.float64]) -> BoolArray:
         """Blocks are segments."""
         segment = self._graph.walks.segment[self.nodes]
         return np.asarray(segment[edges.row] != segment[edges.col], dtype=np.bool_)
 
-    def _name(self, node: int) -> str:
+    def _name_node(self, node: int) -> str:
         inside_map = 0 <= node < len(self.mask)
         return f"node {walk_node_id(self._graph, node) if inside_map else node}"

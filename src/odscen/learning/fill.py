@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-VEHICLES = tuple(one for one in Category if one is not Category.PEDESTRIAN)
+VEHICLES = tuple(category for category in Category if category is not Category.PEDESTRIAN)
 OPTIONAL = {
     "initial_speed": "m/s", "desired_speed": "m/s", "goal": "node", "lateral_offset": "m",
     "depart": "s",
@@ -101,9 +101,9 @@ class FillRequest:
             **graph_arrays(self.graph),
             "region": self.roads,
             "walk_region": self.walks,
-            "categories": np.array([str(one) for one in Category]),
-            "bodies": np.array([self.bodies[one] for one in Category], dtype=np.float64),
-            "allowed": np.stack([self.allowed.get(one, none) for one in VEHICLES]),
+            "categories": np.array([str(category) for category in Category]),
+            "bodies": np.array([self.bodies[category] for category in Category], dtype=np.float64),
+            "allowed": np.stack([self.allowed.get(category, none) for category in VEHICLES]),
             "walk_allowed": self.allowed.get(Category.PEDESTRIAN, nobody),
             "wanted": np.array([self.vehicles, self.walkers], dtype=np.int32),
             "seed": np.array([self.seed], dtype=np.int64),
@@ -200,19 +200,19 @@ def fill_from_arrays(arrays: Mapping[str, Array], *, file: str | None = None) ->
                 element=name,
             )
     columns = {
-        name: _whole(given[name], name, file) if name in ("node", "goal") else
-        _categories(given[name], file) if name == "category" else
-        _numbers(given[name], name, file)
+        name: _whole_numbers(given[name], name, file) if name in ("node", "goal") else
+        _check_categories(given[name], file) if name == "category" else
+        _check_numbers(given[name], name, file)
         for name in ("node", "category", *OPTIONAL)
         if name in given
     }  # fmt: skip
     return Fill(**columns)
 
 
-def _whole(array: Array, name: str, file: str | None) -> Array:
+def _whole_numbers(array: Array, name: str, file: str | None) -> Array:
     if array.dtype.kind in "iu":
         return array.astype(np.int64)
-    numbers = _numbers(array, name, file)
+    numbers = _check_numbers(array, name, file)
     odd = np.flatnonzero(~(np.isnan(numbers) | (numbers == np.round(numbers))))
     if len(odd):
         raise InputError(
@@ -224,13 +224,13 @@ def _whole(array: Array, name: str, file: str | None) -> Array:
     return np.where(known, numbers, NO_NODE).astype(np.int64)
 
 
-def _numbers(array: Array, name: str, file: str | None) -> Array:
+def _check_numbers(array: Array, name: str, file: str | None) -> Array:
     if array.dtype.kind not in "fiu":
         raise InputError(f"it has values of {array.dtype}, not numbers", file=file, element=name)
     return array.astype(np.float64)
 
 
-def _categories(array: Array, file: str | None) -> Array:
+def _check_categories(array: Array, file: str | None) -> Array:
     if not len(array):  # an empty list has numbers of any kind
         return array.astype(np.str_)
     if array.dtype.kind == "S":
@@ -238,7 +238,7 @@ def _categories(array: Array, file: str | None) -> Array:
     if array.dtype.kind == "U":
         return array
     if array.dtype.kind in "iu":
-        names = [*(str(one) for one in Category)]
+        names = [*(str(category) for category in Category)]
         return np.array([names[k] if 0 <= k < len(names) else str(k) for k in array.tolist()])
     raise InputError(
         f"it has values of {array.dtype}, not names of categories or their numbers",
@@ -299,22 +299,22 @@ def checked_fill(fill: Fill, request: FillRequest, region: Region) -> CheckedFil
     drafts = check.with_safe_speeds(check.with_goals(drafts))
     counter: Counter[Category] = Counter()
     actors = []
-    for one in drafts:
-        counter[one.category] += 1
-        walk = one.category is Category.PEDESTRIAN
-        goal = None if one.goal is None else name_of(region.graph, NodePlace(walk, one.goal))
+    for draft in drafts:
+        counter[draft.category] += 1
+        walk = draft.category is Category.PEDESTRIAN
+        goal = None if draft.goal is None else name_of(region.graph, NodePlace(walk, draft.goal))
         fields = {
-            "id": f"{one.category}-{counter[one.category]}",
-            "category": one.category,
-            "spawn": name_of(region.graph, NodePlace(walk, one.node)),
+            "id": f"{draft.category}-{counter[draft.category]}",
+            "category": draft.category,
+            "spawn": name_of(region.graph, NodePlace(walk, draft.node)),
             "goal": goal,
-            "speed": one.desired,
-            "lateral_offset": one.left,
-            "depart": one.depart,
-            "initial_speed": one.initial,
+            "speed": draft.desired,
+            "lateral_offset": draft.left,
+            "depart": draft.depart,
+            "initial_speed": draft.initial,
         }
         actors.append(validated(Actor, fields))
-    remarks = sorted(check.remarks, key=lambda one: one.row)
+    remarks = sorted(check.remarks, key=lambda remark: remark.row)
     return CheckedFill(tuple(actors), tuple(remarks), len(fill.node))
 
 
@@ -331,41 +331,41 @@ class _FillCheck:
         found: list[tuple[int, Category, int]] = []
         others: list[tuple[int, Category, int, str]] = []
         for row in range(len(self._fill.node)):
-            category = self._category(row)
+            category = self._category_of(row)
             if category is None:
                 continue
             node = int(self._fill.node[row])
-            problem = self._problem(node, category)
+            problem = self._find_problem(node, category)
             if problem:
                 others.append((row, category, node, problem))
             else:
-                found.append(self._put(row, category, node))
+                found.append(self._put_user(row, category, node))
         for row, category, node, problem in others:
-            near = self._nearest(node, category)
+            near = self._nearest_free_node(node, category)
             if near is None:
-                self._note(row, "dropped", "node", f"{problem}, and no node near it is free")
+                self._note_remark(row, "dropped", "node", f"{problem}, and no node near it is free")
             else:
-                self._note(row, "moved", "node", f"{problem}; it is on node {near}")
-                found.append(self._put(row, category, near))
+                self._note_remark(row, "moved", "node", f"{problem}; it is on node {near}")
+                found.append(self._put_user(row, category, near))
         return sorted(found)
 
     def draft(self, row: int, category: Category, node: int) -> _Draft:
         """One road user with all but what its goal and its neighbours allow."""
         walk = category is Category.PEDESTRIAN
-        limit = self._limit(category, node)
-        initial = None if walk else self._initial(row)
-        desired = self._desired(row, category)
+        limit = self._speed_limit_at(category, node)
+        initial = None if walk else self._initial_speed(row)
+        desired = self._desired_speed(row, category)
         if initial is not None:
             if desired is None and math.isfinite(limit):
                 # By the limit itself, as the drivers' own factors might be below it.
                 desired = round(min(limit, SPEED_MAX[category]), 2)
             most = SPEED_MAX[category] if desired is None else desired
-            initial = self._clamp(row, "initial_speed", initial, 0.0, most)
-        goal = self._value(row, "goal")
+            initial = self._clamp_value(row, "initial_speed", initial, 0.0, most)
+        goal = self._value_of(row, "goal")
         return _Draft(
             row, category, node, desired, initial,
             None if goal is None or goal == -1 else int(goal),
-            self._left(row, category, node), self._depart(row),
+            self._lateral_offset(row, category, node), self._depart_time(row),
         )  # fmt: skip
 
     def with_goals(self, drafts: list[_Draft]) -> list[_Draft]:
@@ -376,147 +376,152 @@ class _FillCheck:
             for walk in (False, True)
         }
         known = [
-            one
-            for one in drafts
-            if one.goal is not None and 0 <= one.goal < names[one.category is Category.PEDESTRIAN]
+            draft
+            for draft in drafts
+            if draft.goal is not None
+            and 0 <= draft.goal < names[draft.category is Category.PEDESTRIAN]
         ]
         region.look_up(
-            (name_of(region.graph, NodePlace(walk, one.node)),
-             name_of(region.graph, NodePlace(walk, one.goal or 0)))
-            for one in known for walk in (one.category is Category.PEDESTRIAN,)
+            (name_of(region.graph, NodePlace(walk, draft.node)),
+             name_of(region.graph, NodePlace(walk, draft.goal or 0)))
+            for draft in known for walk in (draft.category is Category.PEDESTRIAN,)
         )  # fmt: skip
-        rows = {one.row for one in known}
-        for one in drafts:
-            walk = one.category is Category.PEDESTRIAN
-            if one.goal is None:
-                found.append(one)
-            elif one.row not in rows:
-                self._note(one.row, "opened", "goal", f"there is no node {one.goal}")
-                found.append(one._replace(goal=None))
-            elif region.leads(NodePlace(walk, one.node), NodePlace(walk, one.goal)):
-                found.append(one)
+        rows = {draft.row for draft in known}
+        for draft in drafts:
+            walk = draft.category is Category.PEDESTRIAN
+            if draft.goal is None:
+                found.append(draft)
+            elif draft.row not in rows:
+                self._note_remark(draft.row, "opened", "goal", f"there is no node {draft.goal}")
+                found.append(draft._replace(goal=None))
+            elif region.leads(NodePlace(walk, draft.node), NodePlace(walk, draft.goal)):
+                found.append(draft)
             else:
-                why = f"no path inside the region leads from node {one.node} to {one.goal}"
-                self._note(one.row, "opened", "goal", why)
-                found.append(one._replace(goal=None))
+                why = f"no path inside the region leads from node {draft.node} to {draft.goal}"
+                self._note_remark(draft.row, "opened", "goal", why)
+                found.append(draft._replace(goal=None))
         return found
 
     def with_safe_speeds(self, drafts: list[_Draft]) -> list[_Draft]:
         """Lower initial speeds so that everyone can stop behind the one ahead."""
         driving = [
-            one for one in drafts if one.category is not Category.PEDESTRIAN and one.depart == 0.0
+            draft
+            for draft in drafts
+            if draft.category is not Category.PEDESTRIAN and draft.depart == 0.0
         ]
         speeds = safe_speeds(
             self._region.graph.lanes,
-            nodes=[one.node for one in driving],
-            lengths=[self._request.bodies[one.category].length for one in driving],
-            speeds=[one.initial or 0.0 for one in driving],
+            nodes=[draft.node for draft in driving],
+            lengths=[self._request.bodies[draft.category].length for draft in driving],
+            speeds=[draft.initial or 0.0 for draft in driving],
         )
         safe = {one.row: speed for one, speed in zip(driving, speeds, strict=True)}
         found = []
-        for one in drafts:
-            speed = safe.get(one.row)
-            if one.initial is None or speed is None or speed >= one.initial:
-                found.append(one)
+        for draft in drafts:
+            speed = safe.get(draft.row)
+            if draft.initial is None or speed is None or speed >= draft.initial:
+                found.append(draft)
                 continue
             lowered = math.floor(speed * 100.0) / 100.0
-            why = f"{one.initial:g} m/s is too fast for the gap ahead; it departs with {lowered:g}"
-            self._note(one.row, "clamped", "initial_speed", why)
-            found.append(one._replace(initial=lowered))
+            why = (
+                f"{draft.initial:g} m/s is too fast for the gap ahead; it departs with {lowered:g}"
+            )
+            self._note_remark(draft.row, "clamped", "initial_speed", why)
+            found.append(draft._replace(initial=lowered))
         return found
 
-    def _category(self, row: int) -> Category | None:
+    def _category_of(self, row: int) -> Category | None:
         text = str(self._fill.category[row])
-        if text not in {str(one) for one in Category}:
-            self._note(row, "dropped", "category", f"there is no category {text!r}")
+        if text not in {str(category) for category in Category}:
+            self._note_remark(row, "dropped", "category", f"there is no category {text!r}")
             return None
         category = Category(text)
         if category not in self._request.allowed:
-            self._note(row, "dropped", "category", f"no {text} is wanted here")
+            self._note_remark(row, "dropped", "category", f"no {text} is wanted here")
             return None
         return category
 
-    def _problem(self, node: int, category: Category) -> str:
+    def _find_problem(self, node: int, category: Category) -> str:
         """Why a road user cannot be on a node, empty if it can."""
-        if not 0 <= node < len(self._graph(category).x):
+        if not 0 <= node < len(self._graph_for(category).x):
             return "it has no node" if node == NO_NODE else f"there is no node {node}"
         if not self._request.allowed[category][node]:
             walk = category is Category.PEDESTRIAN
             inside = (self._request.walks if walk else self._request.roads)[node]
             return f"node {node} {'has no room for it' if inside else 'is outside the region'}"
-        return f"node {node} is taken" if self._taken(node, category) else ""
+        return f"node {node} is taken" if self._is_taken(node, category) else ""
 
-    def _put(self, row: int, category: Category, node: int) -> tuple[int, Category, int]:
-        self._crowd.add(row, self._box(node, category))
+    def _put_user(self, row: int, category: Category, node: int) -> tuple[int, Category, int]:
+        self._crowd.add(row, self._body_box(node, category))
         return row, category, node
 
-    def _nearest(self, node: int, category: Category) -> int | None:
-        graph = self._graph(category)
+    def _nearest_free_node(self, node: int, category: Category) -> int | None:
+        graph = self._graph_for(category)
         if not 0 <= node < len(graph.x):
             return None
         away = np.hypot(graph.x - graph.x[node], graph.y - graph.y[node])
         near = np.flatnonzero(self._request.allowed[category] & (away <= MOST_MOVED))
         ordered = near[np.lexsort((near, away[near]))].tolist()
-        return next((one for one in ordered if not self._taken(one, category)), None)
+        return next((one for one in ordered if not self._is_taken(one, category)), None)
 
-    def _taken(self, node: int, category: Category) -> bool:
-        return not self._crowd.is_free(self._box(node, category))
+    def _is_taken(self, node: int, category: Category) -> bool:
+        return not self._crowd.is_free(self._body_box(node, category))
 
-    def _box(self, node: int, category: Category) -> Box:
-        return box_at(self._graph(category), node, self._request.bodies[category], gap=GAP)
+    def _body_box(self, node: int, category: Category) -> Box:
+        return box_at(self._graph_for(category), node, self._request.bodies[category], gap=GAP)
 
-    def _graph(self, category: Category) -> LaneGraph | PedestrianGraph:
+    def _graph_for(self, category: Category) -> LaneGraph | PedestrianGraph:
         graph = self._region.graph
         return graph.walks if category is Category.PEDESTRIAN else graph.lanes
 
-    def _limit(self, category: Category, node: int) -> float:
+    def _speed_limit_at(self, category: Category, node: int) -> float:
         if category is Category.PEDESTRIAN:
             return math.inf
         limit = float(self._region.graph.lanes.speed_limit[node])
         return limit if limit > 0.0 else math.inf
 
-    def _initial(self, row: int) -> float | None:
-        value = self._value(row, "initial_speed")
+    def _initial_speed(self, row: int) -> float | None:
+        value = self._value_of(row, "initial_speed")
         if value is None:
             return None
         if math.isinf(value):
-            self._note(row, "opened", "initial_speed", f"{value} m/s; it departs from rest")
+            self._note_remark(row, "opened", "initial_speed", f"{value} m/s; it departs from rest")
             return None
         return value
 
-    def _desired(self, row: int, category: Category) -> float | None:
-        value = self._value(row, "desired_speed")
+    def _desired_speed(self, row: int, category: Category) -> float | None:
+        value = self._value_of(row, "desired_speed")
         if value is None:
             return None
         low, high = SPEED_MIN[category], SPEED_MAX[category]
-        return self._clamp(row, "desired_speed", value, low, high)
+        return self._clamp_value(row, "desired_speed", value, low, high)
 
-    def _left(self, row: int, category: Category, node: int) -> float:
-        value = self._value(row, "lateral_offset")
+    def _lateral_offset(self, row: int, category: Category, node: int) -> float:
+        value = self._value_of(row, "lateral_offset")
         if value is None:
             return 0.0
-        graph = self._graph(category)
+        graph = self._graph_for(category)
         room = (float(graph.width[node]) - self._request.bodies[category].width) / 2.0 - LANE_MARGIN
         room = math.floor(max(room, 0.0) * 100.0) / 100.0
-        return self._clamp(row, "lateral_offset", value, -room, room)
+        return self._clamp_value(row, "lateral_offset", value, -room, room)
 
-    def _depart(self, row: int) -> float:
-        value = self._value(row, "depart")
-        return 0.0 if value is None else self._clamp(row, "depart", value, 0.0, LATEST)
+    def _depart_time(self, row: int) -> float:
+        value = self._value_of(row, "depart")
+        return 0.0 if value is None else self._clamp_value(row, "depart", value, 0.0, LATEST)
 
-    def _clamp(self, row: int, column: str, value: float, low: float, high: float) -> float:
+    def _clamp_value(self, row: int, column: str, value: float, low: float, high: float) -> float:
         kept = round(min(max(value, low), high), 2)
         if abs(kept - value) > 0.005 + 1e-9:
             why = f"{value:g} is not between {low:g} and {high:g}; it is {kept:g}"
-            self._note(row, "clamped", column, why)
+            self._note_remark(row, "clamped", column, why)
         return kept
 
-    def _value(self, row: int, column: str) -> float | None:
+    def _value_of(self, row: int, column: str) -> float | None:
         """What an optional column says; ``None`` where it leaves it open."""
         array: Array | None = getattr(self._fill, column)
         if array is None or math.isnan(value := float(array[row])):
             return None
         return value
 
-    def _note(self, row: int, what: str, column: str, why: str) -> None:
+    def _note_remark(self, row: int, what: str, column: str, why: str) -> None:
         self.remarks.append(FillRemark(row, what, column, why))

@@ -50,7 +50,7 @@ def read_arrays(path: Path) -> dict[str, Array]:
         array; names it.
     """
     arrays = arrays_from_npz(read_given(path, most=MOST_UNPACKED), file=str(path))
-    known = _format(arrays)
+    known = _format_and_version(arrays)
     if known is None:
         raise InputError("these are no arrays of a run or a scenario", file=str(path))
     if _KNOWN.get(known[0]) != known[1]:
@@ -61,7 +61,7 @@ def read_arrays(path: Path) -> dict[str, Array]:
     return arrays
 
 
-def _format(arrays: Mapping[str, Array]) -> tuple[str, int] | None:
+def _format_and_version(arrays: Mapping[str, Array]) -> tuple[str, int] | None:
     """Format and version that arrays say they are of."""
     try:
         about = json.loads(str(arrays["about"]))
@@ -94,7 +94,7 @@ def hetero_data(arrays: Mapping[str, Array]) -> Any:
     ModuleNotFoundError
         If torch or torch_geometric is not installed.
     """
-    if _format(arrays) == ("odscen-scenario-arrays", 1):
+    if _format_and_version(arrays) == ("odscen-scenario-arrays", 1):
         return scenario_hetero_data(arrays)
     return _run_data(arrays)
 
@@ -126,47 +126,51 @@ def _run_data(arrays: Mapping[str, Array]) -> Any:
     origin = arrays["node"][:, :2].mean(axis=0) if len(arrays["node"]) else np.zeros(2)
     data.origin = torch.from_numpy(origin)
     data.time = torch.from_numpy(arrays["time"])
-    for kind, pos, features in _nodes(arrays, origin):
+    for kind, pos, features in _node_features(arrays, origin):
         data[kind].pos = real(pos)
         data[kind].x = real(features)
-    data["agent"].state = real(_moved(arrays["agent_state"], origin))
+    data["agent"].state = real(_move_points(arrays["agent_state"], origin))
     data["agent"].valid = torch.from_numpy(arrays["agent_valid"])
     data["light"].color = torch.from_numpy(arrays["light_color"].astype(np.int64))
-    for ends, index, lengths in _edges(arrays):
+    for ends, index, lengths in _edge_features(arrays):
         data[ends].edge_index = torch.from_numpy(np.ascontiguousarray(index, dtype=np.int64))
         if lengths is not None:
             data[ends].edge_attr = real(lengths)
     return data
 
 
-def _moved(points: FloatArray, origin: FloatArray) -> FloatArray:
+def _move_points(points: FloatArray, origin: FloatArray) -> FloatArray:
     moved = points.copy()
     moved[..., :2] -= origin
     return moved
 
 
-def _nodes(
+def _node_features(
     arrays: Mapping[str, Array], origin: FloatArray
 ) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """Kind, positions (x, y, z) and features of nodes."""
     node, walk = arrays["node"], arrays["walk"]
     limit = np.nan_to_num(arrays["node_speed_limit"], nan=-1.0, posinf=-1.0)
     turned = np.column_stack([np.cos(node[:, 3]), np.sin(node[:, 3]), node[:, 4:], limit])
-    yield "node", _moved(node[:, :3], origin), turned
+    yield "node", _move_points(node[:, :3], origin), turned
     beside = np.column_stack([np.cos(walk[:, 3]), np.sin(walk[:, 3]), walk[:, 4]])
-    yield "walk", _moved(walk[:, :3], origin), beside
+    yield "walk", _move_points(walk[:, :3], origin), beside
     start = arrays["lane_point_start"]
     middle = arrays["lane_point"][(start[:-1] + start[1:]) // 2, :3]
     lane_limit = np.nan_to_num(arrays["lane_speed_limit"], nan=-1.0, posinf=-1.0)
-    yield "lane", _moved(middle, origin), np.column_stack([lane_limit, arrays["lane_in_junction"]])
+    yield (
+        "lane",
+        _move_points(middle, origin),
+        np.column_stack([lane_limit, arrays["lane_in_junction"]]),
+    )
     first = np.argmax(arrays["agent_valid"], axis=1)
     state = arrays["agent_state"][np.arange(len(first)), first]
     ego = arrays["agent_is_ego"][:, None]
-    yield "agent", _moved(state[:, :3], origin), np.hstack([arrays["agent_size"], ego])
-    yield "light", _moved(arrays["light_stop"], origin), arrays["light_color"][:, :1]
+    yield "agent", _move_points(state[:, :3], origin), np.hstack([arrays["agent_size"], ego])
+    yield "light", _move_points(arrays["light_stop"], origin), arrays["light_color"][:, :1]
 
 
-def _edges(
+def _edge_features(
     arrays: Mapping[str, Array],
 ) -> Iterator[tuple[tuple[str, str, str], Array, Array | None]]:
     """Kind, ends and lengths of edges."""

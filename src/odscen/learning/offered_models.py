@@ -50,7 +50,7 @@ def named_object(name: str, *, group: str, what: str, shipped: str) -> Any:
 def _entry_point(name: str, *, group: str, what: str, shipped: str) -> Any:
     points = [*entry_points(group=group, name=name)]
     if not points:
-        known = sorted(one.name for one in entry_points(group=group))
+        known = sorted(entry_point.name for entry_point in entry_points(group=group))
         offered = (
             f"installed packages offer {', '.join(known)}"
             if known
@@ -90,15 +90,18 @@ class OfferedModel(NamedTuple):
 def installed_names(group: str, shipped: Iterable[str]) -> list[str]:
     """Names of those that ship, and of entry points of a group after them."""
     first = [*shipped]
-    return [*first, *sorted({one.name for one in entry_points(group=group)} - {*first})]
+    return [
+        *first,
+        *sorted({entry_point.name for entry_point in entry_points(group=group)} - {*first}),
+    ]
 
 
 def offered_models(names: Iterable[str], find: Callable[[str], Any]) -> tuple[OfferedModel, ...]:
     """What those of some names say of themselves; ``find`` returns the class of a name."""
-    return tuple(_offered(name, find) for name in names)
+    return tuple(_describe_model(name, find) for name in names)
 
 
-def _offered(name: str, find: Callable[[str], Any]) -> OfferedModel:
+def _describe_model(name: str, find: Callable[[str], Any]) -> OfferedModel:
     try:
         found = find(name)
         summary = (inspect.getdoc(found) or "").partition("\n")[0]

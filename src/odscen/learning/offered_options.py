@@ -83,8 +83,10 @@ def options_of(made_by: Any) -> tuple[OfferedOption, ...]:
     said: Any = getattr(made_by, "options", None)
     if not _is_offer(said):
         some = fields(made_by) if is_dataclass(made_by) else ()
-        schemas = {one.name: one.metadata[_SCHEMA] for one in some if _SCHEMA in one.metadata}
-        return tuple(_option(name, schema) for name, schema in schemas.items())
+        schemas = {
+            field.name: field.metadata[_SCHEMA] for field in some if _SCHEMA in field.metadata
+        }
+        return tuple(_read_option(name, schema) for name, schema in schemas.items())
     try:
         schema = said.model_json_schema() if hasattr(said, "model_json_schema") else said
     except Exception as error:  # whatever code from outside may raise
@@ -94,7 +96,7 @@ def options_of(made_by: Any) -> tuple[OfferedOption, ...]:
         raise InputError(
             "its `options` are no JSON Schema with `properties`, and no pydantic model"
         )
-    return tuple(_option(str(name), one) for name, one in properties.items())
+    return tuple(_read_option(str(name), one) for name, one in properties.items())
 
 
 def option_values(
@@ -107,7 +109,7 @@ def option_values(
     InputError
         If there is no such option, a value is not possible, or one is missing.
     """
-    known = {one.name: one for one in options}
+    known = {option.name: option for option in options}
     for name in given:
         if name not in known:
             offered = f"there are {', '.join(known)}" if known else "it has none"
@@ -117,7 +119,7 @@ def option_values(
         value = given.get(name, one.usual)
         if value is None:
             raise InputError(f"option {name!r} has to be given: {_CALLED[one.kind]}")
-        found[name] = _checked(one, value)
+        found[name] = _check_value(one, value)
     return found
 
 
@@ -142,7 +144,7 @@ def values_for(
     is_class = isinstance(found, type)
     try:
         options = options_of(found) if is_class else ()
-        known = {one.name for one in options}
+        known = {option.name for option in options}
         left = {key for key in given if key not in known} if others and is_class else set()
         checked = option_values(options, {key: v for key, v in given.items() if key not in left})
     except InputError as error:
@@ -157,17 +159,17 @@ def _is_offer(said: Any) -> bool:
         return hasattr(said, "model_json_schema")
     if "properties" in said or "$schema" in said or said.get("type") == "object":
         return True
-    return any(isinstance(one, dict) and one.get("type") in _KINDS for one in said.values())
+    return any(isinstance(row, dict) and row.get("type") in _KINDS for row in said.values())
 
 
-def _option(name: str, schema: Any) -> OfferedOption:
+def _read_option(name: str, schema: Any) -> OfferedOption:
     kind = schema.get("type") if isinstance(schema, dict) else None
     choices = schema.get("enum", ()) if isinstance(schema, dict) else ()
-    texts = isinstance(choices, list | tuple) and all(isinstance(one, str) for one in choices)
+    texts = isinstance(choices, list | tuple) and all(isinstance(choice, str) for choice in choices)
     if kind not in _KINDS or not texts or len(choices) > _MOST or (choices and kind != "string"):
         raise InputError(f"option {name!r} is not one of {', '.join(_KINDS)}; an enum has texts")
     bounds = [schema.get("minimum"), schema.get("maximum")]
-    if not all(one is None or _is_number(one) for one in bounds):
+    if not all(bound is None or _is_number(bound) for bound in bounds):
         raise InputError(f"bounds of option {name!r} are no numbers: {bounds}")
     option = OfferedOption(
         name=name,
@@ -180,10 +182,10 @@ def _option(name: str, schema: Any) -> OfferedOption:
         choices=tuple(choices),
     )
     usual = schema.get("default")
-    return option if usual is None else option._replace(usual=_checked(option, usual))
+    return option if usual is None else option._replace(usual=_check_value(option, usual))
 
 
-def _checked(option: OfferedOption, value: Any) -> OptionValue:
+def _check_value(option: OfferedOption, value: Any) -> OptionValue:
     """Return a value as it is given to the class."""
     name, kind = option.name, option.kind
     fits = {

@@ -25,7 +25,7 @@ TABLES = {
     "actor": "actor_id", "flow": "flow_id",
 }  # fmt: skip
 """Node types, and an array with a value for each of their nodes."""
-_PREFIXES = {one: f"{one}_" for one in TABLES} | {"walk": "walk_node_"}
+_PREFIXES = {name: f"{name}_" for name in TABLES} | {"walk": "walk_node_"}
 _DERIVED = frozenset({"pos", "x", "edge_index", "edge_attr", "origin", "num_nodes"})
 _CATEGORIES = 7
 _PEDESTRIAN = 6
@@ -45,17 +45,17 @@ def scenario_hetero_data(arrays: Mapping[str, Array]) -> Any:
     places = np.column_stack([arrays["node_x"], arrays["node_y"], arrays["node_z"]])
     origin = places[:, :2].mean(axis=0) if len(places) else np.zeros(2)
     data.origin = torch.from_numpy(origin)
-    for kind, (position, features) in _nodes(arrays, places).items():
+    for kind, (position, features) in _node_features(arrays, places).items():
         data[kind].x = real(features)
         if position is not None:
             data[kind].pos = real(position - np.append(origin, 0.0))
-    for ends, index, lengths in _edges(arrays):
+    for ends, index, lengths in _edge_features(arrays):
         data[ends].edge_index = torch.from_numpy(np.ascontiguousarray(index, dtype=np.int64))
         if lengths is not None:
             data[ends].edge_attr = real(lengths[:, None])
     for name, values in arrays.items():
         store = _store_of(name, values, arrays)
-        (data if store is None else data[store])[name] = _carried(values, torch)
+        (data if store is None else data[store])[name] = _to_tensor(values, torch)
     return data
 
 
@@ -69,17 +69,17 @@ def scenario_arrays_of(data: Any) -> dict[str, Array]:
     for store in data.stores:
         for name, value in store.items():
             if name not in _DERIVED:
-                found[name] = _brought(value)
+                found[name] = _from_tensor(value)
     return found
 
 
-def _carried(values: Array, torch: Any) -> Any:
+def _to_tensor(values: Array, torch: Any) -> Any:
     if values.dtype.kind == "U":
         return values.tolist()  # of no dimension it is a text, else a list of texts
     return torch.from_numpy(values.copy())
 
 
-def _brought(value: Any) -> Array:
+def _from_tensor(value: Any) -> Array:
     if isinstance(value, list):
         return np.array(value, dtype=np.str_) if value else np.empty(0, dtype="<U1")
     return np.array(value) if isinstance(value, str) else np.asarray(value.numpy())
@@ -93,16 +93,16 @@ def _store_of(name: str, values: Array, arrays: Mapping[str, Array]) -> str | No
     return None
 
 
-def _nodes(
+def _node_features(
     arrays: Mapping[str, Array], places: FloatArray
 ) -> dict[str, tuple[FloatArray | None, FloatArray]]:
     """Positions (x, y, z, m) and features of each node type."""
     walks = np.column_stack([arrays[f"walk_node_{axis}"] for axis in "xyz"])
     inside = np.isin(np.arange(len(arrays["segment_ids"])), arrays["roi"])
     return {
-        "node": (places, _features(arrays, "node_", _ROAD_COLUMNS)),
-        "walk": (walks, _features(arrays, "walk_node_", ("width",))),
-        "lane": (None, _stacked(arrays, "lane_", ("lengths", "forward", "in_junction"))),
+        "node": (places, _pose_features(arrays, "node_", _ROAD_COLUMNS)),
+        "walk": (walks, _pose_features(arrays, "walk_node_", ("width",))),
+        "lane": (None, _stack_columns(arrays, "lane_", ("lengths", "forward", "in_junction"))),
         "segment": (
             None,
             np.column_stack(
@@ -110,13 +110,13 @@ def _nodes(
             ),
         ),
         "actor": (
-            _starts(arrays, "actor", _walkers(arrays, "actor"), places, walks),
+            _start_places(arrays, "actor", _mask_of_walkers(arrays, "actor"), places, walks),
             np.column_stack([_one_hot(arrays["actor_category"]), _actor_numbers(arrays)]),
         ),
         "flow": (
-            _starts(arrays, "flow", _walkers(arrays, "flow"), places, walks),
+            _start_places(arrays, "flow", _mask_of_walkers(arrays, "flow"), places, walks),
             np.column_stack(
-                [arrays["flow_mix"], _stacked(arrays, "flow_", ("per_hour", "begin", "end"))]
+                [arrays["flow_mix"], _stack_columns(arrays, "flow_", ("per_hour", "begin", "end"))]
             ),
         ),
     }
@@ -124,15 +124,19 @@ def _nodes(
 
 def _actor_numbers(arrays: Mapping[str, Array]) -> FloatArray:
     columns = ("speed", "initial_speed", "lateral_offset", "depart", "ego")
-    return _stacked(arrays, "actor_", columns)
+    return _stack_columns(arrays, "actor_", columns)
 
 
-def _features(arrays: Mapping[str, Array], prefix: str, columns: tuple[str, ...]) -> FloatArray:
+def _pose_features(
+    arrays: Mapping[str, Array], prefix: str, columns: tuple[str, ...]
+) -> FloatArray:
     hdg = arrays[f"{prefix}hdg"]
-    return np.column_stack([np.cos(hdg), np.sin(hdg), _stacked(arrays, prefix, columns)])
+    return np.column_stack([np.cos(hdg), np.sin(hdg), _stack_columns(arrays, prefix, columns)])
 
 
-def _stacked(arrays: Mapping[str, Array], prefix: str, columns: tuple[str, ...]) -> FloatArray:
+def _stack_columns(
+    arrays: Mapping[str, Array], prefix: str, columns: tuple[str, ...]
+) -> FloatArray:
     """Columns side by side, -1 for what is not known or open."""
     values = np.column_stack([arrays[prefix + name].astype(np.float64) for name in columns])
     return np.nan_to_num(values, nan=-1.0, posinf=-1.0)
@@ -142,7 +146,7 @@ def _one_hot(category: Array) -> FloatArray:
     return np.eye(_CATEGORIES)[category.astype(np.int64)]
 
 
-def _walkers(arrays: Mapping[str, Array], table: str) -> BoolArray:
+def _mask_of_walkers(arrays: Mapping[str, Array], table: str) -> BoolArray:
     """Whose nodes are of the pedestrian graph."""
     if table == "flow":
         return arrays["flow_on_foot"]
@@ -150,7 +154,7 @@ def _walkers(arrays: Mapping[str, Array], table: str) -> BoolArray:
     return found
 
 
-def _starts(
+def _start_places(
     arrays: Mapping[str, Array], table: str, on_foot: BoolArray, roads: Array, walks: Array
 ) -> FloatArray:
     """Where each starts; the origin of the map for those whose start has no node."""
@@ -162,7 +166,7 @@ def _starts(
     return found
 
 
-def _edges(arrays: Mapping[str, Array]) -> Iterator[tuple[Ends, Array, Array | None]]:
+def _edge_features(arrays: Mapping[str, Array]) -> Iterator[tuple[Ends, Array, Array | None]]:
     """Kind, ends and lengths of edges."""
     pairs = np.stack([arrays["edge_source"], arrays["edge_target"]])
     for relation in Relation:
@@ -175,19 +179,19 @@ def _edges(arrays: Mapping[str, Array]) -> Iterator[tuple[Ends, Array, Array | N
         both = np.concatenate([walks[:, own], walks[::-1, own]], axis=1)
         length = arrays["walk_edge_length"][own]
         yield ("walk", walk_kind.name.lower(), "walk"), both, np.concatenate([length, length])
-    yield ("node", "in", "segment"), _numbered(arrays["node_segment"]), None
-    yield ("walk", "in", "segment"), _numbered(arrays["walk_node_segment"]), None
-    yield ("node", "on", "lane"), _numbered(arrays["node_lane"]), None
+    yield ("node", "in", "segment"), _number_rows(arrays["node_segment"]), None
+    yield ("walk", "in", "segment"), _number_rows(arrays["walk_node_segment"]), None
+    yield ("node", "on", "lane"), _number_rows(arrays["node_lane"]), None
     beside = arrays["segment_adjacency"].T
     yield ("segment", "beside", "segment"), np.concatenate([beside, beside[::-1]], axis=1), None
     for table in ("actor", "flow"):
-        on_foot = _walkers(arrays, table)
+        on_foot = _mask_of_walkers(arrays, table)
         for word, column in (("starts_at", "node"), ("goes_to", "goal")):
-            ends = _numbered(arrays[f"{table}_{column}"])
+            ends = _number_rows(arrays[f"{table}_{column}"])
             known = ends[1] >= 0
             yield (table, word, "node"), ends[:, known & ~on_foot], None
             yield (table, word, "walk"), ends[:, known & on_foot], None
 
 
-def _numbered(rows: Array) -> Array:
+def _number_rows(rows: Array) -> Array:
     return np.stack([np.arange(len(rows)), rows])

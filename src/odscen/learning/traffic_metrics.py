@@ -119,7 +119,7 @@ def place_binned(
                 break
             odds = statistics.categories[bins[place]] * allowed[:, place]
             kind_of = int(rng.choice(len(odds), p=odds / odds.sum()))
-            if _free(site, place, kind_of, chosen, lengths):
+            if _is_free(site, place, kind_of, chosen, lengths):
                 chosen[place] = kind_of
     nodes = np.array(list(chosen), dtype=np.int64)
     category = np.array(list(chosen.values()), dtype=np.int64)
@@ -132,7 +132,7 @@ def place_binned(
     return PlacedTraffic(nodes, category, speed)
 
 
-def _free(
+def _is_free(
     site: Site, node: int, category: int, chosen: dict[int, int], lengths: FloatArray
 ) -> bool:
     """Whether no vehicle on the same lane overlaps; nodes of a lane follow each other."""
@@ -253,7 +253,7 @@ def frechet_distance(reference: FloatArray, other: FloatArray) -> float:
     """Frechet distance of two sets of rows, standardised by the reference."""
     from scipy.linalg import sqrtm
 
-    one, two = _standardised(reference, other)
+    one, two = _standardize_rows(reference, other)
     means = one.mean(axis=0) - two.mean(axis=0)
     first, second = np.cov(one.T), np.cov(two.T)
     root = np.real(sqrtm(first @ second + _WIDE * np.eye(len(first))))
@@ -264,7 +264,7 @@ def mean_discrepancy(reference: FloatArray, other: FloatArray) -> float:
     """Squared maximum mean discrepancy of two sets of rows, standardised by the reference."""
     from scipy.spatial.distance import cdist
 
-    one, two = (_thinned(rows) for rows in _standardised(reference, other))
+    one, two = (_thin_rows(rows) for rows in _standardize_rows(reference, other))
     squares = cdist(one, one, "sqeuclidean")
     width = max(float(np.median(squares[squares > 0])) if np.any(squares > 0) else 1.0, _WIDE)
     within, other_within, between = (
@@ -287,7 +287,7 @@ def divergence(reference: FloatArray, other: FloatArray, bounds: FloatArray) -> 
             return float("nan")
         shares.append(counts / counts.sum())
     middle = (shares[0] + shares[1]) / 2.0
-    return float(sum(_entropy_to(one, middle) for one in shares) / 2.0)
+    return float(sum(_entropy_to(share, middle) for share in shares) / 2.0)
 
 
 GAP_BINS = np.concatenate([[-1.0], np.linspace(0.0, 20.0, 11), np.linspace(30.0, 150.0, 7)])
@@ -373,7 +373,7 @@ def interval(
     return float(low), float(high)
 
 
-def _standardised(reference: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _standardize_rows(reference: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
     mean, spread = reference.mean(axis=0), reference.std(axis=0)
     # A feature that does not vary in the reference would otherwise count without bounds.
     spread = np.where(spread > _SMALLEST, spread, 1.0)
@@ -383,7 +383,7 @@ def _standardised(reference: FloatArray, other: FloatArray) -> tuple[FloatArray,
 _SMALLEST = 1e-3
 
 
-def _thinned(rows: FloatArray) -> FloatArray:
+def _thin_rows(rows: FloatArray) -> FloatArray:
     if len(rows) <= MOST_ROWS:
         return rows
     return rows[np.linspace(0, len(rows) - 1, MOST_ROWS).astype(np.int64)]

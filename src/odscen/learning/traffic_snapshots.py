@@ -125,17 +125,19 @@ def shard_bytes(
     some = shard.snapshots
     head = {"map": shard.map_name, "sha256": shard.map_sha256, "town": shard.town}
     text = json.dumps({"version": VERSION, **head, "about": shard.about}, sort_keys=True)
-    lit = _lit(some)
+    lit = _lanes_with_lights(some)
     arrays: dict[str, Any] = {
         "about": np.array([text]),
-        "count": np.array([len(one.node) for one in some], dtype=np.int64),
+        "count": np.array([len(snapshot.node) for snapshot in some], dtype=np.int64),
         "lanes": np.array([len(some[0].lights.state) if some else 0], dtype=np.int64),
         "light_lane": lit,
-        "light_state": np.array([one.lights.state[lit] for one in some], dtype=np.uint8),
-        "light_since": np.array([one.lights.since[lit] for one in some], dtype=np.float32),
+        "light_state": np.array([snapshot.lights.state[lit] for snapshot in some], dtype=np.uint8),
+        "light_since": np.array(
+            [snapshot.lights.since[lit] for snapshot in some], dtype=np.float32
+        ),
     }
     for name, kind in _COLUMNS.items():
-        values = [getattr(one, name) for one in some]
+        values = [getattr(snapshot, name) for snapshot in some]
         small = np.int32 if kind is np.int64 else np.float32
         arrays[name] = np.concatenate([*values, np.empty(0)]).astype(small)
     for name, columns in (("queue", queues), ("signal", ahead)):
@@ -163,7 +165,7 @@ def shard_from_bytes(data: bytes, *, file: str) -> Shard:
                 f"version is {about['version']}; this odscen reads {VERSION}", file=file
             )
         return Shard(
-            about["map"], about["sha256"], about["town"], about["about"], _snapshots(arrays)
+            about["map"], about["sha256"], about["town"], about["about"], _read_snapshots(arrays)
         )
     except (
         zipfile.BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError, TypeError,
@@ -172,15 +174,15 @@ def shard_from_bytes(data: bytes, *, file: str) -> Shard:
         raise InputError(f"it is no shard of snapshots: {error}", file=file) from error
 
 
-def _lit(snapshots: tuple[Snapshot, ...]) -> IntArray:
+def _lanes_with_lights(snapshots: tuple[Snapshot, ...]) -> IntArray:
     """Lanes that have a light at the end in any of the snapshots."""
     if not snapshots:
         return np.empty(0, dtype=np.int64)
-    shown = np.any([one.lights.state != SignalAhead.NONE for one in snapshots], axis=0)
+    shown = np.any([snapshot.lights.state != SignalAhead.NONE for snapshot in snapshots], axis=0)
     return np.flatnonzero(shown)
 
 
-def _snapshots(arrays: dict[str, Any]) -> tuple[Snapshot, ...]:
+def _read_snapshots(arrays: dict[str, Any]) -> tuple[Snapshot, ...]:
     ends = np.cumsum(arrays["count"]).tolist()
     found = []
     for row, (start, end) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):

@@ -93,15 +93,15 @@ class Allowance(NamedTuple):
             ``memory``, ``time``, ``wall`` or ``output``.
         """
         problem = {
-            "memory": f"{what} needs more than {_gigabytes(self.memory)} GB of memory",
+            "memory": f"{what} needs more than {_format_gigabytes(self.memory)} GB of memory",
             "time": f"{what} needs more than {self.seconds:.3g} s of computing time",
             "wall": f"{what} did not end within {self.wall_seconds:.3g} s",
-            "output": f"{what} makes a file of more than {_gigabytes(self.output)} GB",
+            "output": f"{what} makes a file of more than {_format_gigabytes(self.output)} GB",
         }[limit]
         if not self.raise_it:
             return LimitError(f"{problem}; that is the limit for a file of its size")
         if limit in ("memory", "output"):
-            more = _gigabytes(2 * self.memory)
+            more = _format_gigabytes(2 * self.memory)
             hint = f"--build-memory {more} (GB), or {MEMORY_VARIABLE}={more}"
         else:
             more = f"{2 * self.seconds / 60.0:.2g}"
@@ -219,5 +219,5 @@ def _too_little(name: str, value: float) -> str:
     return f"{least}: the libraries need most of that before they read anything"
 
 
-def _gigabytes(count: int) -> str:
+def _format_gigabytes(count: int) -> str:
     return f"{count / 1e9:.2f}" if count < 9.95e9 else f"{count / 1e9:.0f}"

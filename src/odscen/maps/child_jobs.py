@@ -21,7 +21,7 @@ from odscen.maps.map_entry import XODR_FILE
 Progress = Callable[[str, float], None]
 
 
-def _map(
+def _build_map_job(
     *,
     folder: str,
     name: str,
@@ -66,7 +66,7 @@ def _map(
     return {"content": imported.original if imported else XODR_FILE}
 
 
-def _scenario(*, path: str, file: str | None, progress: Progress) -> Mapping[str, Any]:
+def _read_scenario_job(*, path: str, file: str | None, progress: Progress) -> Mapping[str, Any]:
     """Read a scenario in any form, and write its document over it."""
     from odscen.scenario.document.json_form import dumps
     from odscen.scenario.forms.any_form import read_any
@@ -77,4 +77,7 @@ def _scenario(*, path: str, file: str | None, progress: Progress) -> Mapping[str
     return {}
 
 
-JOBS: Mapping[str, Callable[..., Mapping[str, Any]]] = {"map": _map, "scenario": _scenario}
+JOBS: Mapping[str, Callable[..., Mapping[str, Any]]] = {
+    "map": _build_map_job,
+    "scenario": _read_scenario_job,
+}

@@ -93,7 +93,7 @@ def work_in_child(
         "seconds": allowance.seconds,
         "output": allowance.output,
     }
-    child = _taken()
+    child = _take_child()
     try:
         tell = progress or (lambda _what, _share: None)
         answer = child.ask(request, tell, seconds=allowance.wall_seconds)
@@ -113,7 +113,7 @@ def work_in_child(
 
 def keep_ready() -> None:
     """Have a child wait for work, so that the first file does not wait for its imports."""
-    _give_back(_taken())
+    _give_back(_take_child())
 
 
 class _Child:
@@ -152,7 +152,7 @@ class _Child:
             self._stdin.flush()
         deadline = time.monotonic() + seconds
         told: tuple[str, float] = ("starting", 0.0)
-        for message in self._messages():
+        for message in self._read_messages():
             if "progress" in message:
                 told = message["progress"][0], message["progress"][1]
             elif message:
@@ -162,7 +162,7 @@ class _Child:
                 return {"limit": "wall"}
         return {"died": True}
 
-    def _messages(self) -> Iterator[dict[str, Any]]:
+    def _read_messages(self) -> Iterator[dict[str, Any]]:
         """What it says until it dies, and nothing whenever it says nothing for a moment."""
         received = b""
         with selectors.DefaultSelector() as selector:
@@ -206,7 +206,7 @@ _waiting: list[_Child] = []
 _foreign: list[_Child] = []
 
 
-def _taken() -> _Child:
+def _take_child() -> _Child:
     """A child that waits for work, or a new one."""
     with _lock:
         while _waiting:

@@ -43,7 +43,7 @@ class _Jobs:
     def __init__(self) -> None:
         self._asked: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._folders: tuple[str, ...] = ()
-        threading.Thread(target=self._listen, daemon=True).start()
+        threading.Thread(target=self._listen_for_end, daemon=True).start()
 
     def next(self) -> dict[str, Any]:
         """Wait for a job."""
@@ -53,17 +53,17 @@ class _Jobs:
         """Forget the folders of the job: they are no longer this process's."""
         self._folders = ()
 
-    def _listen(self) -> None:
+    def _listen_for_end(self) -> None:
         for line in sys.stdin.buffer:
             job = json.loads(line)
             self._folders = tuple(job["folders"])
             self._asked.put(job)
         for folder in self._folders:
-            _remove(Path(folder))
+            _remove_folder(Path(folder))
         os.killpg(0, signal.SIGKILL)  # with whatever the job has started
 
 
-def _remove(folder: Path) -> None:
+def _remove_folder(folder: Path) -> None:
     """Remove a folder that the other thread may still write into: under its name it finds none."""
     gone = folder.with_name(f"{folder.name}-ended")
     with suppress(OSError):
@@ -87,19 +87,19 @@ def main() -> None:
 
     while True:
         job = jobs.next()
-        answer = _answer(JOBS.get(job["name"]) or _found(job["name"]), job, say)
+        answer = _answer_job(JOBS.get(job["name"]) or _find_job(job["name"]), job, say)
         jobs.finished()
-        say({**answer, "peak": _peak()})
+        say({**answer, "peak": _peak_memory()})
 
 
-def _found(name: str) -> Callable[..., Mapping[str, Any]]:
+def _find_job(name: str) -> Callable[..., Mapping[str, Any]]:
     """A job that is not in the list of this room, as ``module:function``."""
     module, function = name.split(":")
     work: Callable[..., Mapping[str, Any]] = getattr(import_module(module), function)
     return work
 
 
-def _answer(
+def _answer_job(
     work: Callable[..., Mapping[str, Any]], job: Mapping[str, Any], say: Say
 ) -> dict[str, Any]:
     """Do the work within its limits; what there is to say of its end."""
@@ -111,10 +111,10 @@ def _answer(
     tempfile.tempdir = job["folders"][0]
     try:
         try:
-            _limit(job["memory"], job["seconds"], job["output"])
+            _limit_process(job["memory"], job["seconds"], job["output"])
             return {"done": dict(work(progress=progress, **job["arguments"]))}
         finally:
-            _unlimited()  # to tell what has happened needs some memory too
+            _lift_limits()  # to tell what has happened needs some memory too
     except (MemoryError, LimitError):
         return {"limit": "memory"}
     except OdscenError as error:
@@ -134,7 +134,7 @@ def _answer(
         return {"fault": f"{lines[-1].strip()} ({where})"}
 
 
-def _limit(memory: int, seconds: float, output: int) -> None:
+def _limit_process(memory: int, seconds: float, output: int) -> None:
     """Limit what this process may use from now on; a limit that it has already may be lower.
 
     Only the soft limits: programs that the work starts have limits of their own.
@@ -149,7 +149,7 @@ def _limit(memory: int, seconds: float, output: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _unlimited() -> None:
+def _lift_limits() -> None:
     import resource
 
     for name in _RESOURCES_LIMITED:
@@ -166,7 +166,7 @@ def _set_soft(which: int, wish: int) -> None:
         resource.setrlimit(which, (wish, hard))
 
 
-def _peak() -> int:
+def _peak_memory() -> int:
     """Bytes of memory that this process has had at most."""
     with suppress(OSError, ValueError, IndexError):
         # What the system says of usage has on Linux what the parent had when it started this.

@@ -49,13 +49,13 @@ def converted(converter: ConverterName | None, source: MapInput) -> SumoNetwork:
     return CONVERTERS[converter or "odscen"](source)
 
 
-def _own(source: MapInput) -> SumoNetwork:
+def _convert_own(source: MapInput) -> SumoNetwork:
     from odscen.convert.building.network import build_network
 
     return build_network(source.odr, source.table, source.walks)
 
 
-def _netconvert(source: MapInput) -> SumoNetwork:
+def _convert_by_netconvert(source: MapInput) -> SumoNetwork:
     from odscen.convert.imported.imported_network import imported_network, unread_signs
     from odscen.maps.netconvert import convert_map
 
@@ -64,7 +64,7 @@ def _netconvert(source: MapInput) -> SumoNetwork:
     return imported_network(net_xml, source.odr, source.table, source.walks, entries=entries)
 
 
-def _given(source: MapInput) -> SumoNetwork:
+def _use_given_network(source: MapInput) -> SumoNetwork:
     from odscen.convert.imported.imported_network import imported_network
 
     if source.given is None:
@@ -76,7 +76,7 @@ def _given(source: MapInput) -> SumoNetwork:
 
 
 CONVERTERS: Mapping[ConverterName, Callable[[MapInput], SumoNetwork]] = {
-    "odscen": _own,
-    "netconvert": _netconvert,
-    "file": _given,
+    "odscen": _convert_own,
+    "netconvert": _convert_by_netconvert,
+    "file": _use_given_network,
 }

@@ -132,7 +132,7 @@ def build_map(
             "sha256": hashlib.sha256(network.net_xml).hexdigest(),
         },
         "sumo": {"net_file": FILES["net"], **network.table.counts},
-        "lights": [_light(light) for light in network.table.lights],
+        "lights": [_describe_light(light) for light in network.table.lights],
         "files": FILES if imported is None else {**FILES, "original": imported.original},
         "semantics": map_semantics(odr, table),
         "report": report.to_dict(),
@@ -144,7 +144,7 @@ def build_map(
     progress("done", 1.0)
 
 
-def _light(light: SumoLight) -> dict[str, Any]:
+def _describe_light(light: SumoLight) -> dict[str, Any]:
     """A traffic light, as scenarios name and time it."""
     return {
         "id": light.id,

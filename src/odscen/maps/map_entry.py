@@ -56,14 +56,14 @@ class MapEntry:
 
     def __eq__(self, other: object) -> bool:
         """Equal if it is the same build of the same map."""
-        return isinstance(other, MapEntry) and self._key == other._key
+        return isinstance(other, MapEntry) and self._cache_key == other._cache_key
 
     def __hash__(self) -> int:
         """Hash of the same."""
-        return hash(self._key)
+        return hash(self._cache_key)
 
     @property
-    def _key(self) -> tuple[Path, str, float, str, str]:
+    def _cache_key(self) -> tuple[Path, str, float, str, str]:
         return self.folder, self.sha256, self.info["spacing"], self.info["builder"], self.net_sha256
 
     @property
@@ -121,24 +121,24 @@ class MapEntry:
         """
         name = str(self.info["files"][key])
         with repair_advice(self.name):
-            return read_checked(self.folder, name, self._sums())
+            return read_checked(self.folder, name, self._checksums())
 
     def checked(self, key: str) -> Path:
         """Path of one of its files, for others to read; errors as of :meth:`read`."""
         name = str(self.info["files"][key])
         with repair_advice(self.name):
-            if name in (sums := self._sums()):
+            if name in (sums := self._checksums()):
                 refuse_damaged(self.folder, {name: sums[name]})
         return self.path(key)
 
     def damaged(self) -> list[DamagedFile]:
         """Its files that are not as they were written."""
         try:
-            return damaged_files(self.folder, self._sums())
+            return damaged_files(self.folder, self._checksums())
         except DamagedError as error:
             return list(error.files)
 
-    def _sums(self) -> dict[str, str]:
+    def _checksums(self) -> dict[str, str]:
         """Checksums of its files; of a map by an earlier version only those it knows itself."""
         sums = read_sums(self.folder)
         if sums is None:

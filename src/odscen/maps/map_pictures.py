@@ -44,7 +44,7 @@ def draw_map(
     graph = entry.graph() if with_graph or with_segments else None
     statistics = entry.statistics()
     svg = render_drawing(entry.drawing(), statistics=statistics, graph=graph, options=options)
-    _write(svg, out, width=width)
+    _write_picture(svg, out, width=width)
 
 
 def draw_fidelity(entry: MapEntry, fidelity: Fidelity, out: Path, *, width: int = 2400) -> None:
@@ -57,12 +57,12 @@ def draw_fidelity(entry: MapEntry, fidelity: Fidelity, out: Path, *, width: int 
     """
     _check_ending(out)
     svg = render_drawing(
-        entry.drawing(), statistics=entry.statistics(), marks=_departures(fidelity)
+        entry.drawing(), statistics=entry.statistics(), marks=_marks_of_departures(fidelity)
     )
-    _write(svg, out, width=width)
+    _write_picture(svg, out, width=width)
 
 
-def _departures(fidelity: Fidelity) -> list[PlaceMarks]:
+def _marks_of_departures(fidelity: Fidelity) -> list[PlaceMarks]:
     kinds: tuple[tuple[str, str, Sequence[_Placed]], ...] = (
         ("Lane not covered", "#d7263d", fidelity.gaps),
         ("Lane aside", "#b832c7", [far for far in fidelity.far_places if far.metres > NEAR]),
@@ -87,7 +87,7 @@ def _check_ending(out: Path) -> None:
         )
 
 
-def _write(svg: str, out: Path, *, width: int) -> None:
+def _write_picture(svg: str, out: Path, *, width: int) -> None:
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         if out.suffix.lower() == ".png":

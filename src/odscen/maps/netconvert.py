@@ -116,7 +116,7 @@ def run_netconvert(
     MissingDependencyError
         If SUMO is not installed.
     """
-    program, environment = _program()
+    program, environment = _find_program()
     with scratch_folder() as folder:
         for file, content in files.items():
             (folder / file).write_bytes(content)
@@ -129,16 +129,16 @@ def run_netconvert(
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
         ) as process:
-            _limit(process.pid, limits)
-            said = _waited(process, limits.seconds)
-        messages = _messages(said)
+            _limit_child(process.pid, limits)
+            said = _wait_for_output(process, limits.seconds)
+        messages = _clean_messages(said)
         if process.returncode != 0 or not output.is_file():
-            problem = _problem(process.returncode, messages, limits)
+            problem = _describe_problem(process.returncode, messages, limits)
             raise ToolError(problem, output="\n".join(messages))
         return NetconvertOutput(_HEADER.sub(b"", output.read_bytes(), count=1), messages)
 
 
-def _waited(process: subprocess.Popen[bytes], seconds: float) -> bytes:
+def _wait_for_output(process: subprocess.Popen[bytes], seconds: float) -> bytes:
     try:
         said, _ = process.communicate(timeout=_PATIENCE * seconds)
     except subprocess.TimeoutExpired as error:
@@ -146,12 +146,12 @@ def _waited(process: subprocess.Popen[bytes], seconds: float) -> bytes:
         said, _ = process.communicate()
         raise ToolError(
             f"netconvert did not finish within {_PATIENCE * seconds:g} s",
-            output="\n".join(_messages(said)),
+            output="\n".join(_clean_messages(said)),
         ) from error
     return said
 
 
-def _program() -> tuple[Path, dict[str, str]]:
+def _find_program() -> tuple[Path, dict[str, str]]:
     """Find netconvert of the ``eclipse-sumo`` package, and make its environment.
 
     One thread, because the algebra library that comes with it sets aside memory for as many threads
@@ -172,7 +172,7 @@ def _program() -> tuple[Path, dict[str, str]]:
     return program, {**os.environ, "SUMO_HOME": str(home), "OMP_NUM_THREADS": "1"}
 
 
-def _limit(pid: int, limits: NetconvertLimits) -> None:
+def _limit_child(pid: int, limits: NetconvertLimits) -> None:
     """Limit a running child; only Linux can, elsewhere the clock must do."""
     try:
         from resource import RLIMIT_CORE, RLIMIT_CPU, RLIMIT_DATA, prlimit
@@ -186,13 +186,13 @@ def _limit(pid: int, limits: NetconvertLimits) -> None:
         prlimit(pid, RLIMIT_CORE, (0, 0))
 
 
-def _messages(said: bytes) -> tuple[str, ...]:
+def _clean_messages(said: bytes) -> tuple[str, ...]:
     lines = (line.strip() for line in said.decode("utf-8", "replace").splitlines())
     kept = [line for line in lines if line and not any(noise in line for noise in _NOISE)]
     return tuple(dict.fromkeys(kept[:_MESSAGES_KEPT]))
 
 
-def _problem(code: int, messages: Sequence[str], limits: NetconvertLimits) -> str:
+def _describe_problem(code: int, messages: Sequence[str], limits: NetconvertLimits) -> str:
     if code == -getattr(signal, "SIGXCPU", 24):
         return f"netconvert needed more than {limits.seconds:g} s of computing time"
     if any("bad_alloc" in line or "memory" in line.lower() for line in messages):

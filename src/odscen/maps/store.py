@@ -160,9 +160,9 @@ class Workspace:
     def _is_map(self, name: str) -> bool:
         folder = self.root / "maps" / name
         files = (INFO_FILE, XODR_FILE)
-        return is_name(name) and any((folder / one).is_file() for one in files)
+        return is_name(name) and any((folder / file).is_file() for file in files)
 
-    def _has(self, name: str) -> bool:
+    def _has_map(self, name: str) -> bool:
         """Whether there is such a map; asked for each run of many, and does not look at others."""
         return name in self._map_folders() and self._is_map(name)
 
@@ -188,10 +188,10 @@ class Workspace:
 
         Those of suites come after all others, see :meth:`of_suites`.
         """
-        for one in self.maps():
-            if fits(one):
+        for map_entry in self.maps():
+            if fits(map_entry):
                 with suppress(DamagedError):
-                    return self.map(one.name)
+                    return self.map(map_entry.name)
         suites = Workspace(self.root / _SUITES)
         return suites.first_map(fits) if (suites.root / "maps").is_dir() else None
 
@@ -205,7 +205,7 @@ class Workspace:
         DamagedError
             If it is broken.
         """
-        if not self._has(name):
+        if not self._has_map(name):
             raise NotFoundError("map", name, self.map_names())
         return read_entry(self.root / "maps" / name)
 
@@ -243,7 +243,7 @@ class Workspace:
             If the map of that name has other content.
         """
         broken: OdscenError | None = None
-        if self._has(name):
+        if self._has_map(name):
             try:
                 entry = self.map(name)
             except DamagedError as error:
@@ -251,12 +251,12 @@ class Workspace:
             else:
                 if entry.sha256 == sha256:
                     return entry
-        other = self.first_map(lambda one: one.sha256 == sha256)
+        other = self.first_map(lambda map_entry: map_entry.sha256 == sha256)
         if other is not None:
             return other
         if broken is not None:
             raise broken
-        if not self._has(name):
+        if not self._has_map(name):
             raise NotFoundError("map", name, self.map_names())
         raise InputError(
             f"map {name!r} in {self.root} has other content (sha256 {entry.sha256[:12]}...) "
@@ -333,8 +333,8 @@ class Workspace:
         """Build a map as :meth:`add_map` does, from the text of a file of that name."""
         name, file = check_name(name), printable(file)
         final = self.root / "maps" / name
-        with _workspace_errors(self.root), self._lock(name):
-            built = _whole(final)
+        with _workspace_errors(self.root), self._lock_map(name):
+            built = _read_whole_map(final)
             same = built if built and built.source_sha256 == digest(content) else None
             if settings.converter is None:
                 settings = replace(settings, converter=same.converter if same else "odscen")
@@ -345,7 +345,9 @@ class Workspace:
                     return same
             kept = same is not None and same.converter == settings.converter == "file"
             given = same.given() if same and kept else None
-            return self._built(name, content, file, settings, importing, given, limits, progress)
+            return self._build_and_store(
+                name, content, file, settings, importing, given, limits, progress
+            )
 
     def set_network(
         self,
@@ -383,16 +385,16 @@ class Workspace:
         given = GivenNetwork(read_given(source), source.name)
         settings = replace(entry.conversion, converter="file")
         content, file = entry.read(entry.source_key), str(entry.info["source"])
-        with _workspace_errors(self.root), self._lock(name):
-            return self._built(
+        with _workspace_errors(self.root), self._lock_map(name):
+            return self._build_and_store(
                 name, content, file, settings, entry.importing, given, limits, progress
             )
 
-    def _lock(self, name: str) -> AbstractContextManager[int]:
+    def _lock_map(self, name: str) -> AbstractContextManager[int]:
         """Hold the lock of a map; another process that builds it is waited for."""
         return locked(self.root / "maps" / name, what=f"map {name!r}", patience=PATIENCE)
 
-    def _built(
+    def _build_and_store(
         self,
         name: str,
         content: bytes,
@@ -424,7 +426,7 @@ class Workspace:
         return MapEntry(name, final, info)
 
 
-def _whole(folder: Path) -> MapEntry | None:
+def _read_whole_map(folder: Path) -> MapEntry | None:
     """A map that is there with all of its files as they were written, else ``None``."""
     try:
         entry = read_entry(folder)

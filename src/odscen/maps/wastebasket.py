@@ -108,7 +108,7 @@ class Wastebasket:
         WorkspaceError
             If it cannot be moved.
         """
-        place = self._place(kind, name)
+        place = self._place_of(kind, name)
         if not place.exists():
             raise NotFoundError(kind, name, [])
         removed = datetime.now(UTC).replace(microsecond=0)
@@ -119,13 +119,13 @@ class Wastebasket:
             item.folder.mkdir(parents=True)
             place.rename(item.content)
             if kind == "scenario":
-                _move(self._history(name), item.folder / HISTORY)
+                _move_folder(self._history_folder(name), item.folder / HISTORY)
         self.sweep()
         return item
 
     def items(self) -> list[RemovedItem]:
         """Everything in the wastebasket, removed last first."""
-        found = [item for folder in self._all() if (item := _read(folder)) is not None]
+        found = [item for folder in self._all_folders() if (item := _read_item(folder)) is not None]
         return sorted(found, key=lambda item: (item.removed, item.id), reverse=True)
 
     def item(self, id_: str) -> RemovedItem:
@@ -139,15 +139,17 @@ class Wastebasket:
             If several have that name.
         """
         items = self.items()
-        found = [one for one in items if one.id == id_] or [one for one in items if one.name == id_]
+        found = [item for item in items if item.id == id_] or [
+            item for item in items if item.name == id_
+        ]
         if not found:
             raise NotFoundError(
                 "item of the wastebasket",
                 id_,
-                [name for one in items for name in (one.id, one.name)],
+                [name for item in items for name in (item.id, item.name)],
             )
         if len(found) > 1:
-            ids = ", ".join(one.id for one in found)
+            ids = ", ".join(item.id for item in found)
             raise ConflictError(
                 f"several items of the wastebasket are named {id_!r}; say which: {ids}"
             )
@@ -166,7 +168,7 @@ class Wastebasket:
             If it cannot be moved.
         """
         item = self.item(id_)
-        place = self._place(item.kind, item.name)
+        place = self._place_of(item.kind, item.name)
         if place.exists():
             raise ConflictError(
                 f"there is another {item.kind} named {item.name!r} now; "
@@ -174,10 +176,10 @@ class Wastebasket:
             )
         with disk_errors(f"{item.kind} {item.name!r}"):
             if item.kind == "scenario":
-                history = self._history(item.name)
+                history = self._history_folder(item.name)
                 with suppress(FileNotFoundError):  # of a namesake that is gone
                     discard(history)
-                _move(item.folder / HISTORY, history)
+                _move_folder(item.folder / HISTORY, history)
             item.content.rename(place)
             shutil.rmtree(item.folder)
         return item
@@ -192,13 +194,13 @@ class Wastebasket:
     def sweep(self, now: datetime | None = None) -> None:
         """Delete what is here for longer than 30 days at ``now`` (UTC), and leftovers."""
         now = now or datetime.now(UTC)
-        for folder in self._all():
-            item, removed = _read(folder), _removed(folder)
+        for folder in self._all_folders():
+            item, removed = _read_item(folder), _time_of_removal(folder)
             if now - removed > (KEPT if item is not None else _UNFINISHED):
                 with suppress(OSError):  # another process was faster, or the next time
                     shutil.rmtree(folder)
 
-    def _all(self) -> Iterator[Path]:
+    def _all_folders(self) -> Iterator[Path]:
         for kind, parent in self._folders.items():
             with suppress(OSError):
                 for folder in sorted((parent / FOLDER).iterdir()):
@@ -206,15 +208,15 @@ class Wastebasket:
                     if match is not None and match[1] == kind:
                         yield folder
 
-    def _place(self, kind: RemovedKind, name: str) -> Path:
+    def _place_of(self, kind: RemovedKind, name: str) -> Path:
         ending = SCENARIO_SUFFIX if kind == "scenario" else ""
         return self._folders[kind] / (check_name(name, what=kind) + ending)
 
-    def _history(self, name: str) -> Path:
+    def _history_folder(self, name: str) -> Path:
         return self._folders["scenario"] / HISTORY / name
 
 
-def _read(folder: Path) -> RemovedItem | None:
+def _read_item(folder: Path) -> RemovedItem | None:
     """The item in a folder; ``None`` if its content never came, or has left."""
     match = _ID.fullmatch(folder.name)
     if match is None:
@@ -225,11 +227,11 @@ def _read(folder: Path) -> RemovedItem | None:
         for path in folder.iterdir():
             if path.name != HISTORY and path.name.endswith(ending):
                 name = path.name.removesuffix(ending)
-                return RemovedItem(folder.name, kind, name, _removed(folder), folder)
+                return RemovedItem(folder.name, kind, name, _time_of_removal(folder), folder)
     return None
 
 
-def _removed(folder: Path) -> datetime:
+def _time_of_removal(folder: Path) -> datetime:
     match = _ID.fullmatch(folder.name)
     try:
         return datetime.strptime(match[2] if match else "", _STAMP).replace(tzinfo=UTC)
@@ -237,7 +239,7 @@ def _removed(folder: Path) -> datetime:
         return datetime.min.replace(tzinfo=UTC)
 
 
-def _move(source: Path, target: Path) -> None:
+def _move_folder(source: Path, target: Path) -> None:
     """Move a folder, if it is there."""
     target.parent.mkdir(parents=True, exist_ok=True)
     with suppress(FileNotFoundError):

@@ -69,7 +69,7 @@ class PlanView:
         flat = [geometry for road in roads for geometry in road]
         rows = np.array([g[:5] for g in flat], dtype=np.float64).reshape(-1, 5)
         kind = np.fromiter((_KINDS[g.kind] for g in flat), np.int64, len(flat))
-        bends = np.array([_bend(g) for g in flat], dtype=np.float64).reshape(-1, 2)
+        bends = np.array([_start_bend(g) for g in flat], dtype=np.float64).reshape(-1, 2)
         is_cubic = kind == _CUBIC
         cubics = [g for g in flat if _KINDS[g.kind] == _CUBIC]
         return cls(
@@ -94,7 +94,7 @@ class PlanView:
     def at_rows(self, row: IntArray, ds: FloatArray) -> PlanPoints:
         """Points ``ds`` metres behind the start of each geometry; beyond its ends straight on."""
         inside = np.minimum(np.maximum(ds, 0.0), self.length[row])
-        points = self._inside(row, inside)
+        points = self._evaluate_inside(row, inside)
         over = ds - inside
         if not over.any():
             return points
@@ -102,7 +102,7 @@ class PlanView:
         y = points.y + over * np.sin(points.hdg)
         return points._replace(x=x, y=y)
 
-    def _inside(self, row: IntArray, ds: FloatArray) -> PlanPoints:
+    def _evaluate_inside(self, row: IntArray, ds: FloatArray) -> PlanPoints:
         hdg = self.hdg[row]
         curvature = self.curvature[row]
         change = self.change[row]
@@ -117,7 +117,7 @@ class PlanView:
         kind = self.kind[row]
         if (kind != _BEND).any():
             at = np.flatnonzero(kind == _SPIRAL)
-            u[at], v[at] = _spiral(curvature[at], change[at], ds[at])
+            u[at], v[at] = _evaluate_spiral(curvature[at], change[at], ds[at])
             at = np.flatnonzero(kind == _CUBIC)
             if at.size:
                 change = change.copy()
@@ -130,7 +130,7 @@ class PlanView:
         return PlanPoints(x, y, hdg + turn, bend, change)
 
 
-def _bend(geometry: Geometry) -> tuple[float, float]:
+def _start_bend(geometry: Geometry) -> tuple[float, float]:
     """Curvature at the start and its change by s."""
     if geometry.kind is GeometryKind.ARC:
         return geometry.params[0], 0.0
@@ -140,7 +140,7 @@ def _bend(geometry: Geometry) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def _spiral(
+def _evaluate_spiral(
     curvature: FloatArray, change: FloatArray, ds: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     r"""End of a spiral that starts at the origin along u.
@@ -203,7 +203,9 @@ class CubicCurves:
             return curves
         width = p_end[:, None, None] / _PIECES
         p = width * (np.arange(_PIECES)[None, :, None] + 0.5 * (_PIECE_NODES + 1.0))
-        speed = np.hypot(*_derivatives(coefficients.transpose(1, 2, 0)[..., None, None], p)[1])
+        speed = np.hypot(
+            *_curve_derivatives(coefficients.transpose(1, 2, 0)[..., None, None], p)[1]
+        )
         pieces = 0.5 * width[:, :, 0] * (speed @ _PIECE_WEIGHTS)
         lengths = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(pieces, axis=1)], axis=1)
         stretch = np.where(is_param, lengths[:, -1] / p_end, 1.0)
@@ -229,8 +231,8 @@ class CubicCurves:
         p: FloatArray = start + (wanted - before) / span * width
         coefficients = self.coefficients[row].transpose(1, 2, 0)
         for _ in range(4):  # Newton: the derivative of arc length by p is the speed
-            length = before + _arc(coefficients, start, p)
-            here = np.hypot(*_derivatives(coefficients, p)[1])
+            length = before + _arc_lengths(coefficients, start, p)
+            here = np.hypot(*_curve_derivatives(coefficients, p)[1])
             p += (wanted - length) / np.maximum(here, 1e-9)
         return p
 
@@ -252,7 +254,7 @@ class CubicCurves:
         piece = np.clip(np.floor(p / width), 0, _PIECES - 1)
         before = self.lengths[row, piece.astype(np.int64)]
         coefficients = self.coefficients[row].transpose(1, 2, 0)
-        gone = before + _arc(coefficients, piece * width, p)
+        gone = before + _arc_lengths(coefficients, piece * width, p)
         off = np.abs(gone - ds * self.stretch[row]).reshape(-1, len(tried))
         off[np.isnan(off)] = np.inf
         worst[doubted] = off.max(axis=1, initial=0.0)
@@ -263,7 +265,7 @@ class CubicCurves:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """u, v, heading, curvature and its change by s, ``ds`` metres behind the start."""
         p = self.parameter(row, ds)
-        (u, v), (u1, v1), (u2, v2), (u3, v3) = _derivatives(
+        (u, v), (u1, v1), (u2, v2), (u3, v3) = _curve_derivatives(
             self.coefficients[row].transpose(1, 2, 0), p
         )
         speed2 = np.maximum(u1 * u1 + v1 * v1, 1e-18)
@@ -276,11 +278,11 @@ class CubicCurves:
         return u, v, np.arctan2(v1, u1), curvature, change
 
 
-def _arc(coefficients: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+def _arc_lengths(coefficients: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
     """Arc length of each curve between two parameters within one piece of its table."""
     half = 0.5 * (end - start)
     nodes = start[:, None] + half[:, None] * (_PIECE_NODES + 1.0)
-    speed = np.hypot(*_derivatives(coefficients[..., None], nodes)[1])
+    speed = np.hypot(*_curve_derivatives(coefficients[..., None], nodes)[1])
     length: FloatArray = half * (speed @ _PIECE_WEIGHTS)
     return length
 
@@ -288,7 +290,7 @@ def _arc(coefficients: FloatArray, start: FloatArray, end: FloatArray) -> FloatA
 ArrayPair = tuple[FloatArray, FloatArray]
 
 
-def _derivatives(
+def _curve_derivatives(
     coefficients: FloatArray, p: FloatArray
 ) -> tuple[ArrayPair, ArrayPair, ArrayPair, ArrayPair]:
     """(u, v) and their first three derivatives by p.

@@ -142,7 +142,7 @@ class RoadTable:
             lane_s0=np.array([row[3].s for row in rows], dtype=np.float64),
             lane_s1=np.array([row[3].s_end for row in rows], dtype=np.float64),
             lane_forward=np.array([is_forward(row[1], row[4]) for row in rows], dtype=bool),
-            lane_rank=_ranks(sections),
+            lane_rank=_rank_sections(sections),
             section_first=offsets(len(road.sections) for road in roads),
             section_s=np.array([section.s for section in sections]),
             section_lanes=offsets(len(section.lanes) - 1 for section in sections),
@@ -188,7 +188,7 @@ class RoadTable:
     def lane_borders(self, lane: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Give t of the inner and the outer border of each lane (row) at s."""
         lane = np.asarray(lane)
-        inner, outer = self._borders(lane, self._within(lane, s))
+        inner, outer = self._lane_borders(lane, self._clamp_to_section(lane, s))
         return inner.t, outer.t
 
     def lane_width(self, lane: IntArray, s: FloatArray) -> FloatArray:
@@ -212,9 +212,9 @@ class RoadTable:
             shape ``(N,)``.
         """
         lane = np.asarray(lane)
-        s = self._within(lane, s)
+        s = self._clamp_to_section(lane, s)
         road = self.lane_road[lane]
-        inner, outer = self._borders(lane, s)
+        inner, outer = self._lane_borders(lane, s)
         line = LineOffset(*(a + at * (b - a) for a, b in zip(inner, outer, strict=True)))
         plan = self.plan.at(road, s)
         elevation = self.elevation.at(road, s)
@@ -236,7 +236,7 @@ class RoadTable:
             width=np.abs(outer.t - inner.t),
         )
 
-    def _within(self, lane: IntArray, s: FloatArray) -> FloatArray:
+    def _clamp_to_section(self, lane: IntArray, s: FloatArray) -> FloatArray:
         """Hold s within the lane's section.
 
         The end belongs to the next section, whose lane offset may differ: the last number before
@@ -245,7 +245,7 @@ class RoadTable:
         last = np.nextafter(self.lane_s1[lane], -np.inf)
         return np.maximum(np.minimum(s, last), self.lane_s0[lane])
 
-    def _borders(self, lane: IntArray, s: FloatArray) -> tuple[LineOffset, LineOffset]:
+    def _lane_borders(self, lane: IntArray, s: FloatArray) -> tuple[LineOffset, LineOffset]:
         """Inner and outer border: widths are summed from the centre line outwards.
 
         A ``border`` record is the t of the lane's outer border, counted like widths from the centre
@@ -334,7 +334,7 @@ def is_forward(road: Road, lane: Lane) -> bool:
     return with_s != (lane.direction == "reversed")
 
 
-def _ranks(sections: list[LaneSection]) -> IntArray:
+def _rank_sections(sections: list[LaneSection]) -> IntArray:
     ranks: list[int] = []
     for section in sections:
         ids = [lane_id for lane_id in section.lanes if lane_id]

@@ -89,7 +89,7 @@ def object_outline(table: RoadTable, road: RoadId, obj: RoadObject) -> tuple[Flo
     row = table.road_index[road]
     outlines = [outline for outline in obj.outlines if len(outline.corners) >= 2]
     if outlines:
-        return tuple(_corners(table, row, obj, outline) for outline in outlines)
+        return tuple(_outline_corners(table, row, obj, outline) for outline in outlines)
     if obj.length and obj.width:
         u, v = 0.5 * obj.length, 0.5 * obj.width
         local = np.array([[u, v, 0.0], [-u, v, 0.0], [-u, -v, 0.0], [u, -v, 0.0]])
@@ -101,7 +101,7 @@ def object_outline(table: RoadTable, road: RoadId, obj: RoadObject) -> tuple[Flo
     return (_from_local(table, row, obj, local),)
 
 
-def _corners(table: RoadTable, road: int, obj: RoadObject, outline: Outline) -> FloatArray:
+def _outline_corners(table: RoadTable, road: int, obj: RoadObject, outline: Outline) -> FloatArray:
     values = np.array([(c.a, c.b, c.z) for c in outline.corners], dtype=np.float64)
     is_local = np.array([c.local for c in outline.corners])
     points = np.empty_like(values)
@@ -132,24 +132,24 @@ def _from_local(table: RoadTable, road: int, obj: RoadObject, local: FloatArray)
 def crosswalks(odr: OpenDrive, table: RoadTable) -> tuple[Crosswalk, ...]:
     """All crosswalks, in the order of the file; objects without a size are left out."""
     found = (
-        _crosswalk(table, road, obj, outline)
-        for road, obj in _objects(odr)
+        _make_crosswalk(table, road, obj, outline)
+        for road, obj in _all_objects(odr)
         if is_crosswalk(obj)
         for outline in object_outline(table, road, obj)[:1]
     )
     return tuple(crosswalk for crosswalk in found if crosswalk is not None)
 
 
-def _objects(odr: OpenDrive) -> Iterator[tuple[RoadId, RoadObject]]:
+def _all_objects(odr: OpenDrive) -> Iterator[tuple[RoadId, RoadObject]]:
     return ((road.id, obj) for road in odr.roads.values() for obj in road.objects)
 
 
-def _crosswalk(
+def _make_crosswalk(
     table: RoadTable, road: RoadId, obj: RoadObject, outline: FloatArray
 ) -> Crosswalk | None:
     polygon = outline[:, :2]
     if len(polygon) < 3 or abs(_signed_area(polygon)) < 0.01:
-        polygon = _widened(polygon)
+        polygon = _widen_line(polygon)
     if len(polygon) < 3:
         return None
     area = _signed_area(polygon)
@@ -164,12 +164,12 @@ def _crosswalk(
         object_id=obj.id,
         polygon=polygon.copy(),
         z=float(outline[:, 2].mean()),
-        axis=_chord(polygon, along),
+        axis=_middle_chord(polygon, along),
         width=float(np.ptp(polygon @ across)),
     )
 
 
-def _widened(line: FloatArray) -> FloatArray:
+def _widen_line(line: FloatArray) -> FloatArray:
     """Rectangle of :data:`LINE_WIDTH` around a line across the road; nothing around a point."""
     gaps = np.linalg.norm(line[:, None] - line[None], axis=2)
     start, end = np.unravel_index(np.argmax(gaps), gaps.shape)
@@ -203,7 +203,7 @@ def _crossing_direction(polygon: FloatArray, normal: FloatArray) -> FloatArray:
     return side if float(side @ normal) >= 0.0 else -side
 
 
-def _chord(polygon: FloatArray, along: FloatArray) -> FloatArray:
+def _middle_chord(polygon: FloatArray, along: FloatArray) -> FloatArray:
     """Where the line through the middle of the polygon enters and leaves it; shape ``(2, 2)``."""
     across = np.array([-along[1], along[0]])
     u, v = polygon @ along, polygon @ across
@@ -220,7 +220,7 @@ def _chord(polygon: FloatArray, along: FloatArray) -> FloatArray:
 
 def stop_lines(odr: OpenDrive, table: RoadTable) -> tuple[StopLine, ...]:
     """All stop lines, in the order of the file; objects without any length are left out."""
-    found = (_stop_line(table, road, obj) for road, obj in _objects(odr) if is_stop_line(obj))
+    found = (_stop_line(table, road, obj) for road, obj in _all_objects(odr) if is_stop_line(obj))
     return tuple(line for line in found if line is not None)
 
 
@@ -236,7 +236,7 @@ def _stop_line(table: RoadTable, road: RoadId, obj: RoadObject) -> StopLine | No
     else:
         return None
     if len(points) > 2:
-        ends = _chord(points[:, :2], _long_side(points[:, :2]))
+        ends = _middle_chord(points[:, :2], _long_side(points[:, :2]))
     else:
         ends = points[:, :2].copy()
     z = float(points[:, 2].mean())

@@ -107,7 +107,7 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
         if tag not in READ:
             rule = Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN
             notes.skip(rule, "OpenDRIVE", tag, len(found))
-    header = _header(root, only(groups, "header"), notes)
+    header = _parse_header(root, only(groups, "header"), notes)
     elements = groups.get("road", [])
     if not elements:
         raise refusal(root, "there is no <road>")
@@ -119,14 +119,14 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
         except OpenDriveError as error:
             faults.append(RoadFault(element.get("id", ""), error))
         else:
-            _add(roads, road.id, road, element)
+            _add_unique(roads, road.id, road, element)
     twice = next((fault for fault in faults if fault.road in roads), None)
     if twice is not None:
         raise twice.error
     junctions: dict[JunctionId, Junction] = {}
     for element in groups.get("junction", ()):
         junction = parse_junction(element, roads, notes)
-        _add(junctions, junction.id, junction, element)
+        _add_unique(junctions, junction.id, junction, element)
     controllers: dict[str, Controller] = {}
     for element in groups.get("controller", ()):
         _add_controller(controllers, element, notes)
@@ -142,7 +142,7 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
     return replace(odr, notes=notes.sentences())
 
 
-def _add(known: dict[K, V], key: K, value: V, element: Element) -> None:
+def _add_unique(known: dict[K, V], key: K, value: V, element: Element) -> None:
     if key in known:
         tag = str(element.tag)
         problem = f"there is another {tag} with the id {shown(str(key))}"
@@ -167,7 +167,7 @@ def _add_controller(known: dict[str, Controller], element: Element, notes: Notes
     known[controller.id] = controller
 
 
-def _header(root: Element, element: Element | None, notes: Notes) -> Header:
+def _parse_header(root: Element, element: Element | None, notes: Notes) -> Header:
     if element is None:
         detail = "there is no <header>; the file is read by the rules of 1.4 to 1.8"
         notes.add(Rule.MISSING_HEADER, root, detail)
@@ -191,8 +191,8 @@ def _header(root: Element, element: Element | None, notes: Notes) -> Header:
         east=_described(element, "east", notes),
         west=_described(element, "west", notes),
         geo_reference=text,
-        crs=_crs(text, element, notes),
-        offset=_offset(offset, notes),
+        crs=_parse_crs(text, element, notes),
+        offset=_parse_offset(offset, notes),
     )
 
 
@@ -215,14 +215,14 @@ def _described(element: Element, name: str, notes: Notes) -> float | None:
         return None
 
 
-def _offset(element: Element | None, notes: Notes) -> tuple[float, float, float, float]:
+def _parse_offset(element: Element | None, notes: Notes) -> tuple[float, float, float, float]:
     if element is None:
         return (0.0, 0.0, 0.0, 0.0)
     x, y, z, hdg = (_described(element, name, notes) or 0.0 for name in ("x", "y", "z", "hdg"))
     return (x, y, z, hdg)
 
 
-def _crs(text: str, element: Element, notes: Notes) -> str | None:
+def _parse_crs(text: str, element: Element, notes: Notes) -> str | None:
     """WKT of a geoReference, if pyproj understands it."""
     if not text:
         return None

@@ -69,7 +69,7 @@ def _faults_among(roads: list[Road]) -> list[RoadFault]:
     return []
 
 
-def _namer(roads: list[Road], groups: list[int], tag: str) -> NameOf:
+def _make_namer(roads: list[Road], groups: list[int], tag: str) -> NameOf:
     """Path of row ``i`` of a table with ``groups[k]`` rows of road ``k``."""
     first = np.concatenate([[0], np.cumsum(groups)])
 
@@ -81,11 +81,11 @@ def _namer(roads: list[Road], groups: list[int], tag: str) -> NameOf:
 
 
 def _refuse_any(bad: NDArray[np.bool_], name: NameOf, problem: Callable[[int], str]) -> None:
-    for row in _rows(bad):
+    for row in _rows_where(bad):
         raise OpenDriveError(problem(row), element=name(row))
 
 
-def _rows(mask: NDArray[np.bool_]) -> list[int]:
+def _rows_where(mask: NDArray[np.bool_]) -> list[int]:
     """Rows at which ``mask`` holds."""
     return [int(row) for row in np.flatnonzero(mask)]
 
@@ -93,7 +93,7 @@ def _rows(mask: NDArray[np.bool_]) -> list[int]:
 # ----------------------------------------------------------------------------- plan view
 def _check_plan_view(roads: list[Road], notes: Notes) -> None:
     plan = PlanView.of([road.geometry for road in roads])
-    name = _namer(roads, [len(road.geometry) for road in roads], "geometry")
+    name = _make_namer(roads, [len(road.geometry) for road in roads], "geometry")
     row = np.arange(plan.s.size)
     last = np.zeros(plan.s.size, dtype=bool)
     last[plan.first[1:] - 1] = True
@@ -109,7 +109,7 @@ def _check_plan_view(roads: list[Road], notes: Notes) -> None:
         name,
         lambda i: f"ends at s={plan.s[i] + plan.length[i]:.6g}, but {says[i]} is {end_s[i]:.6g}",
     )
-    for i in _rows(np.abs(missing) > rules.S_TOLERANCE):
+    for i in _rows_where(np.abs(missing) > rules.S_TOLERANCE):
         detail = f"its end and {says[i]} differ by {abs(missing[i]):.3g} m"
         notes.add(Rule.PLAN_VIEW_S, name(i), detail)
 
@@ -146,7 +146,7 @@ def _note_joints(
     turn = plan.curves.start_heading(plan.cubic, plan.hdg)[inner + 1] - end_hdg[inner]
     kink[inner] = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
     noted = (gap > rules.GAP_TOLERANCE) | (kink > rules.KINK_TOLERANCE)
-    for i in _rows(noted):
+    for i in _rows_where(noted):
         detail = f"ends {gap[i]:.3g} m and {kink[i]:.3g} rad off the start of the next"
         notes.add(Rule.PLAN_VIEW_GAP, name(i), detail)
 
@@ -173,7 +173,7 @@ def _check_curves(plan: PlanView, name: NameOf, notes: Notes) -> None:
             f"the curve bends too sharply to be followed over its length of {plan.length[i]:.6g} m"
         ),
     )
-    for i in _rows(np.abs(stretch - 1.0) > rules.CURVE_TOLERANCE):
+    for i in _rows_where(np.abs(stretch - 1.0) > rules.CURVE_TOLERANCE):
         detail = f"the curve is {stretch[i] * plan.length[i]:.6g} m long, not {plan.length[i]:.6g}"
         notes.add(Rule.CURVE_LENGTH, name(i), detail)
 
@@ -189,9 +189,9 @@ def _check_road_profiles(roads: list[Road], notes: Notes) -> None:
     for field, limit in limits.items():
         groups = [getattr(road, field) for road in roads]
         tag = "laneOffset" if field == "lane_offset" else field
-        name = _namer(roads, [len(group) for group in groups], tag)
+        name = _make_namer(roads, [len(group) for group in groups], tag)
         table = CubicTable.of(groups)
-        low, high, _ = _extremes(table, ends)
+        low, high, _ = _record_extremes(table, ends)
         worst = np.where(np.abs(low) > np.abs(high), low, high)
         _refuse_any(
             ~(np.abs(worst) <= limit),
@@ -214,7 +214,7 @@ def _check_lane_widths(roads: list[Road], notes: Notes) -> None:
     table = CubicTable.of(groups)
     group = np.repeat(np.arange(len(lanes)), np.diff(table.first))
     ends = np.array([section.s_end for _, section, _ in lanes])
-    low, high, at = _extremes(table, ends)
+    low, high, at = _record_extremes(table, ends)
 
     def name(row: int) -> str:
         return lanes[int(group[row])][0]
@@ -229,7 +229,7 @@ def _check_lane_widths(roads: list[Road], notes: Notes) -> None:
         name,
         lambda i: f"width reaches {high[i]:.6g} m; the limit is {rules.MAX_WIDTH:g} m",
     )
-    for i in _rows(low < -rules.WIDTH_TOLERANCE):
+    for i in _rows_where(low < -rules.WIDTH_TOLERANCE):
         detail = f"width at s={at[i]:.6g} is {low[i]:.3g} m and counts as 0"
         notes.add(Rule.NEGATIVE_WIDTH, name(i), detail)
     _note_jumps(table, ends, name, notes)
@@ -245,7 +245,9 @@ def _record_ends(table: CubicTable, ends: FloatArray) -> FloatArray:
     return ends_at
 
 
-def _extremes(table: CubicTable, ends: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _record_extremes(
+    table: CubicTable, ends: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Lowest and highest value of each record, and the s of the lowest; shape ``(records,)``."""
     if table.starts.size == 0:
         return np.zeros(0), np.zeros(0), np.zeros(0)
@@ -274,7 +276,7 @@ def _note_jumps(table: CubicTable, ends: FloatArray, name: NameOf, notes: Notes)
     jump[1:] = a[1:] - end_value[:-1]
     jump[table.first[:-1][np.diff(table.first) > 0]] = 0.0
     jump[1:][ds[:-1] <= 0.0] = 0.0  # a record of no length has no value to jump from
-    for i in _rows(np.abs(jump) > rules.JUMP_TOLERANCE):
+    for i in _rows_where(np.abs(jump) > rules.JUMP_TOLERANCE):
         notes.add(Rule.JUMP, name(i), f"jumps by {jump[i]:.3g} m at s={table.starts[i]:.6g}")
 
 

@@ -23,7 +23,7 @@ def merge_coincident_roads(
 
     Roads that a junction names stay: its connections may tell them apart.
     """
-    kept = _kept(roads, junctions)
+    kept = _find_kept_roads(roads, junctions)
     if not kept:
         return roads
     for road, other in kept.items():
@@ -32,21 +32,23 @@ def merge_coincident_roads(
     return {
         key: replace(
             road,
-            predecessor=_link(road.predecessor, kept),
-            successor=_link(road.successor, kept),
+            predecessor=_redirect_link(road.predecessor, kept),
+            successor=_redirect_link(road.successor, kept),
         )
         for key, road in roads.items()
         if key not in kept
     }
 
 
-def _kept(roads: dict[RoadId, Road], junctions: Iterable[Junction]) -> dict[RoadId, RoadId]:
+def _find_kept_roads(
+    roads: dict[RoadId, Road], junctions: Iterable[Junction]
+) -> dict[RoadId, RoadId]:
     """The first of the roads that are alike, for each of the others."""
     named = {
         road
         for junction in junctions
-        for one in junction.connections
-        for road in (one.incoming_road, one.connecting_road)
+        for connection in junction.connections
+        for road in (connection.incoming_road, connection.connecting_road)
     }
     free = [road for road in roads.values() if road.junction is None and road.id not in named]
     places = Counter(road.geometry for road in free)
@@ -62,7 +64,7 @@ def _kept(roads: dict[RoadId, Road], junctions: Iterable[Junction]) -> dict[Road
     return kept
 
 
-def _link(link: RoadLink | None, kept: dict[RoadId, RoadId]) -> RoadLink | None:
+def _redirect_link(link: RoadLink | None, kept: dict[RoadId, RoadId]) -> RoadLink | None:
     if link is None or link.element_type != "road":
         return link
     own = RoadId(link.element_id)

@@ -41,7 +41,7 @@ def parse_objects(container: Element | None, notes: Notes) -> tuple[RoadObject, 
     for element in container:
         if element.tag == "object":
             try:
-                objects.append(_object(element, notes))
+                objects.append(_parse_object(element, notes))
             except OpenDriveError as error:
                 detail = f"{error.problem}; the object is left out"
                 notes.add(Rule.OBJECT_LEFT_OUT, error.element or element, detail)
@@ -55,7 +55,7 @@ _OBJECT_READ: Final = frozenset({"outline", "outlines", "repeat", "validity", "u
 _OBJECT_IGNORED: Final = frozenset({"material", "parkingSpace", "markings", "borders", "surface"})
 
 
-def _object(element: Element, notes: Notes) -> RoadObject:
+def _parse_object(element: Element, notes: Notes) -> RoadObject:
     groups = children(element)
     for tag in groups:
         if tag not in _OBJECT_READ:
@@ -82,13 +82,13 @@ def _object(element: Element, notes: Notes) -> RoadObject:
         height=optional_number(element, "height"),
         radius=optional_number(element, "radius"),
         valid_length=optional_number(element, "validLength"),
-        outlines=tuple(_outline(outline, notes) for outline in found),
-        repeats=tuple(_repeat(repeat) for repeat in groups.get("repeat", ())),
+        outlines=tuple(_parse_outline(outline, notes) for outline in found),
+        repeats=tuple(_parse_repeat(repeat) for repeat in groups.get("repeat", ())),
         validities=validities(groups.get("validity", ())),
     )
 
 
-def _outline(element: Element, notes: Notes) -> Outline:
+def _parse_outline(element: Element, notes: Notes) -> Outline:
     corners = []
     for child in element:
         if child.tag == "cornerLocal":
@@ -108,7 +108,7 @@ def _outline(element: Element, notes: Notes) -> Outline:
     )
 
 
-def _repeat(element: Element) -> ObjectRepeat:
+def _parse_repeat(element: Element) -> ObjectRepeat:
     t_start = number_or(element, "tStart", 0.0)
     return ObjectRepeat(
         number(element, "s"),
@@ -130,10 +130,10 @@ def parse_signals(
     for element in container:
         try:
             if element.tag == "signal":
-                signals.append(_signal(element, notes))
+                signals.append(_parse_signal(element, notes))
                 continue
             if element.tag == "signalReference":
-                references.append(_reference(element))
+                references.append(_parse_reference(element))
                 continue
         except OpenDriveError as error:
             detail = f"{error.problem}; the {element.tag} is left out"
@@ -151,7 +151,7 @@ _SIGNAL_IGNORED: Final = frozenset(
 )
 
 
-def _signal(element: Element, notes: Notes) -> Signal:
+def _parse_signal(element: Element, notes: Notes) -> Signal:
     groups = children(element)
     for tag in groups:
         if tag not in _SIGNAL_READ:
@@ -168,7 +168,7 @@ def _signal(element: Element, notes: Notes) -> Signal:
         z_offset=number_or(element, "zOffset", 0.0),
         h_offset=number_or(element, "hOffset", 0.0),
         orientation=element.get("orientation", "none"),
-        dynamic=_dynamic(element, notes),
+        dynamic=_parse_dynamic(element, notes),
         country=element.get("country", ""),
         type=element.get("type", ""),
         subtype=element.get("subtype", ""),
@@ -178,7 +178,7 @@ def _signal(element: Element, notes: Notes) -> Signal:
         width=optional_number(element, "width"),
         height=optional_number(element, "height"),
         validities=validities(groups.get("validity", ())),
-        dependencies=_dependencies(groups.get("dependency", ())),
+        dependencies=_parse_dependencies(groups.get("dependency", ())),
     )
 
 
@@ -191,18 +191,18 @@ def _value(element: Element, notes: Notes) -> float | None:
         return None
 
 
-def _dynamic(element: Element, notes: Notes) -> bool:
+def _parse_dynamic(element: Element, notes: Notes) -> bool:
     text = element.get("dynamic", "no")
     if text not in {"yes", "no"}:
         notes.add(Rule.UNKNOWN_VALUE, element, f"dynamic={shown(text)} counts as 'no'")
     return text == "yes"
 
 
-def _dependencies(elements: Sequence[Element]) -> tuple[tuple[str, str], ...]:
+def _parse_dependencies(elements: Sequence[Element]) -> tuple[tuple[str, str], ...]:
     return tuple((required(element, "id"), element.get("type", "")) for element in elements)
 
 
-def _reference(element: Element) -> SignalReference:
+def _parse_reference(element: Element) -> SignalReference:
     return SignalReference(
         id=required(element, "id"),
         s=number(element, "s"),

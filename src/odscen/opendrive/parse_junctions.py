@@ -70,14 +70,14 @@ def _read_connection(
 ) -> Connection | None:
     """A connection, or ``None`` for one that is not read or names no road."""
     try:
-        return _connection(element, kind, roads, notes)
+        return _parse_connection(element, kind, roads, notes)
     except OpenDriveError as error:
         detail = f"{error.problem}; the connection is left out"
         notes.add(Rule.CONNECTION_LEFT_OUT, error.element or element, detail)
         return None
 
 
-def _connection(
+def _parse_connection(
     element: Element, kind: str, roads: Mapping[RoadId, Road], notes: Notes
 ) -> Connection | None:
     if kind in {"virtual", "crossing"} and element.get("incomingRoad") is None:
@@ -139,14 +139,14 @@ def parse_controller(element: Element, notes: Notes) -> Controller:
     return Controller(
         id=required(element, "id"),
         name=element.get("name", ""),
-        sequence=_sequence(element, notes),
+        sequence=_parse_sequence(element, notes),
         controls=tuple(
             (str(control.get("signalId")), control.get("type", "")) for control in controls
         ),
     )
 
 
-def _sequence(element: Element, notes: Notes) -> int | None:
+def _parse_sequence(element: Element, notes: Notes) -> int | None:
     text = element.get("sequence", "").strip()
     if not text:
         return None

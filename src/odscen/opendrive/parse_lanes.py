@@ -86,12 +86,12 @@ def parse_sections(
         raise refusal(elements[0], f"the first laneSection starts at s={starts[0]:g}, not at 0")
     ends = [*starts[1:], length]
     return tuple(
-        _section(element, s, s_end, notes)
+        _parse_section(element, s, s_end, notes)
         for element, s, s_end in zip(elements, starts, ends, strict=True)
     )
 
 
-def _section(element: Element, s: float, s_end: float, notes: Notes) -> LaneSection:
+def _parse_section(element: Element, s: float, s_end: float, notes: Notes) -> LaneSection:
     if s_end <= s:
         notes.add(Rule.ZERO_LENGTH, element, f"starts and ends at s={s:g}; its lanes have no place")
     groups = children(element)
@@ -102,7 +102,7 @@ def _section(element: Element, s: float, s_end: float, notes: Notes) -> LaneSect
             continue
         for child in container:
             if child.tag == "lane":
-                found.append(_lane(child, side, s, s_end, notes))
+                found.append(_parse_lane(child, side, s, s_end, notes))
             elif child.tag != "userData":
                 notes.skip(Rule.UNKNOWN, side, str(child.tag))
     if not any(lane.id == 0 for lane in found):
@@ -140,7 +140,7 @@ def _check_ids(element: Element, ids: list[int], notes: Notes) -> None:
 _SIDES: Final = {"left": 1, "center": 0, "right": -1}
 
 
-def _lane(element: Element, side: str, s0: float, s_end: float, notes: Notes) -> Lane:
+def _parse_lane(element: Element, side: str, s0: float, s_end: float, notes: Notes) -> Lane:
     lane_id = integer(element, "id", limit=MAX_LANE_ID)
     if (lane_id > 0) - (lane_id < 0) != _SIDES[side]:
         if not lane_id or side == "center":
@@ -164,10 +164,10 @@ def _lane(element: Element, side: str, s0: float, s_end: float, notes: Notes) ->
         level=_drawn_boolean(element, "level", notes),
         widths=widths,
         borders=borders,
-        heights=_heights(groups.get("height", ()), s0, notes),
+        heights=_parse_heights(groups.get("height", ()), s0, notes),
         road_marks=_road_marks(groups.get("roadMark", ()), s0, notes),
-        speeds=_speeds(groups.get("speed", ()), s0, notes),
-        access=_access(groups.get("access", ()), s0, notes),
+        speeds=_parse_speeds(groups.get("speed", ()), s0, notes),
+        access=_parse_access(groups.get("access", ()), s0, notes),
         predecessors=predecessors,
         successors=successors,
         direction=element.get("direction", "standard"),
@@ -202,11 +202,11 @@ def _lane_links(link: Element | None, notes: Notes) -> tuple[tuple[int, ...], tu
     return tuple(linked["predecessor"]), tuple(linked["successor"])
 
 
-def _s(element: Element, s0: float) -> float:
+def _parse_s(element: Element, s0: float) -> float:
     return s0 + number_or(element, "sOffset", 0.0)
 
 
-def _heights(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneHeight, ...]:
+def _parse_heights(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneHeight, ...]:
     found = []
     for element in elements:
         names = ("inner", "outer")
@@ -218,17 +218,17 @@ def _heights(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[Lane
                 notes.add(Rule.OLD_NAMES, element, "heightInner, heightOuter are inner, outer")
         try:
             inner, outer = (number(element, name) for name in names)
-            found.append((element, LaneHeight(_s(element, s0), inner, outer)))
+            found.append((element, LaneHeight(_parse_s(element, s0), inner, outer)))
         except OpenDriveError as error:
             notes.add(Rule.PAINT, element, f"{error.problem}; the height is left out")
-    return _ordered(found, notes)
+    return _order_records(found, notes)
 
 
-def _speeds(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneSpeed, ...]:
+def _parse_speeds(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneSpeed, ...]:
     read = ((element, speed(element, notes)) for element in elements)
     found = ((element, value) for element, value in read if value is not None)
-    return _ordered(
-        [(element, LaneSpeed(_s(element, s0), value)) for element, value in found], notes
+    return _order_records(
+        [(element, LaneSpeed(_parse_s(element, s0), value)) for element, value in found], notes
     )
 
 
@@ -240,14 +240,14 @@ _ACCESS_RULES: Final[dict[str | None, str]] = {
 }
 
 
-def _access(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneAccess, ...]:
+def _parse_access(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneAccess, ...]:
     """One record per restriction: an attribute up to 1.7, elements below from 1.8 on."""
     records = []
     for element in elements:
         rule = spelt_choice(element, "rule", _ACCESS_RULES, notes)
         below = [str(child.get("type", "")) for child in element if child.tag == "restriction"]
         names = below or [str(element.get("restriction", ""))]
-        records += [LaneAccess(_s(element, s0), rule, name) for name in names]
+        records += [LaneAccess(_parse_s(element, s0), rule, name) for name in names]
     return tuple(records)
 
 
@@ -259,7 +259,7 @@ def _road_marks(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[R
         get = element.get
         lane_change = spelt_choice(element, "laneChange", _LANE_CHANGES, notes, otherwise="both")
         try:
-            s = _s(element, s0)
+            s = _parse_s(element, s0)
         except OpenDriveError as error:
             notes.add(Rule.PAINT, element, f"{error.problem}; the mark is left out")
             continue
@@ -298,7 +298,7 @@ def _painted_width(element: Element, notes: Notes) -> float:
 _start = attrgetter("s")
 
 
-def _ordered(found: Sequence[tuple[Element, R]], notes: Notes) -> tuple[R, ...]:
+def _order_records(found: Sequence[tuple[Element, R]], notes: Notes) -> tuple[R, ...]:
     """Records with the elements that they are from, in ascending order of s."""
     records: list[R] = []
     for element, record in found:

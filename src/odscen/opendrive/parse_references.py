@@ -35,15 +35,19 @@ def check_references(
     """
     signals = _signal_ids(roads, notes)
     roads = {key: _with_contacts(road, roads, notes) for key, road in roads.items()}
-    roads = {key: _road(road, roads, junctions, signals, notes) for key, road in roads.items()}
+    roads = {
+        key: _check_road(road, roads, junctions, signals, notes) for key, road in roads.items()
+    }
     for road in roads.values():
         _note_lane_links(road, roads, notes)
         _note_places(road, notes)
     junctions = {
-        key: _junction(junction, roads, controllers, notes) for key, junction in junctions.items()
+        key: _check_junction(junction, roads, controllers, notes)
+        for key, junction in junctions.items()
     }
     controllers = {
-        key: _controller(controller, signals, notes) for key, controller in controllers.items()
+        key: _check_controller(controller, signals, notes)
+        for key, controller in controllers.items()
     }
     return roads, junctions, controllers
 
@@ -104,7 +108,9 @@ def _end_that_links_back(other: Road | None, road: Road, end: str) -> ContactPoi
     return ends[0] if len(ends) == 1 else None
 
 
-def _road(road: Road, roads: Roads, junctions: Junctions, signals: set[str], notes: Notes) -> Road:
+def _check_road(
+    road: Road, roads: Roads, junctions: Junctions, signals: set[str], notes: Notes
+) -> Road:
     """Return the road itself, or a copy without what leads nowhere."""
     place = f"road {shown_id(road.id)}"
     changes: dict[str, object] = {}
@@ -173,12 +179,12 @@ def _note_places(road: Road, notes: Notes) -> None:
             notes.add(Rule.OUTSIDE_ROAD, place, detail)
 
 
-def _junction(
+def _check_junction(
     junction: Junction, roads: Roads, controllers: dict[str, Controller], notes: Notes
 ) -> Junction:
     """Return the junction itself, or a copy without what leads nowhere."""
     place = f"junction {shown_id(junction.id)}"
-    connections = tuple(_connections(junction, roads, notes))
+    connections = tuple(_check_connections(junction, roads, notes))
     kept_controllers = tuple(key for key in junction.controllers if key in controllers)
     for key in junction.controllers:
         if key not in controllers:
@@ -194,7 +200,7 @@ def _junction(
     )
 
 
-def _connections(junction: Junction, roads: Roads, notes: Notes) -> Iterator[Connection]:
+def _check_connections(junction: Junction, roads: Roads, notes: Notes) -> Iterator[Connection]:
     for connection in junction.connections:
         place = f"junction {shown_id(junction.id)} > connection {shown_id(connection.id)}"
         ends = (connection.incoming_road, connection.connecting_road)
@@ -220,7 +226,7 @@ def _connections(junction: Junction, roads: Roads, notes: Notes) -> Iterator[Con
         yield connection._replace(lane_links=links)
 
 
-def _controller(controller: Controller, signals: set[str], notes: Notes) -> Controller:
+def _check_controller(controller: Controller, signals: set[str], notes: Notes) -> Controller:
     kept = tuple(control for control in controller.controls if control[0] in signals)
     if len(kept) == len(controller.controls):
         return controller

@@ -62,14 +62,14 @@ def repair_junction_tables(odr: OpenDrive, notes: Notes) -> OpenDrive:
     found = dead_ends(odr)
     if not found:
         return odr
-    meetings = _meetings(odr, found)
+    meetings = _find_meetings(odr, found)
     if not meetings:
         return odr
-    repaired = _joined(odr, meetings)
+    repaired = _join_meetings(odr, meetings)
     left = set(dead_ends(repaired))
     if left - set(found):  # another contact point would cut off lanes that do lead somewhere
-        meetings = [one for one in meetings if _contact_stands(odr, one)]
-        repaired = _joined(odr, meetings)
+        meetings = [meeting for meeting in meetings if _contact_stands(odr, meeting)]
+        repaired = _join_meetings(odr, meetings)
         left = set(dead_ends(repaired))
     for dead, other, gap in meetings:
         if dead not in left:
@@ -85,19 +85,19 @@ def repair_junction_tables(odr: OpenDrive, notes: Notes) -> OpenDrive:
     return repaired
 
 
-def _meetings(odr: OpenDrive, found: Iterable[DeadEnd]) -> list[_Meeting]:
+def _find_meetings(odr: OpenDrive, found: Iterable[DeadEnd]) -> list[_Meeting]:
     """Dead ends that exactly one lane end meets."""
     from scipy.spatial import cKDTree
 
     table = RoadTable.of(odr)
     dead = list(found)
-    links = [_link(odr.roads[one.lane.road], one.end) for one in dead]
+    links = [_link_at_end(odr.roads[dead_end.lane.road], dead_end.end) for dead_end in dead]
     others = list(_lane_ends(odr, {link.element_id for link in links if link is not None}))
     if not others:
         return []
-    own = [_LaneEnd(one.lane, one.end, not one.leads) for one in dead]
-    places, headings, widths = _placed(odr, table, own)
-    other_places, other_headings, other_widths = _placed(odr, table, others)
+    own = [_LaneEnd(dead_end.lane, dead_end.end, not dead_end.leads) for dead_end in dead]
+    places, headings, widths = _place_lane_ends(odr, table, own)
+    other_places, other_headings, other_widths = _place_lane_ends(odr, table, others)
     found_near: Any = cKDTree(other_places).query(
         places, k=list(range(1, MOST_NEAR + 1)), distance_upper_bound=MEETS
     )
@@ -132,31 +132,31 @@ def _lane_ends(odr: OpenDrive, named: AbstractSet[str]) -> Iterable[_LaneEnd]:
                     yield _LaneEnd(LaneKey(road.id, number, lane.id), end, begins)
 
 
-def _placed(
+def _place_lane_ends(
     odr: OpenDrive, table: RoadTable, ends: list[_LaneEnd]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Middles of lane ends, shape ``(N, 2)``, directions of their traffic, radians, and widths."""
-    rows: IntArray = np.array([table.lane_index[one.lane] for one in ends], dtype=np.int64)
-    s = np.array([0.0 if one.end == "start" else odr.roads[one.lane.road].length for one in ends])
+    rows: IntArray = np.array([table.lane_index[end.lane] for end in ends], dtype=np.int64)
+    s = np.array([0.0 if end.end == "start" else odr.roads[end.lane.road].length for end in ends])
     points = table.lane_points(rows, s)
     back = np.where(table.lane_forward[rows], 0.0, math.pi)
     return np.stack([points.x, points.y], axis=1), points.hdg + back, points.width
 
 
-def _link(road: Road, end: End) -> RoadLink | None:
+def _link_at_end(road: Road, end: End) -> RoadLink | None:
     return road.predecessor if end == "start" else road.successor
 
 
 def _contact_stands(odr: OpenDrive, meeting: _Meeting) -> bool:
     """Whether the link of the connecting road names the end that is met, or there is none."""
-    link = _link(odr.roads[meeting.dead.lane.road], meeting.dead.end)
+    link = _link_at_end(odr.roads[meeting.dead.lane.road], meeting.dead.end)
     return link is None or link.contact_point == meeting.other.end
 
 
 def _may_join(odr: OpenDrive, dead: DeadEnd, other: _LaneEnd) -> bool:
     """Whether no link of either road leads elsewhere."""
     road, there = odr.roads[dead.lane.road], odr.roads[other.lane.road]
-    link, back = _link(road, dead.end), _link(there, other.end)
+    link, back = _link_at_end(road, dead.end), _link_at_end(there, other.end)
     own: tuple[str, str | None]
     if there.junction is None:
         own = ("junction", road.junction)
@@ -171,7 +171,7 @@ def _may_join(odr: OpenDrive, dead: DeadEnd, other: _LaneEnd) -> bool:
     return (link.element_type, link.element_id) == ("road", there.id) and link.element_s is None
 
 
-def _joined(odr: OpenDrive, meetings: Iterable[_Meeting]) -> OpenDrive:
+def _join_meetings(odr: OpenDrive, meetings: Iterable[_Meeting]) -> OpenDrive:
     """The model with links and lane links for meetings, as far as they agree on each road end."""
     roads, junctions = dict(odr.roads), dict(odr.junctions)
     agreed: dict[tuple[str, End], RoadLink] = {}
@@ -185,14 +185,14 @@ def _joined(odr: OpenDrive, meetings: Iterable[_Meeting]) -> OpenDrive:
         else:
             road = replace(road, successor=link)
         if dead.leads:
-            road = _leading(road, dead, other)
+            road = _lead_on(road, dead, other)
         elif road.junction is not None:
-            junctions[road.junction] = _entered(junctions[road.junction], dead, other)
+            junctions[road.junction] = _add_lane_link(junctions[road.junction], dead, other)
         roads[road.id] = road
     return replace(odr, roads=roads, junctions=junctions)
 
 
-def _leading(road: Road, dead: DeadEnd, other: _LaneEnd) -> Road:
+def _lead_on(road: Road, dead: DeadEnd, other: _LaneEnd) -> Road:
     """A connecting road whose lane leads on."""
     section = road.sections[dead.lane.section]
     lane = section.lanes[dead.lane.lane]
@@ -206,7 +206,7 @@ def _leading(road: Road, dead: DeadEnd, other: _LaneEnd) -> Road:
     return replace(road, sections=tuple(sections))
 
 
-def _entered(junction: Junction, dead: DeadEnd, other: _LaneEnd) -> Junction:
+def _add_lane_link(junction: Junction, dead: DeadEnd, other: _LaneEnd) -> Junction:
     """A junction with a lane link to a connecting lane."""
     link = (other.lane.lane, dead.lane.lane)
     key = (other.lane.road, dead.lane.road, dead.end)

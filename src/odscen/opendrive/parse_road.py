@@ -71,7 +71,7 @@ def parse_road(element: Element, notes: Notes) -> Road:
             notes.skip(rule, "road", tag, len(found))
     link = only(groups, "link")
     length, is_point = _length(element, link, notes)
-    lateral = _container(groups, "lateralProfile", {"superelevation"}, notes)
+    lateral = _container_children(groups, "lateralProfile", {"superelevation"}, notes)
     lanes = only(groups, "lanes")
     if lanes is None:
         raise refusal(element, "there is no <lanes>")
@@ -81,17 +81,20 @@ def parse_road(element: Element, notes: Notes) -> Road:
         id=RoadId(required(element, "id")),
         name=element.get("name", ""),
         length=length,
-        junction=_junction(element, notes),
+        junction=_parse_junction_id(element, notes),
         rule=spelt_choice(element, "rule", _TRAFFIC_RULES, notes),
         predecessor=_road_link(link, "predecessor", notes),
         successor=_road_link(link, "successor", notes),
         types=_road_types(groups.get("type", ()), notes),
         geometry=_plan_view(element, groups, length if is_point else None, notes),
-        elevation=_profile(
-            _container(groups, "elevationProfile", {"elevation"}, notes), "elevation", length, notes
+        elevation=_parse_profile(
+            _container_children(groups, "elevationProfile", {"elevation"}, notes),
+            "elevation",
+            length,
+            notes,
         ),
-        superelevation=_profile(lateral, "superelevation", length, notes),
-        lane_offset=_profile(lane_groups, "laneOffset", length, notes),
+        superelevation=_parse_profile(lateral, "superelevation", length, notes),
+        lane_offset=_parse_profile(lane_groups, "laneOffset", length, notes),
         sections=parse_sections(lanes, lane_groups, length, notes),
         objects=parse_objects(only(groups, "objects"), notes),
         signals=signals,
@@ -111,7 +114,7 @@ def _length(element: Element, link: Element | None, notes: Notes) -> tuple[float
     return positive(element, "length", limit=MAX_ROAD_LENGTH), False
 
 
-def _junction(element: Element, notes: Notes) -> JunctionId | None:
+def _parse_junction_id(element: Element, notes: Notes) -> JunctionId | None:
     text = element.get("junction")
     if text is None or not text.strip():
         detail = "junction is missing" if text is None else "junction is empty"
@@ -160,7 +163,7 @@ def _road_types(elements: Sequence[Element], notes: Notes) -> tuple[RoadType, ..
     return tuple(types)
 
 
-def _container(
+def _container_children(
     groups: dict[str, list[Element]], tag: str, read: set[str], notes: Notes
 ) -> dict[str, list[Element]]:
     """Children of an optional container; those without effect are noted."""
@@ -191,7 +194,7 @@ def _plan_view(
         return (Geometry(0.0, x, y, hdg, point, GeometryKind.LINE, ()),)
     for element in elements:
         found = _holding_a_point(element, notes)
-        if found is not None and _behind(geometry, found, element, notes):
+        if found is not None and _goes_on_behind(geometry, found, element, notes):
             geometry.append(found)
     if not geometry:
         raise refusal(road, "every planView geometry has the length 0")
@@ -208,16 +211,18 @@ def _holding_a_point(element: Element, notes: Notes) -> Geometry | None:
         notes.add(Rule.ZERO_LENGTH, element, f"length is {length:g}; the geometry is left out")
         return None
     if not 0.0 < length <= SLIVER_LENGTH:
-        return _geometry(element, s)
+        return _parse_geometry(element, s)
     try:
-        return _geometry(element, s)
+        return _parse_geometry(element, s)
     except OpenDriveError as error:
         detail = f"{error.problem}; the geometry of {length:.3g} m is left out"
         notes.add(Rule.SLIVER, error.element or element, detail)
         return None
 
 
-def _behind(geometry: list[Geometry], new: Geometry, element: Element, notes: Notes) -> bool:
+def _goes_on_behind(
+    geometry: list[Geometry], new: Geometry, element: Element, notes: Notes
+) -> bool:
     """Whether ``new`` goes on behind ``geometry``, of which slivers that it starts at are dropped.
 
     Raises
@@ -244,7 +249,7 @@ def _behind(geometry: list[Geometry], new: Geometry, element: Element, notes: No
     return True
 
 
-def _geometry(element: Element, s: float) -> Geometry:
+def _parse_geometry(element: Element, s: float) -> Geometry:
     shapes = [shape for shape in element if shape.tag != "userData"]
     if len(shapes) != 1:
         raise refusal(element, f"there are {len(shapes)} shapes where one must be")
@@ -254,7 +259,7 @@ def _geometry(element: Element, s: float) -> Geometry:
     except ValueError as err:
         raise refusal(element, f"<{shown_id(str(shape.tag))}> is no known shape") from err
     length = positive(element, "length", limit=MAX_ROAD_LENGTH)
-    params = _params(shape, kind, length)
+    params = _parse_params(shape, kind, length)
     turning = length * max(map(abs, params), default=0.0)
     if kind in {GeometryKind.ARC, GeometryKind.SPIRAL} and turning > MAX_TURNING:
         raise refusal(shape, f"turns by about {turning:g} rad; the limit is {MAX_TURNING:g}")
@@ -278,7 +283,7 @@ _PARAMETERS: Final[dict[GeometryKind, tuple[str, ...]]] = {
 }
 
 
-def _params(shape: Element, kind: GeometryKind, length: float) -> tuple[float, ...]:
+def _parse_params(shape: Element, kind: GeometryKind, length: float) -> tuple[float, ...]:
     values = tuple(number(shape, name) for name in _PARAMETERS[kind])
     if kind is not GeometryKind.PARAM_POLY3:
         return values
@@ -293,7 +298,7 @@ def _params(shape: Element, kind: GeometryKind, length: float) -> tuple[float, .
     return tuple(value / length ** (i % 4) for i, value in enumerate(values))
 
 
-def _profile(
+def _parse_profile(
     groups: dict[str, list[Element]], tag: str, length: float, notes: Notes
 ) -> tuple[Cubic, ...]:
     """Records of a whole road; zero where the file starts late."""

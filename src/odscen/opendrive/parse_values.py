@@ -62,7 +62,7 @@ def cubics(
             # The slow way finds the attribute at fault and says so.
             following = elements[row + 1] if row + 1 < len(elements) else None
             end = s_end - s0 if following is None else number(following, s_name)
-            s, a, b, c, d = _record(element, s_name, end, notes)
+            s, a, b, c, d = _parse_record(element, s_name, end, notes)
         if s <= last:
             s = ordered_s(element, s_name, s, last, notes)
         last = s
@@ -70,7 +70,7 @@ def cubics(
     return tuple(records)
 
 
-def _record(element: Element, s_name: str, end: float, notes: Notes) -> tuple[float, ...]:
+def _parse_record(element: Element, s_name: str, end: float, notes: Notes) -> tuple[float, ...]:
     """Start and coefficients of a record; those of a sliver may be beyond the limit."""
     s = number(element, s_name)
     if not abs(end - s) <= SLIVER_LENGTH:

@@ -83,7 +83,7 @@ def _drop_namespaces(root: Element) -> None:
             element.tag = etree.QName(element).localname
 
 
-def _label(element: Element) -> str:
+def _label_of(element: Element) -> str:
     tag = shown_id(str(element.tag))
     if tag in _NAMED and element.get("id"):
         return f"{tag} {shown_id(str(element.get('id')))}"
@@ -96,7 +96,7 @@ def _label(element: Element) -> str:
 def element_path(element: Element) -> str:
     """Where an element is, for people: ``road 7 > laneSection 0 > lane -1 > width 2``."""
     chain = [element, *element.iterancestors()]
-    return " > ".join(_label(part) for part in reversed(chain) if part.tag not in _CONTAINERS)
+    return " > ".join(_label_of(part) for part in reversed(chain) if part.tag not in _CONTAINERS)
 
 
 def refusal(element: Element, problem: str) -> OpenDriveError:

@@ -76,7 +76,7 @@ def _within_and_beyond(road: Road, odr: OpenDrive) -> Iterator[tuple[LaneKey, La
             target, target_section, contact = place
             here = LaneKey(road.id, number, lane.id)
             for lane_id in ids:
-                if _enters(target, target_section, lane_id, contact):
+                if _lane_enters(target, target_section, lane_id, contact):
                     yield here, LaneKey(target.id, target_section, lane_id)
 
 
@@ -88,10 +88,10 @@ def _following_place(
         return road, number + 1, "start"
     if not forward and number > 0:
         return road, number - 1, "end"
-    return _linked(road.successor if forward else road.predecessor, odr)
+    return _linked_road(road.successor if forward else road.predecessor, odr)
 
 
-def _linked(link: RoadLink | None, odr: OpenDrive) -> tuple[Road, int, End] | None:
+def _linked_road(link: RoadLink | None, odr: OpenDrive) -> tuple[Road, int, End] | None:
     """Road, section and end of it that a plain road link leads to."""
     if link is None or link.element_type != "road" or link.contact_point is None:
         return None
@@ -106,13 +106,13 @@ def end_section(road: Road, contact: ContactPoint) -> int:
     return 0 if contact == "start" else len(road.sections) - 1
 
 
-def _lane(road: Road, section: int, lane_id: int) -> Lane | None:
+def _lane_of_section(road: Road, section: int, lane_id: int) -> Lane | None:
     return road.sections[section].lanes.get(lane_id) if lane_id else None
 
 
-def _enters(road: Road, section: int, lane_id: int, contact: End) -> bool:
+def _lane_enters(road: Road, section: int, lane_id: int, contact: End) -> bool:
     """Whether the lane exists and is driven away from that end of its section."""
-    lane = _lane(road, section, lane_id)
+    lane = _lane_of_section(road, section, lane_id)
     return lane is not None and is_forward(road, lane) == (contact == "start")
 
 
@@ -129,8 +129,8 @@ def _through_connection(
     for end in _incoming_ends(junction, incoming, connecting, contact):
         incoming_section = end_section(incoming, end)
         for from_id, to_id in connection.lane_links:
-            from_lane = _lane(incoming, incoming_section, from_id)
-            to_lane = _lane(connecting, section, to_id)
+            from_lane = _lane_of_section(incoming, incoming_section, from_id)
+            to_lane = _lane_of_section(connecting, section, to_id)
             if from_lane is None or to_lane is None:
                 continue
             # "entering" seen from the junction: driven away from the point where the roads meet
@@ -233,11 +233,13 @@ def side_links(odr: OpenDrive) -> tuple[SideLink, ...]:
                 continue
             main = odr.roads.get(RoadId(link.element_id))
             if main is not None and main is not road and link.contact_point is None:
-                found.update(dict.fromkeys(_beside(odr, road, end, main, link.element_s)))
+                found.update(dict.fromkeys(_lanes_beside_end(odr, road, end, main, link.element_s)))
     return tuple(found)
 
 
-def _beside(odr: OpenDrive, road: Road, end: End, main: Road, s: float) -> Iterator[SideLink]:
+def _lanes_beside_end(
+    odr: OpenDrive, road: Road, end: End, main: Road, s: float
+) -> Iterator[SideLink]:
     number = next((n for n in reversed(range(len(main.sections))) if main.sections[n].s <= s), None)
     if number is None or s > main.length:
         return
@@ -253,7 +255,7 @@ def _beside(odr: OpenDrive, road: Road, end: End, main: Road, s: float) -> Itera
     for lane in road.sections[section].lanes.values():
         own = lane.predecessors if end == "start" else lane.successors
         for main_id in sorted({*own, *(m for own_id, m in stated if own_id == lane.id)}):
-            if lane.id and _lane(main, number, main_id) is not None:
+            if lane.id and _lane_of_section(main, number, main_id) is not None:
                 leaves = is_forward(road, lane) == (end == "start")
                 here = LaneKey(main.id, number, main_id)
                 yield SideLink(here, s, LaneKey(road.id, section, lane.id), leaves)

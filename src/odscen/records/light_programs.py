@@ -144,9 +144,9 @@ def stage_spans(plan: ShownPlan) -> tuple[StageSpan, ...]:
             last = ""
             continue
         if phase.stage == last:
-            one = found[-1]
-            held = one.seconds if phase.most > phase.least else 0.0
-            found[-1] = one._replace(end=now, least=held + phase.least, most=held + phase.most)
+            span = found[-1]
+            held = span.seconds if phase.most > phase.least else 0.0
+            found[-1] = span._replace(end=now, least=held + phase.least, most=held + phase.most)
             continue
         last = phase.stage
         found.append(
@@ -154,7 +154,7 @@ def stage_spans(plan: ShownPlan) -> tuple[StageSpan, ...]:
                 phase.stage, begin, now, 0.0, phase.least, phase.most, phase.on_call, phase.state
             )
         )
-    begins = [one.begin for one in found[1:]] + [plan.cycle + one.begin for one in found[:1]]
+    begins = [span.begin for span in found[1:]] + [plan.cycle + span.begin for span in found[:1]]
     return tuple(
         one._replace(split=following - one.begin)
         for one, following in zip(found, begins, strict=True)
@@ -164,12 +164,14 @@ def stage_spans(plan: ShownPlan) -> tuple[StageSpan, ...]:
 def programs_to_json(programs: tuple[LightProgram, ...]) -> str:
     """One JSON document."""
     data = {"format": _FORMAT, "version": _VERSION, "lights": programs}
-    return json.dumps(data, default=_fields, separators=(",", ":"), allow_nan=False)
+    return json.dumps(data, default=_shallow_fields, separators=(",", ":"), allow_nan=False)
 
 
-def _fields(one: LightProgram | ShownGroup | ShownPlan | ShownDetector) -> dict[str, object]:
+def _shallow_fields(
+    light_program: LightProgram | ShownGroup | ShownPlan | ShownDetector,
+) -> dict[str, object]:
     """What ``asdict`` gives, one level; it would copy each text."""
-    return {field.name: getattr(one, field.name) for field in fields(one)}
+    return {field.name: getattr(light_program, field.name) for field in fields(light_program)}
 
 
 @lru_cache(maxsize=8)
@@ -184,11 +186,11 @@ def programs_from_json(text: str) -> tuple[LightProgram, ...]:
     with stored_document(
         text, form=_FORMAT, version=_VERSION, what="the programs of lights"
     ) as data:
-        return tuple(_light(light) for light in data["lights"])
+        return tuple(_read_light(light) for light in data["lights"])
 
 
-def _light(data: dict[str, object]) -> LightProgram:
-    light = json.loads(json.dumps(data), object_hook=_tuples)
+def _read_light(data: dict[str, object]) -> LightProgram:
+    light = json.loads(json.dumps(data), object_hook=_lists_to_tuples)
     groups = tuple(ShownGroup(**group) for group in light.pop("groups"))
     plans = tuple(
         ShownPlan(**{**plan, "phases": tuple(ProgramPhase(*one) for one in plan["phases"])})
@@ -198,7 +200,7 @@ def _light(data: dict[str, object]) -> LightProgram:
     return LightProgram(**light, groups=groups, plans=plans, detectors=detectors)
 
 
-def _tuples(data: dict[str, object]) -> dict[str, object]:
+def _lists_to_tuples(data: dict[str, object]) -> dict[str, object]:
     def made(value: object) -> object:
         return tuple(map(made, value)) if isinstance(value, list) else value
 

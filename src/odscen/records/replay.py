@@ -40,7 +40,7 @@ def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
     prefix = next((p for p in ("vehicle_", "person_", "") if f"{p}x" in columns), None)
     clock = next((name for name in ("timestep_time", "time") if name in columns), None)
     if prefix is None or clock is None:
-        return _nobody()
+        return _empty_positions()
     names = {name: f"{prefix}{name}" for name in ("id", "x", "y", "angle", "speed")}
     names |= {ours: f"{prefix}{old}" for old, ours in _OPTIONAL.items() if prefix + old in columns}
     actors = pl.DataFrame(
@@ -72,7 +72,7 @@ def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
     ).select("time", "id", "category", "row", "x", "y", "hdg", "speed", *extra)
 
 
-def _nobody() -> pl.DataFrame:
+def _empty_positions() -> pl.DataFrame:
     import polars as pl
 
     numbers = dict.fromkeys(("x", "y", "hdg", "speed"), pl.Float64)
@@ -104,10 +104,10 @@ def replay_columns(trajectories: pl.DataFrame, plan: Plan, *, every: int = 1) ->
     rows, number, times = rows.filter(pl.Series(kept)), number[kept] // every, times[::every]
     actor, x, y, hdg, speed = (rows[name].to_numpy() for name in ("row", "x", "y", "hdg", "speed"))
     first = np.searchsorted(number, np.arange(len(times) + 1))
-    return _columns(times, first, actor, x, y, hdg, speed)
+    return _rounded_columns(times, first, actor, x, y, hdg, speed)
 
 
-def _columns(
+def _rounded_columns(
     times: np.ndarray,
     first: np.ndarray,
     actor: np.ndarray,

@@ -220,15 +220,15 @@ class Plan:
             "trajectories": self.trajectories,
         }
         if self.measures:
-            head["measures"] = [asdict(one) for one in self.measures]
-            head["closed"] = [asdict(one) for one in self.closed]
+            head["measures"] = [asdict(measure) for measure in self.measures]
+            head["closed"] = [asdict(period) for period in self.closed]
         said: dict[str, Any] = {
             "warm_up": self.warm_up,
             "interval": self.interval,
             "clock": self.clock,
         }
-        said["stations"] = [asdict(one) for one in self.stations]
-        said["parking"] = [asdict(one) for one in self.parking]
+        said["stations"] = [asdict(station) for station in self.stations]
+        said["parking"] = [asdict(parking) for parking in self.parking]
         said["criteria"] = list(self.criteria)
         head |= {name: value for name, value in said.items() if value}
         return json_with_rows(
@@ -250,15 +250,15 @@ class Plan:
             x, y = data["net_offset"]
             data["net_offset"] = (float(x), float(y))
             data["actors"] = tuple(map(_PLANNED_ACTOR, data["actors"]))
-            data["measures"] = _nested(_PLANNED_MEASURE, data.get("measures", ()), "lines")
-            data["closed"] = _nested(_CLOSED_PERIOD, data.get("closed", ()), "pairs")
+            data["measures"] = _make_nested(_PLANNED_MEASURE, data.get("measures", ()), "lines")
+            data["closed"] = _make_nested(_CLOSED_PERIOD, data.get("closed", ()), "pairs")
             data["stations"] = tuple(map(PlannedStation.from_dict, data.get("stations", ())))
             data["parking"] = tuple(map(_PLANNED_PARKING, data.get("parking", ())))
             data["criteria"] = tuple(data.get("criteria", ()))
             return _PLAN({key: data[key] for key in data.keys() - {"format", "version"}})
 
 
-def _nested(
+def _make_nested(
     make: Callable[[Mapping[str, Any]], _Row], rows: Iterable[Mapping[str, Any]], name: str
 ) -> tuple[_Row, ...]:
     """Make rows of which one field has tuples of tuples."""

@@ -113,7 +113,7 @@ def clock_axis(begin: float, end: float) -> Axis:
     Within the first hour without a clock the labels are minutes.
     """
     steps = (1, 2, 5, 10, 15, 30, 60, 120, 180, 360)
-    step = next((60.0 * one for one in steps if end - begin <= one * 540.0), 43_200.0)
+    step = next((60.0 * step for step in steps if end - begin <= step * 540.0), 43_200.0)
     first = np.ceil(begin / step - 1e-9) * step + 0.0  # not -0
     values = np.arange(first, end + 1e-6, step).tolist()
     if not has_clock() and end <= 3600.0:
@@ -149,14 +149,14 @@ def line_chart(
     end
         Where the axis of time ends, seconds; with the last value if not given.
     """
-    top = max((_peak(line) for line in series), default=0.0)
+    top = max((_peak_of_line(line) for line in series), default=0.0)
     frame = ChartFrame(
         time_axis(max(float(time[-1]) if end is None else end, 1.0)),
         value_axis(top, y_label),
         height,
     )
     parts = [
-        _band(frame, time, line)
+        _draw_band(frame, time, line)
         for line in series
         if line.low is not None and line.high is not None
     ]
@@ -164,7 +164,7 @@ def line_chart(
         element("path", d=_line_data(frame, time, line.y), class_=f"line {line.style}")
         for line in series
     ]
-    return chart(frame, parts, description=description, keys=_legend(series))
+    return chart(frame, parts, description=description, keys=_draw_legend(series))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -266,7 +266,7 @@ def legend(entries: Sequence[tuple[str, str]]) -> Markup:
     return element("div", *items, class_="legend")
 
 
-def _peak(line: Series) -> float:
+def _peak_of_line(line: Series) -> float:
     curve = line.y if line.high is None else np.fmax(line.high, line.y)
     finite = curve[np.isfinite(curve)]
     return float(finite.max()) if finite.size else 0.0
@@ -295,13 +295,13 @@ def _tick_text(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 1000 else number(value, 3)
 
 
-def _runs(valid: NDArray[np.bool_]) -> list[slice]:
+def _runs_of_true(valid: NDArray[np.bool_]) -> list[slice]:
     """Stretches of consecutive true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], valid, [False])).astype(np.int8)))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _points(x: FloatArray, y: FloatArray) -> str:
+def _format_points(x: FloatArray, y: FloatArray) -> str:
     return " ".join(
         f"{number(a, 1)},{number(b, 1)}" for a, b in zip(x.tolist(), y.tolist(), strict=True)
     )
@@ -311,22 +311,22 @@ def _line_data(frame: ChartFrame, time: FloatArray, y: FloatArray) -> str:
     x, height = np.asarray(frame.x(time)), np.asarray(frame.y(y))
     # A lone value would be invisible as a line: a stub with round caps shows as a dot.
     return "".join(
-        f"M{_points(x[run], height[run])}" + ("h0.1" if run.stop - run.start == 1 else "")
-        for run in _runs(np.isfinite(y))
+        f"M{_format_points(x[run], height[run])}" + ("h0.1" if run.stop - run.start == 1 else "")
+        for run in _runs_of_true(np.isfinite(y))
     )
 
 
-def _band(frame: ChartFrame, time: FloatArray, line: Series) -> Markup:
+def _draw_band(frame: ChartFrame, time: FloatArray, line: Series) -> Markup:
     low, high = np.asarray(line.low), np.asarray(line.high)
     x, below, above = np.asarray(frame.x(time)), np.asarray(frame.y(low)), np.asarray(frame.y(high))
     data = "".join(
-        f"M{_points(x[run], above[run])} {_points(x[run][::-1], below[run][::-1])}z"
-        for run in _runs(np.isfinite(low) & np.isfinite(high))
+        f"M{_format_points(x[run], above[run])} {_format_points(x[run][::-1], below[run][::-1])}z"
+        for run in _runs_of_true(np.isfinite(low) & np.isfinite(high))
     )
     return element("path", d=data, class_=f"band {line.style}")
 
 
-def _legend(series: Sequence[Series]) -> Markup | None:
+def _draw_legend(series: Sequence[Series]) -> Markup | None:
     if len(series) < 2 and all(line.low is None for line in series):
         return None
     entries = [(line.style, line.label) for line in series]

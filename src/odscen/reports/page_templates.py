@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 def render_page(template: str, **values: object) -> str:
     """Whole page of a template that extends ``page.html.j2``; ``values`` has its ``title``."""
-    return _template(template).render(values)
+    return _load_template(template).render(values)
 
 
 def render_block(template: str, block: str, **values: object) -> Markup:
     """One block of a template, such as one section of the report of a run."""
-    loaded = _template(template)
+    loaded = _load_template(template)
     return Markup("".join(loaded.blocks[block](loaded.new_context(values))))
 
 
@@ -68,15 +68,17 @@ def html_table(
 def _fill_macro(macro: str, *values: object, parts: Sequence[Markup | None]) -> Markup:
     """Call a macro of ``kit.html.j2`` that is written around what it is called with."""
     inner = Markup("\n".join(part for part in parts if part))
-    return Markup(getattr(_template("kit.html.j2").module, macro)(*values, caller=lambda: inner))
+    return Markup(
+        getattr(_load_template("kit.html.j2").module, macro)(*values, caller=lambda: inner)
+    )
 
 
-def _template(name: str) -> Template:
-    return _environment().get_template(name)
+def _load_template(name: str) -> Template:
+    return _template_environment().get_template(name)
 
 
 @cache
-def _environment() -> Environment:
+def _template_environment() -> Environment:
     environment = Environment(
         loader=FunctionLoader(lambda name: _read_text("templates", name)),
         autoescape=True,

@@ -33,7 +33,7 @@ def figure_cards(section: ReportSection, values: Mapping[str, Any]) -> list[Card
         Figures and counts of the run by name, in the units of the registry.
     """
     return [
-        _card(figure, float(value), values)
+        _make_card(figure, float(value), values)
         for figure in RUN_FIGURES
         if figure.section is section and (value := values.get(figure.name)) is not None
     ]
@@ -43,7 +43,7 @@ def named_cards(names: Iterable[str], values: Mapping[str, Any]) -> list[Card]:
     """Cards of the figures of these names that the run has; ``values`` as for figure_cards."""
     figures = [figure for name in names if (figure := run_figure(name)) is not None]
     return [
-        _card(figure, float(value), values)
+        _make_card(figure, float(value), values)
         for figure in figures
         if (value := values.get(figure.name)) is not None
     ]
@@ -63,7 +63,7 @@ def _format_value(figure: RunFigure, value: float) -> str:
     return f"{text} {display.unit}".rstrip()
 
 
-def _card(figure: RunFigure, value: float, values: Mapping[str, Any]) -> Card:
+def _make_card(figure: RunFigure, value: float, values: Mapping[str, Any]) -> Card:
     note = figure.note if isinstance(figure.note, str) else figure.note(values)
     planned = values.get("planned")
     if figure.count and figure.better is Better.HIGHER and planned:

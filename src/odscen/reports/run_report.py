@@ -194,7 +194,7 @@ def render_report(
 def _head_values(
     title: str, plan: Plan, summary: Mapping[str, Any], usability: Usability, counts: Values
 ) -> dict[str, Any]:
-    style, words = _verdict(summary, usability)
+    style, words = _verdict_words(summary, usability)
     weather = summary.get("environment")
     if isinstance(weather, dict):
         weather = str(weather.get("name") or weather.get("preset") or "")
@@ -224,7 +224,7 @@ _STYLES = {
 }
 
 
-def _verdict(summary: Mapping[str, Any], usability: Usability) -> tuple[str, str]:
+def _verdict_words(summary: Mapping[str, Any], usability: Usability) -> tuple[str, str]:
     """Class and words."""
     if summary.get("status") == RunStatus.FAILED:
         return "bad", "The run failed"

@@ -50,7 +50,7 @@ def shown_bars(rows: Sequence[tuple[float, str]], links: Sequence[int]) -> list[
     bars: list[TimeBar] = []
     for (begin, state), (end, _) in pairwise(rows):
         letters = {state[n] for n in links}
-        kind = next((_BAR_KINDS[one] for one in "Ggy" if one in letters), "")
+        kind = next((_BAR_KINDS[name] for name in "Ggy" if name in letters), "")
         if not kind:
             continue
         if bars and bars[-1].end == begin and bars[-1].shown == kind:
@@ -180,7 +180,7 @@ def bar_chart(
     scale = BarScale.of([name for name, _ in rows], begin=begin, end=end, width=width)
     top = _HEAD if spans else 0.0
     bottom = top + _ROW * len(rows) + 2.0
-    parts: list[Markup] = [element("title", description), *_ticks(scale, top, bottom)]
+    parts: list[Markup] = [element("title", description), *_draw_ticks(scale, top, bottom)]
     parts += _span_row(scale, spans)
     for row, (name, bars) in enumerate(rows):
         parts += _group_row(scale, name, bars, top + _ROW * row + _ROW / 2.0 + 1.0)
@@ -199,10 +199,10 @@ def bar_chart(
     )
 
 
-def _ticks(scale: BarScale, top: float, bottom: float) -> Iterator[Markup]:
+def _draw_ticks(scale: BarScale, top: float, bottom: float) -> Iterator[Markup]:
     span = scale.end - scale.begin
     most = min(_MOST_TICKS, int((scale.width - scale.left) / 40.0))
-    step = next((one for one in _TICKS if span / one <= most), 1200.0)
+    step = next((value for value in _TICKS if span / value <= most), 1200.0)
     tick = -(-scale.begin // step) * step
     while tick <= scale.end + 1e-9:
         at = number(scale.x(tick), 1)
@@ -215,7 +215,7 @@ def _ticks(scale: BarScale, top: float, bottom: float) -> Iterator[Markup]:
 def _span_row(scale: BarScale, spans: Sequence[PhaseSpan]) -> Iterator[Markup]:
     """Stages with their seconds where there is room, else with their ids."""
     if spans:
-        yield _name(scale, "Stage", 15.0)
+        yield _draw_name(scale, "Stage", 15.0)
     for span in spans:
         left, wide = scale.x(span.begin), scale.x(span.end) - scale.x(span.begin)
         seconds = f"{number(span.end - span.begin, 1)} s"
@@ -226,9 +226,9 @@ def _span_row(scale: BarScale, spans: Sequence[PhaseSpan]) -> Iterator[Markup]:
         yield element("rect", title, **place, y=2, height=18, class_=style)
         words = next(
             (
-                one
-                for one in (f"{span.stage}: {seconds}", span.stage)
-                if span.stage and _LETTER * len(one) < wide
+                name
+                for name in (f"{span.stage}: {seconds}", span.stage)
+                if span.stage and _LETTER * len(name) < wide
             ),
             None,
         )
@@ -237,7 +237,7 @@ def _span_row(scale: BarScale, spans: Sequence[PhaseSpan]) -> Iterator[Markup]:
             yield element("text", words, x=at, y=15, text_anchor="middle", class_="in")
 
 
-def _name(scale: BarScale, name: str, y: float) -> Markup:
+def _draw_name(scale: BarScale, name: str, y: float) -> Markup:
     room = int((scale.left - 12.0) / _LETTER)
     short = name if len(name) <= room + 1 else f"{name[:room]}…"
     title = element("title", name) if short != name else None
@@ -248,7 +248,7 @@ def _name(scale: BarScale, name: str, y: float) -> Markup:
 def _group_row(
     scale: BarScale, name: str, bars: Sequence[TimeBar], middle: float
 ) -> Iterator[Markup]:
-    yield _name(scale, name, middle + 4.0)
+    yield _draw_name(scale, name, middle + 4.0)
     ends = {"x1": number(scale.left), "x2": number(scale.x(scale.end), 1)}
     yield element("line", **ends, y1=number(middle), y2=number(middle), class_="red")
     for bar in bars:

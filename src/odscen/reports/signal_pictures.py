@@ -81,7 +81,7 @@ class PictureFrame(NamedTuple):
     def path(self, points: Sequence[tuple[float, float]] | FloatArray) -> str:
         """``d`` of a path through points in metres."""
         return "M" + " L".join(
-            f"{number(x, 1)} {number(y, 1)}" for x, y in (self.point(*one) for one in points)
+            f"{number(x, 1)} {number(y, 1)}" for x, y in (self.point(*point) for point in points)
         )
 
 
@@ -98,22 +98,24 @@ def junction_ground(drawing: MapDrawing, frame: PictureFrame) -> Markup:
     window = box(*bounds)
     shapes = []
     for name, kinds in _KINDS.items():
-        rings = [ring for area in near.areas if area.kind in kinds for ring in _each(area.rings)]
-        if outline := _outline(rings, window, frame):
+        rings = [
+            ring for area in near.areas if area.kind in kinds for ring in _each_line(area.rings)
+        ]
+        if outline := _outline_of_rings(rings, window, frame):
             shapes.append(element("path", d=outline, class_=name))
     shapes += [
         element("path", d=frame.path(line), class_="stop-line")
-        for line in _each(near.stop_lines.touching(bounds))
+        for line in _each_line(near.stop_lines.touching(bounds))
     ]
     return element("g", *shapes, class_="ground")
 
 
-def _each(lines: Lines) -> Iterator[FloatArray]:
+def _each_line(lines: Lines) -> Iterator[FloatArray]:
     for begin, end in zip(lines.start[:-1].tolist(), lines.start[1:].tolist(), strict=True):
         yield lines.xy[begin:end]
 
 
-def _outline(rings: Sequence[FloatArray], window: object, frame: PictureFrame) -> str:
+def _outline_of_rings(rings: Sequence[FloatArray], window: object, frame: PictureFrame) -> str:
     """Outline of all rings together inside of the window; empty if there is nothing."""
     import shapely
 
@@ -196,7 +198,7 @@ class JunctionPictures:
         self._light = light
         self._drawing = drawing
         self._ident = ident
-        points = list(_reach(light, _APPROACH))
+        points = list(_points_to_show(light, _APPROACH))
         self._frame = PictureFrame.around(points, side=SIDE, margin=_MARGIN) if points else None
 
     def ground(self) -> Markup | None:
@@ -212,15 +214,17 @@ class JunctionPictures:
         frame = self._frame
         if frame is None:
             return []
-        return [self._stage(stage, frame) for stage in stage_spans(plan)]
+        return [self._draw_stage(stage, frame) for stage in stage_spans(plan)]
 
     def site(self) -> Markup | None:
         """The whole junction: movements with the names of their groups, and detectors."""
         light = self._light
-        loops = [one for one in light.detectors if one.place and not one.bus]
-        areas = [one for one in light.detectors if len(one.place) > 1 and one.bus]
+        loops = [detector for detector in light.detectors if detector.place and not detector.bus]
+        areas = [
+            detector for detector in light.detectors if len(detector.place) > 1 and detector.bus
+        ]
         approach = _BUS_APPROACH if areas else _APPROACH
-        points = [*_reach(light, approach), *(p for one in loops for p in one.place)]
+        points = [*_points_to_show(light, approach), *(p for loop in loops for p in loop.place)]
         if self._frame is None:
             return None
         frame = PictureFrame.around(points, side=SITE, margin=_SITE_MARGIN)
@@ -228,14 +232,16 @@ class JunctionPictures:
         count = len(light.detectors)
         words = f"Junction {', '.join(light.junctions)}: {len(light.groups)} signal groups"
         words += f", {count} detectors" if count else ""
-        shapes = [shape for group in light.groups for _, shape in _movements(group, frame, None)]
+        shapes = [
+            shape for group in light.groups for _, shape in _draw_movements(group, frame, None)
+        ]
         return element(
             "svg",
             element("title", words),
             ground,
-            *(_bus_area(light, one, frame) for one in areas),
+            *(_bus_area(light, area, frame) for area in areas),
             *shapes,
-            *(_loop(light, one, frame) for one in loops),
+            *(_draw_loop(light, loop, frame) for loop in loops),
             *(_group_name(group, frame) for group in light.groups if any(group.paths)),
             *_detector_names(light, loops, frame),
             viewBox=f"0 0 {number(SITE)} {number(SITE)}",
@@ -245,10 +251,14 @@ class JunctionPictures:
             class_="picture site-picture",
         )
 
-    def _stage(self, stage: StageSpan, frame: PictureFrame) -> StagePicture:
+    def _draw_stage(self, stage: StageSpan, frame: PictureFrame) -> StagePicture:
         light = self._light
         words, names = stage_words(stage), " ".join(stage.groups(light))
-        shapes = [one for group in light.groups for one in _movements(group, frame, stage.state)]
+        shapes = [
+            draw_movement
+            for group in light.groups
+            for draw_movement in _draw_movements(group, frame, stage.state)
+        ]
         ground = None
         if self._drawing is not None:
             ground = element("use", href=f"#{self._ident}")
@@ -269,25 +279,25 @@ class JunctionPictures:
         return StagePicture(stage, picture, words, names + (" on call" if stage.on_call else ""))
 
 
-def _reach(light: LightProgram, approach: float) -> Iterator[tuple[float, float]]:
+def _points_to_show(light: LightProgram, approach: float) -> Iterator[tuple[float, float]]:
     """Points that have to be in a picture: paths, with the last metres before their stop lines."""
     for group in light.groups:
         for path in group.paths:
             yield from path
             if len(path) > 1 and not group.walk:
-                yield _back(path, approach)
+                yield _point_before(path, approach)
                 (x0, y0), (x1, y1) = path[-2:]
-                yield _back(((x1, y1), (x0, y0)), approach)
+                yield _point_before(((x1, y1), (x0, y0)), approach)
 
 
-def _back(path: Sequence[tuple[float, float]], away: float) -> tuple[float, float]:
+def _point_before(path: Sequence[tuple[float, float]], away: float) -> tuple[float, float]:
     """So many metres before the first point of a path, straight on."""
     (x0, y0), (x1, y1) = path[:2]
     length = max(hypot(x1 - x0, y1 - y0), 1e-9)
     return x0 - (x1 - x0) / length * away, y0 - (y1 - y0) / length * away
 
 
-def _movements(
+def _draw_movements(
     group: ShownGroup, frame: PictureFrame, state: str | None
 ) -> Iterator[tuple[str, Markup]]:
     """What each movement shows, and its line and head; without a state they show ``any``."""
@@ -297,10 +307,10 @@ def _movements(
         if len(path) > 1:
             yield kind, element("path", d=frame.path(path), class_=style)
             if kind != "red" and not group.walk:
-                yield kind, _head(path, frame, kind)
+                yield kind, _draw_head(path, frame, kind)
 
 
-def _head(path: Sequence[tuple[float, float]], frame: PictureFrame, kind: str) -> Markup:
+def _draw_head(path: Sequence[tuple[float, float]], frame: PictureFrame, kind: str) -> Markup:
     """Triangle at the end of a movement."""
     (x0, y0), (x1, y1) = path[-2:]
     length = max(hypot(x1 - x0, y1 - y0), 1e-9)
@@ -312,7 +322,7 @@ def _head(path: Sequence[tuple[float, float]], frame: PictureFrame, kind: str) -
     return element("path", d=f"{frame.path([tip, left, right])} Z", class_=f"arrow {kind}")
 
 
-def _loop(light: LightProgram, detector: ShownDetector, frame: PictureFrame) -> Markup:
+def _draw_loop(light: LightProgram, detector: ShownDetector, frame: PictureFrame) -> Markup:
     """A loop in its lane, or a circle where people wait."""
     title = _detector_title(light, detector)
     if detector.call:
@@ -353,7 +363,7 @@ def _group_name(group: ShownGroup, frame: PictureFrame) -> Markup:
         path = ends[0]
         x, y = (path[0][0] + path[-1][0]) / 2.0, (path[0][1] + path[-1][1]) / 2.0
     else:
-        places = [_back(path, _LABEL_AT) for path in ends]
+        places = [_point_before(path, _LABEL_AT) for path in ends]
         x = sum(x for x, _ in places) / len(places)
         y = sum(y for _, y in places) / len(places)
     at_x, at_y = frame.point(x, y)
@@ -365,11 +375,11 @@ def _detector_names(
 ) -> Iterator[Markup]:
     """Names of detectors behind them, those of one detector in several lanes once."""
     named: dict[str, list[ShownDetector]] = {}
-    for one in detectors:
-        named.setdefault(detector_label(light, one), []).append(one)
+    for detector in detectors:
+        named.setdefault(detector_label(light, detector), []).append(detector)
     taken: list[tuple[float, float]] = []
     for label, some in named.items():
-        ends = [frame.point(*one.place[0]) for one in some]
+        ends = [frame.point(*detector.place[0]) for detector in some]
         x, y = (sum(values) / len(ends) for values in zip(*ends, strict=True))
         anchor = "middle"
         # Away from the junction: above or below, or where a road leads to the side, beside.

@@ -47,13 +47,13 @@ def split_rows(light: LightProgram, plan: ShownPlan) -> list[tuple[str, ...]]:
 def detector_rows(light: LightProgram) -> list[tuple[str, ...]]:
     """Cells of :data:`DETECTOR_HEADS`; detectors with one name and purpose are one row."""
     loops: dict[tuple[str, ...], int] = {}
-    for one in light.detectors:
-        before, gap = number(one.ahead, 1), number(one.gap, 1)
-        if one.bus:
-            before, gap = f"0 to {number(one.length, 0)}", ""
-        elif one.call:
+    for detector in light.detectors:
+        before, gap = number(detector.ahead, 1), number(detector.gap, 1)
+        if detector.bus:
+            before, gap = f"0 to {number(detector.length, 0)}", ""
+        elif detector.call:
             before, gap = "", ""
-        row = (detector_label(light, one), before, gap, detector_purpose(one))
+        row = (detector_label(light, detector), before, gap, detector_purpose(detector))
         loops[row] = loops.get(row, 0) + 1
     return [(name, str(count), *more) for (name, *more), count in loops.items()]
 
@@ -117,13 +117,13 @@ class _Sheet:
         name = f"Traffic light of junction {', '.join(light.junctions)}"
         control = {"fixed": "fixed-time", "actuated": "actuated"}[light.control]
         whose = "program of the scenario" if light.own else "program of the map"
-        self._text(name, style="title", height=30.0)
+        self._draw_text(name, style="title", height=30.0)
         told = " · ".join(part for part in (self._title, control, whose) if part)
-        self._text(told, style="soft", height=26.0)
-        self._junction()
+        self._draw_text(told, style="soft", height=26.0)
+        self._draw_junction()
         for plan in light.plans:
-            self._plan(plan)
-        self._legend()
+            self._draw_plan(plan)
+        self._draw_legend()
         height = self._y + _EDGE
         return element(
             "svg",
@@ -139,25 +139,25 @@ class _Sheet:
             class_="sheet",
         )
 
-    def _text(
+    def _draw_text(
         self, words: str, *, x: float = _EDGE, style: str | None = None, height: float = _LINE
     ) -> None:
         self._parts.append(element("text", words, x=x, y=self._y + 0.75 * height, class_=style))
         self._y += height
 
-    def _framed(self, picture: Markup, x: float, y: float, side: float) -> None:
+    def _draw_framed(self, picture: Markup, x: float, y: float, side: float) -> None:
         self._parts.append(element("rect", x=x, y=y, width=side, height=side, rx=6, class_="frame"))
         self._parts.append(element("svg", picture, x=x, y=y, width=side, height=side))
 
-    def _junction(self) -> None:
+    def _draw_junction(self) -> None:
         """Picture of the junction, and beside it plans, groups and detectors."""
         light, begin = self._light, self._y
         site = self._pictures.site()
         x = _EDGE
         if site is not None:
-            self._framed(site, _EDGE, begin, SITE)
+            self._draw_framed(site, _EDGE, begin, SITE)
             x += SITE + 2.0 * _GAP
-        self._table(
+        self._draw_table(
             "Signal groups",
             ("Group", "Movements"),
             [(group.id, ", ".join(group.movements)) for group in light.groups],
@@ -166,10 +166,12 @@ class _Sheet:
         )
         if light.detectors:
             columns = (0.0, 100.0, 170.0, 350.0, 420.0)
-            self._table("Detectors", DETECTOR_HEADS, detector_rows(light), x=x, columns=columns)
+            self._draw_table(
+                "Detectors", DETECTOR_HEADS, detector_rows(light), x=x, columns=columns
+            )
         self._y = max(self._y, begin + (SITE if site is not None else 0.0)) + _GAP
 
-    def _table(
+    def _draw_table(
         self,
         heading: str,
         heads: Sequence[str],
@@ -178,7 +180,7 @@ class _Sheet:
         x: float,
         columns: Sequence[float],
     ) -> None:
-        self._text(heading, x=x, style="heading", height=24.0)
+        self._draw_text(heading, x=x, style="heading", height=24.0)
         for number_, row in enumerate((heads, *rows)):
             y = self._y + 0.75 * _LINE
             style = "soft" if number_ == 0 else None
@@ -187,7 +189,7 @@ class _Sheet:
             self._y += _LINE
         self._y += _GAP
 
-    def _plan(self, plan: ShownPlan) -> None:
+    def _draw_plan(self, plan: ShownPlan) -> None:
         light = self._light
         self._parts.append(
             element("line", x1=_EDGE, x2=WIDTH - _EDGE, y1=self._y, y2=self._y, class_="rule")
@@ -195,28 +197,28 @@ class _Sheet:
         self._y += _GAP
         words = f"cycle {number(plan.cycle)} s, offset {number(plan.offset)} s"
         head = f"Plan {plan.id}: {words}" if len(light.plans) > 1 else words.capitalize()
-        self._text(head, style="heading", height=26.0)
-        self._stages(self._pictures.stages(plan))
+        self._draw_text(head, style="heading", height=26.0)
+        self._draw_stages(self._pictures.stages(plan))
         width, height = WIDTH - 2.0 * _EDGE, plan_height(light)
         chart = plan_chart(light, plan, width=width)
         self._parts.append(element("svg", chart, x=_EDGE, y=self._y, width=width, height=height))
         self._y += height + _GAP
         columns = (0.0, 140.0, 260.0, 360.0, 460.0)
-        self._table("Splits", SPLIT_HEADS, split_rows(light, plan), x=_EDGE, columns=columns)
+        self._draw_table("Splits", SPLIT_HEADS, split_rows(light, plan), x=_EDGE, columns=columns)
 
-    def _stages(self, stages: Sequence[StagePicture]) -> None:
+    def _draw_stages(self, stages: Sequence[StagePicture]) -> None:
         each = 168.0
         row = int((WIDTH - 2.0 * _EDGE) // each)
         for begin in range(0, len(stages), row):
             for column, one in enumerate(stages[begin : begin + row]):
                 x = _EDGE + column * each
-                self._framed(one.picture, x, self._y, SIDE)
+                self._draw_framed(one.picture, x, self._y, SIDE)
                 for style, line, words in ((None, 16.0, one.words), ("soft", 32.0, one.detail)):
                     y = self._y + SIDE + line
                     self._parts.append(element("text", words, x=x, y=y, class_=style))
             self._y += SIDE + 44.0
 
-    def _legend(self) -> None:
+    def _draw_legend(self) -> None:
         x = _EDGE
         for picture, words in legend_shapes([self._light]):
             room = 52.0 + 7.2 * len(words)
@@ -246,7 +248,7 @@ def legend_shapes(lights: Iterable[LightProgram]) -> Iterator[tuple[Markup, str]
         yield element("rect", x=2, y=2, width=20, height=10, class_=f"span {kind}"), words
     yield element("rect", x=6, y=3, width=12, height=8, class_="loop"), "detector"
     yield element("circle", cx=12, cy=7, r=5, class_="loop call"), "waiting place with a call"
-    if any(one.bus for light in lights for one in light.detectors):
+    if any(detector.bus for light in lights for detector in light.detectors):
         band = element("rect", x=1, y=3, width=22, height=8, class_="bus-area")
         yield band, "area in which buses are seen"
 

@@ -70,7 +70,7 @@ def figure_of_actors(run: Path, summary: Mapping[str, Any], figure: RunFigure) -
     first = AnalysisTimes.of_summary(summary).warm_up
     with in_file(str(run / layout.ACTORS_FILE)), disk_errors(f"run folder {run}"):
         actors = actors_from_json((run / layout.ACTORS_FILE).read_text(encoding="utf-8"))
-    counted = [one for one in actors if one.depart >= first]
+    counted = [actor for actor in actors if actor.depart >= first]
     data = RunData(counted, end=float(summary["sim_seconds"]))
     found: Values = rounded(figure_values(data, [figure]))
     return found[figure.name]

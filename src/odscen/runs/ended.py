@@ -50,11 +50,11 @@ def read_summary(run: Path) -> dict[str, Any]:
         except OSError as error:
             raise InputError(f"cannot be read: {error.strerror or error}") from error
         with documents(what):
-            _check(summary)
+            _check_summary(summary)
     return summary
 
 
-def _check(summary: dict[str, Any]) -> None:
+def _check_summary(summary: dict[str, Any]) -> None:
     """Raise a ValueError or KeyError for what no run writes."""
     ended = RunStatus(summary["status"]) is not RunStatus.FAILED
     for name, kinds in _PARTS.items():

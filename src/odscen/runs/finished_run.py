@@ -203,8 +203,8 @@ class Run:
         InputError
             If the run failed before it had any.
         """
-        rows = actors_from_json(self._text(layout.ACTORS_FILE))
-        return _table([asdict(row) for row in rows], get_type_hints(ActorOutcome))
+        rows = actors_from_json(self._read_text(layout.ACTORS_FILE))
+        return _make_table([asdict(row) for row in rows], get_type_hints(ActorOutcome))
 
     def events(self) -> pl.DataFrame:
         """What happened, in order of time.
@@ -223,12 +223,12 @@ class Run:
         InputError
             If the run failed before it had any.
         """
-        rows = events_from_json(self._text(layout.EVENTS_FILE))
+        rows = events_from_json(self._read_text(layout.EVENTS_FILE))
         said = [
             row._asdict() | {"values": None if row.values is None else json.dumps(row.values)}
             for row in rows
         ]
-        return _table(said, {**get_type_hints(Event), "values": str})
+        return _make_table(said, {**get_type_hints(Event), "values": str})
 
     def trajectories(self) -> pl.DataFrame:
         """Where everyone was, at every recorded time.
@@ -252,7 +252,7 @@ class Run:
                 "the run has no trajectories: they were not recorded, or there were no road users",
                 file=str(self.folder),
             )
-        plan = Plan.from_json(self._text(layout.PLAN_FILE))
+        plan = Plan.from_json(self._read_text(layout.PLAN_FILE))
         return body_centres(recorded.rows, plan).drop("row")
 
     def lane_places(self) -> LanePlaces:
@@ -264,7 +264,7 @@ class Run:
             If the run does not have them.
         """
         with in_file(str(self.folder / layout.LANE_PLACES_FILE)):
-            return LanePlaces.from_json(self._text(layout.LANE_PLACES_FILE))
+            return LanePlaces.from_json(self._read_text(layout.LANE_PLACES_FILE))
 
     def figures_by(self, place: PlaceKind, *, over_time: bool = False) -> pl.DataFrame:
         """Figures of traffic by place.
@@ -299,7 +299,7 @@ class Run:
             raise NotFoundError("kind of place", place, list(_TABLES))
         name, _ = _TABLES[place], self.summary  # which has them computed
         if not over_time:
-            return places_from_json(self._text(layout.FIGURES_FILE), name)
+            return places_from_json(self._read_text(layout.FIGURES_FILE), name)
         tables = read_tables(self.folder / layout.FIGURES_FOLDER)
         if tables is None:
             raise InputError("traffic was not measured in this run", file=str(self.folder))
@@ -337,14 +337,14 @@ class Run:
             files["report"] = str(self.report)
         return {**self.summary, "folder": str(self.folder), "files": files}
 
-    def _text(self, name: str) -> str:
+    def _read_text(self, name: str) -> str:
         try:
             return (self.folder / name).read_text(encoding="utf-8", errors="replace")
         except OSError as error:
             raise InputError(f"the run has no {name}", file=str(self.folder)) from error
 
 
-def _table(rows: list[dict[str, Any]], hints: Mapping[str, Any]) -> pl.DataFrame:
+def _make_table(rows: list[dict[str, Any]], hints: Mapping[str, Any]) -> pl.DataFrame:
     """Rows as a table with the same types whatever is null in it."""
     import polars as pl
 

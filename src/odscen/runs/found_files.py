@@ -60,7 +60,7 @@ def found_files(folder: Path) -> dict[str, str]:
         "log": layout.LOG_FILE,
     }
     top = str(folder)
-    there = {part: _listed(f"{top}/{part}") for part in ("", sumo, layout.FIGURES_FOLDER)}
+    there = {part: _list_files(f"{top}/{part}") for part in ("", sumo, layout.FIGURES_FOLDER)}
     found = {}
     for key, name in names.items():
         place, _, own = name.rpartition("/")
@@ -69,7 +69,7 @@ def found_files(folder: Path) -> dict[str, str]:
     return {**found, "summary": layout.SUMMARY_FILE}
 
 
-def _listed(folder: str) -> frozenset[str]:
+def _list_files(folder: str) -> frozenset[str]:
     try:
         return frozenset(os.listdir(folder))  # noqa: PTH208 - names, and no paths
     except OSError:

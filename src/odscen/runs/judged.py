@@ -28,11 +28,11 @@ def read_judged(folder: Path) -> RunRecords:
         actors_from_json((folder / layout.ACTORS_FILE).read_text(encoding="utf-8")),
         events_from_json((folder / layout.EVENTS_FILE).read_text(encoding="utf-8")),
         read_conflicts(folder),
-        lambda actor: _speeds(folder, actor),
+        lambda actor: _read_speeds(folder, actor),
     )
 
 
-def _speeds(folder: Path, actor: str) -> pl.DataFrame | None:
+def _read_speeds(folder: Path, actor: str) -> pl.DataFrame | None:
     import polars as pl
 
     files = trajectory_files(folder)

@@ -78,7 +78,7 @@ def read_figures(
     InputError
         If the places of lanes cannot be read, or times do not fit what was measured.
     """
-    return _figures(_Records(run, meso=meso), end=end, times=times)
+    return _measure_traffic(_Records(run, meso=meso), end=end, times=times)
 
 
 class _Records:
@@ -189,7 +189,9 @@ def _measured(
     return places, clock, lanes, parts
 
 
-def _figures(records: _Records, *, end: float, times: AnalysisTimes) -> TrafficFigures | None:
+def _measure_traffic(
+    records: _Records, *, end: float, times: AnalysisTimes
+) -> TrafficFigures | None:
     measured, rows = _measured(records, end=end, times=times), records.rows
     if measured is None:
         return None
@@ -199,14 +201,14 @@ def _figures(records: _Records, *, end: float, times: AnalysisTimes) -> TrafficF
         places,
         end=end,
         queues=None if rows is None else queue_lengths(rows, places, clock),
-        facilities=_facilities(records, parts, places, clock),
+        facilities=_measure_facilities(records, parts, places, clock),
         times=times,
         clock=clock,
         parts=parts,
     )
 
 
-def _facilities(
+def _measure_facilities(
     records: _Records, parts: pl.DataFrame, places: LanePlaces, clock: pl.DataFrame
 ) -> FacilityData | None:
     """Kinds of facilities, control delay and density; ``None`` without the run's SUMO files."""
@@ -250,14 +252,14 @@ def read_run_data(
     """
     first, records = times.warm_up, _Records(run, meso=meso)
     return RunData(
-        outcomes=[one for one in outcomes if one.depart >= first],
-        traffic=_figures(records, end=end, times=times),
-        trips=_since(read_trips(run), "depart", first),
-        conflicts=_since(read_conflicts(run), "begin", first),
+        outcomes=[outcome for outcome in outcomes if outcome.depart >= first],
+        traffic=_measure_traffic(records, end=end, times=times),
+        trips=_rows_since(read_trips(run), "depart", first),
+        conflicts=_rows_since(read_conflicts(run), "begin", first),
         end=end,
         signals=_signal_use(records, end=end),
         visits=read_visits(run),
-        stations=None if meso else _stations(records, end=end, times=times),
+        stations=None if meso else _measure_stations(records, end=end, times=times),
         parking=read_parking(run, begin=first, end=end),
     )
 
@@ -271,7 +273,9 @@ def read_parking(run: Path, *, begin: float = 0.0, end: float) -> ParkingUse | N
     return ParkingUse.of(stays, plan, begin=begin, end=end)
 
 
-def _stations(records: _Records, *, end: float, times: AnalysisTimes) -> pl.DataFrame | None:
+def _measure_stations(
+    records: _Records, *, end: float, times: AnalysisTimes
+) -> pl.DataFrame | None:
     """What the stations of the study counted; ``None`` if there are none, or no trajectories."""
     file = records.run / layout.PLAN_FILE
     rows, lanes = records.trajectories, records.lanes
@@ -289,7 +293,7 @@ def _stations(records: _Records, *, end: float, times: AnalysisTimes) -> pl.Data
     return None if found is None else times.analysed(found)
 
 
-def _since(table: pl.DataFrame | None, column: str, first: float) -> pl.DataFrame | None:
+def _rows_since(table: pl.DataFrame | None, column: str, first: float) -> pl.DataFrame | None:
     return table if table is None or not first else table.filter(table[column] >= first)
 
 

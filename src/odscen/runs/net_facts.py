@@ -47,18 +47,18 @@ def read_net_facts(run: Path) -> NetFacts | None:
     if not (net.is_file() and routes.is_file()):
         return None
     try:
-        return _facts(net, routes)
+        return _read_facts(net, routes)
     except (OSError, ValueError, etree.XMLSyntaxError) as error:
         raise InputError(
             f"the SUMO files of the run cannot be read: {error}", file=str(run / layout.SUMO_FOLDER)
         ) from error
 
 
-def _facts(net: Path, routes: Path) -> NetFacts:
+def _read_facts(net: Path, routes: Path) -> NetFacts:
     # Runs on one map have its network as the same file, see write_sumo_files.
     stat = net.stat()
     same = stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns
-    return replace(_net_facts(_NetFile(net, same)), drivers=_drivers(routes))
+    return replace(_net_facts(_NetFile(net, same)), drivers=_read_drivers(routes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,22 +85,24 @@ def _net_facts(net: _NetFile) -> NetFacts:
         )
         for edge, lane in lanes
     ]
-    ring = {name for one in root.iterfind("roundabout") for name in one.get("edges", "").split()}
+    ring = {
+        name for element in root.iterfind("roundabout") for name in element.get("edges", "").split()
+    }
     known = read_connections(root)
     yields = _giving_way(known)
     mirrored = str.maketrans("lLrR", "rRlL") if root.get("lefthand") == "true" else {}
     links = {
         via: (
             via,
-            one.get("state", "M"),
+            element.get("state", "M"),
             via in yields,
-            one.get("to") in ring,
-            one.get("from") in ring,
+            element.get("to") in ring,
+            element.get("from") in ring,
             yields.get(via, []),
-            one.get("dir", "s").translate(mirrored),
+            element.get("dir", "s").translate(mirrored),
         )
-        for one in root.iterfind("connection")
-        if (via := one.get("via"))
+        for element in root.iterfind("connection")
+        if (via := element.get("via"))
     }
     flags = dict.fromkeys(("gives_way", "onto_ring", "from_ring"), pl.Boolean)
     return NetFacts(
@@ -114,8 +116,8 @@ def _net_facts(net: _NetFile) -> NetFacts:
             },
             orient="row",
         ),
-        follows=_follows(known),
-        shapes={lane.get("id", ""): _points(lane.get("shape", "")) for _, lane in lanes},
+        follows=_read_lane_successors(known),
+        shapes={lane.get("id", ""): _parse_points(lane.get("shape", "")) for _, lane in lanes},
         links=pl.DataFrame(
             list(links.values()),
             schema={
@@ -131,7 +133,7 @@ def _net_facts(net: _NetFile) -> NetFacts:
     )
 
 
-def _follows(net: NetConnections) -> pl.DataFrame:
+def _read_lane_successors(net: NetConnections) -> pl.DataFrame:
     """Lane and lane behind it, over the lanes inside junctions."""
     import polars as pl
 
@@ -139,7 +141,7 @@ def _follows(net: NetConnections) -> pl.DataFrame:
     return pl.DataFrame(list(rows), schema=no_links().schema, orient="row")
 
 
-def _points(shape: str) -> FloatArray:
+def _parse_points(shape: str) -> FloatArray:
     points = [[float(part) for part in point.split(",")[:2]] for point in shape.split()]
     return np.array(points, dtype=np.float64).reshape(-1, 2)
 
@@ -169,7 +171,7 @@ def _metres(text: str | None) -> float | None:
         return None
 
 
-def _drivers(routes: Path) -> pl.DataFrame:
+def _read_drivers(routes: Path) -> pl.DataFrame:
     import polars as pl
 
     kinds: dict[str, tuple[float, float, float, bool]] = {}

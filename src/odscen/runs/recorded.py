@@ -49,8 +49,8 @@ def recorded_files(run: Path, file: str) -> list[Path]:
     file
         Of :data:`odscen.runs.layout.RECORDED`: its name in the folder of a run in one piece.
     """
-    one = run / file
-    return [one] if one.is_file() else sorted((run / RECORDED[file]).glob("part-*.parquet"))
+    path = run / file
+    return [path] if path.is_file() else sorted((run / RECORDED[file]).glob("part-*.parquet"))
 
 
 def trajectory_files(run: Path) -> list[Path]:
@@ -125,7 +125,7 @@ def read_lanes(run: Path) -> pl.DataFrame | None:
     -------
     ``None`` if nothing was recorded, or no vehicle was there.
     """
-    return _read(run, LANES_FILE)
+    return _read_recorded(run, LANES_FILE)
 
 
 def read_lane_segments(run: Path) -> pl.DataFrame | None:
@@ -137,7 +137,7 @@ def read_lane_segments(run: Path) -> pl.DataFrame | None:
     -------
     ``None`` if that was not recorded.
     """
-    return _read(run, LANE_SEGMENTS_FILE)
+    return _read_recorded(run, LANE_SEGMENTS_FILE)
 
 
 def read_trips(run: Path) -> pl.DataFrame | None:
@@ -149,7 +149,7 @@ def read_trips(run: Path) -> pl.DataFrame | None:
     -------
     ``None`` if nothing was recorded, or no road user was there.
     """
-    return _read(run, TRIPS_FILE)
+    return _read_recorded(run, TRIPS_FILE)
 
 
 def read_conflicts(run: Path) -> pl.DataFrame | None:
@@ -176,7 +176,7 @@ def read_light_states(run: Path) -> pl.DataFrame | None:
     """
     import polars as pl
 
-    states = _read(run, LIGHT_STATES_FILE)
+    states = _read_recorded(run, LIGHT_STATES_FILE)
     if states is None:
         return None
     shown = pl.struct("program", "state")
@@ -194,7 +194,7 @@ def read_calls(run: Path) -> pl.DataFrame | None:
     Sorted by detector and time; ``None`` if no light has detectors. Who is there when a slice ends
     is in two rows.
     """
-    return _read(run, CALLS_FILE)
+    return _read_recorded(run, CALLS_FILE)
 
 
 def read_visits(run: Path) -> pl.DataFrame | None:
@@ -204,7 +204,7 @@ def read_visits(run: Path) -> pl.DataFrame | None:
     -------
     In order of departure; ``None`` if the scenario has no lines.
     """
-    return _read(run, VISITS_FILE)
+    return _read_recorded(run, VISITS_FILE)
 
 
 def read_stays(run: Path) -> pl.DataFrame | None:
@@ -215,11 +215,11 @@ def read_stays(run: Path) -> pl.DataFrame | None:
     Columns of :func:`odscen.sumo.outputs.stop_table.stay_table`, in order of arrival; ``None`` if
     no trip of the scenario parks.
     """
-    stays = _read(run, STAYS_FILE)
+    stays = _read_recorded(run, STAYS_FILE)
     return None if stays is None else stays.sort("arrival", "actor")
 
 
-def _read(run: Path, file: str) -> pl.DataFrame | None:
+def _read_recorded(run: Path, file: str) -> pl.DataFrame | None:
     import polars as pl
 
     files = recorded_files(run, file)

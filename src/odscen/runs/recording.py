@@ -76,9 +76,9 @@ def parse_recording(text: str) -> Recording:
         if key == "every":
             every = parse_duration(value)
         elif key == "region":
-            region = _region(value)
+            region = _parse_region(value)
         elif key == "columns":
-            columns = _columns(value)
+            columns = _parse_columns(value)
         else:
             raise InputError(
                 f"trajectories: {part.strip()!r} is not one of none, every=, region=, columns="
@@ -94,7 +94,7 @@ def region_xml(region: tuple[float, float, float, float], net_offset: tuple[floa
     return f'<additional>\n    <poly id="{REGION_ID}" shape="{shape}"/>\n</additional>\n'
 
 
-def _region(text: str) -> tuple[float, float, float, float]:
+def _parse_region(text: str) -> tuple[float, float, float, float]:
     try:
         x0, y0, x1, y1 = (float(number) for number in text.split(":"))
     except ValueError:
@@ -106,7 +106,7 @@ def _region(text: str) -> tuple[float, float, float, float]:
     return x0, y0, x1, y1
 
 
-def _columns(text: str) -> tuple[str, ...]:
+def _parse_columns(text: str) -> tuple[str, ...]:
     wanted = {word.strip() for word in text.split("+")} - set(NEEDED)
     unknown = sorted(wanted - set(OPTIONAL))
     if unknown:

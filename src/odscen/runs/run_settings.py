@@ -165,7 +165,10 @@ class RunSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """As values that JSON can hold; the simulator only where it is not SUMO."""
-        values = {**asdict(self), "expectations": [one.text for one in self.expectations]}
+        values = {
+            **asdict(self),
+            "expectations": [expectation.text for expectation in self.expectations],
+        }
         if self.simulator == "sumo":
             del values["simulator"], values["simulator_options"]
         return values

@@ -173,7 +173,7 @@ class ShippedCatalogue(AssetSource):
 
     def models(self) -> list[Blueprint]:
         """Read the models."""
-        return [_blueprint(row) for row in _shipped_rows("blueprints.json", "blueprints")]
+        return [_read_blueprint(row) for row in _shipped_rows("blueprints.json", "blueprints")]
 
     def weather(self) -> list[WeatherPreset]:
         """Read the weather presets."""
@@ -202,7 +202,7 @@ class FetchedModels(AssetSource):
         """
         try:
             rows = json.loads(self.file.read_text(encoding="utf-8"))["blueprints"]
-            return [_blueprint(row) for row in rows]
+            return [_read_blueprint(row) for row in rows]
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise WorkspaceError(
                 f"{self.file}: not a catalogue of models ({error}); remove it or fetch it again"
@@ -234,8 +234,8 @@ def installed_assets() -> Assets:
 def _own_assets(source: AssetSource) -> Assets:
     """What a source offers, all of the right kind; raises what its code raises, or a TypeError."""
     own = Assets.of(source)
-    for offered, kind in (*((one, Blueprint) for one in own.blueprints.values()),
-                          *((one, WeatherPreset) for one in own.presets.values())):  # fmt: skip
+    for offered, kind in (*((blueprint, Blueprint) for blueprint in own.blueprints.values()),
+                          *((preset, WeatherPreset) for preset in own.presets.values())):  # fmt: skip
         if not isinstance(offered, kind):
             raise TypeError(f"{offered!r} is no {kind.__name__}")
     return own
@@ -256,7 +256,7 @@ def assets_in(folder: Path) -> Assets:
         If the file there cannot be read.
     """
     file = folder / BLUEPRINTS_FILE
-    known = _fetched(file, file.stat().st_mtime_ns) if file.is_file() else shipped_assets()
+    known = _read_fetched(file, file.stat().st_mtime_ns) if file.is_file() else shipped_assets()
     more = installed_assets()
     if not more.blueprints and not more.presets:
         return known
@@ -264,7 +264,7 @@ def assets_in(folder: Path) -> Assets:
 
 
 @lru_cache(maxsize=4)
-def _fetched(file: Path, _changed: int) -> Assets:
+def _read_fetched(file: Path, _changed: int) -> Assets:
     models = {model.id: model for model in FetchedModels(file).models()}
     return Assets(models, shipped_assets().presets)
 
@@ -276,7 +276,7 @@ def blueprint_row(model: Blueprint) -> dict[str, Any]:
     return {**row, "length": length, "width": width, "height": height}
 
 
-def _blueprint(row: Mapping[str, Any]) -> Blueprint:
+def _read_blueprint(row: Mapping[str, Any]) -> Blueprint:
     return Blueprint(
         id=row["id"],
         category=Category(row["category"]),

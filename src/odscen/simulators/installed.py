@@ -56,7 +56,7 @@ def open_simulator(
         If there is none of this name, it cannot be imported or made, or an option is not possible.
     """
     if installed_only and name not in simulator_names():
-        raise _unknown(name)
+        raise _unknown_simulator(name)
     found = _find_class(name)
     values = values_for(found, options, name=name)
     try:
@@ -70,7 +70,7 @@ def open_simulator(
     return made
 
 
-def _unknown(name: str) -> InputError:
+def _unknown_simulator(name: str) -> InputError:
     names = ", ".join(simulator_names())
     return InputError(f"there is no simulator {name!r}; there are {names}", element="simulator")
 
@@ -80,5 +80,5 @@ def _find_class(name: str) -> Any:
         module, _, attribute = _SHIPPED[name].partition(":")
         return getattr(import_module(module), attribute)
     if ":" not in name and name not in simulator_names():
-        raise _unknown(name)
+        raise _unknown_simulator(name)
     return named_object(name, group=GROUP, what="simulator", shipped=f"{', '.join(_SHIPPED)} ship")

@@ -117,7 +117,7 @@ class PositionRecord:
                 raise InputError(f"{position.id!r} is nowhere at {time:g} s: {position[1:]}")
             if position.id in self._ended:
                 raise InputError(f"{position.id!r} is back at {time:g} s, but has arrived before")
-            self._follow(time, position)
+            self._follow_user(time, position)
         for name in [name for name in self._under_way if name not in there]:
             trip = self._under_way.pop(name)
             self._ended[name] = trip, time
@@ -127,13 +127,17 @@ class PositionRecord:
                     travel_time=round(time - trip.depart, 6),
                 )
             )  # fmt: skip
-        self._record(time, list(there.values()))
+        self._record_step(time, list(there.values()))
         self._time, self._steps = time, self._steps + 1
 
     def write(self, folder: Path) -> SimulationOutcome:
         """Write the records into the folder of the run, and say how it ended."""
-        trips = {name: self._trip(name, trip, end) for name, (trip, end) in self._ended.items()}
-        trips |= {name: self._trip(name, trip, None) for name, trip in self._under_way.items()}
+        trips = {
+            name: self._measure_trip(name, trip, end) for name, (trip, end) in self._ended.items()
+        }
+        trips |= {
+            name: self._measure_trip(name, trip, None) for name, trip in self._under_way.items()
+        }
         write_records(self._plan, self._events, folder, trips)
         if self._plan.trajectories and self._states:
             file = folder / layout.TRAJECTORIES_FILE
@@ -147,7 +151,7 @@ class PositionRecord:
             stopped=self._stopped,
         )
 
-    def _follow(self, time: float, position: Position) -> None:
+    def _follow_user(self, time: float, position: Position) -> None:
         """Take in how far a road user has come, and whether it was stopped."""
         trip = self._under_way.get(position.id)
         if trip is None:
@@ -166,7 +170,7 @@ class PositionRecord:
             trip.halts += trip.speed >= STOPPED
         trip.x, trip.y, trip.time, trip.speed = position.x, position.y, time, position.speed
 
-    def _record(self, time: float, positions: Sequence[Position]) -> None:
+    def _record_step(self, time: float, positions: Sequence[Position]) -> None:
         """Keep the states of a step, as often and where they are wanted."""
         recording = self._recording
         if not self._plan.trajectories:
@@ -185,7 +189,7 @@ class PositionRecord:
         self._times.append(time)
         self._states.append(rows)
 
-    def _trip(self, name: str, trip: _TripSoFar, end: float | None) -> Trip:
+    def _measure_trip(self, name: str, trip: _TripSoFar, end: float | None) -> Trip:
         """What was measured on a trip; the time lost is that beyond the free-flow time."""
         planned = self._plan.actors[self._rows[name]]
         loss = None

@@ -98,7 +98,7 @@ class Runs:
         """
         if wish.simulator is not None and wish.simulator.name == CARLA_MIRROR:
             wish = wish.model_copy(update={"carla": True, "simulator": None})
-        run = check_run(self._workspace, scenario, name=name, settings=self._settings(wish))
+        run = check_run(self._workspace, scenario, name=name, settings=self._settings_of_wish(wish))
         if wish.carla and (wish.every is not None or not wish.trajectories):
             raise InputError(
                 "a run that CARLA shows is recorded step by step; leave every and trajectories out"
@@ -114,7 +114,7 @@ class Runs:
             self._active[active.id] = active
         run = replace(run, name=active.id, folder=self._workspace.runs / active.id)
         active.future = self._pool.submit(
-            self._run, active, lambda: self._simulate(active, run, wish)
+            self._run_to_end, active, lambda: self._simulate_run(active, run, wish)
         )
         return active.id
 
@@ -130,7 +130,9 @@ class Runs:
             self._refuse_more()
         live = Live(Pace(paused=wish.paused, speed=wish.speed))
         file = self._workspace.scenarios / f"{name}{SUFFIX}"
-        large = LargeRun(self._workspace, file, name=name, settings=self._settings(wish), live=live)
+        large = LargeRun(
+            self._workspace, file, name=name, settings=self._settings_of_wish(wish), live=live
+        )
         try:
             with self._lock:
                 self._refuse_more()
@@ -139,7 +141,9 @@ class Runs:
         except ConflictError:
             large.end()
             raise
-        active.future = self._pool.submit(self._run, active, lambda: self._follow(active, large))
+        active.future = self._pool.submit(
+            self._run_to_end, active, lambda: self._follow_large(active, large)
+        )
         return active.id
 
     def resume(self, run: str, wish: GoOn) -> None:
@@ -167,7 +171,9 @@ class Runs:
             if (before := self._active.get(run)) is not None:
                 before.forget()
             self._active[run] = active
-        active.future = self._pool.submit(self._run, active, lambda: self._resume_run(active))
+        active.future = self._pool.submit(
+            self._run_to_end, active, lambda: self._resume_run(active)
+        )
 
     def forecast(self, scenario: Scenario, wish: NewRun) -> RunForecast:
         """What a run will need; takes as long as getting it ready.
@@ -177,7 +183,7 @@ class Runs:
         ScenarioError
             If the scenario has errors.
         """
-        settings = self._settings(wish)
+        settings = self._settings_of_wish(wish)
         prepared = prepare_run(
             check_run(self._workspace, scenario, name=wish.scenario, settings=settings)
         )
@@ -318,7 +324,9 @@ class Runs:
         for one in known:
             one.forget()
 
-    def _run(self, active: Active, simulate: Callable[[], tuple[RunState, str | None]]) -> None:
+    def _run_to_end(
+        self, active: Active, simulate: Callable[[], tuple[RunState, str | None]]
+    ) -> None:
         try:
             state, error = simulate()
         except OdscenError as wrong:
@@ -329,19 +337,19 @@ class Runs:
         else:
             active.end(state, error)
 
-    def _simulate(
+    def _simulate_run(
         self, active: Active, run: CheckedRun, wish: NewRun
     ) -> tuple[RunState, str | None]:
         reporter = PageReporter(active, watched=isinstance(run.simulator, SumoSimulator))
         prepared = prepare_run(run, reporter=reporter)
         active.prepared(prepared.plan)
         if wish.carla:
-            return self._mirror(active, prepared.plan, run.settings, wish)
+            return self._mirror_run(active, prepared.plan, run.settings, wish)
 
         result = carry_out(run, prepared, reporter=reporter, live=active.live)
         return _end_of(result, active)
 
-    def _follow(self, active: Active, large: LargeRun) -> tuple[RunState, str | None]:
+    def _follow_large(self, active: Active, large: LargeRun) -> tuple[RunState, str | None]:
         def prepared(slice_length: float | None) -> None:
             active.introduction, active.slice_length = large.introduction, slice_length
             active.live.wake()
@@ -366,7 +374,7 @@ class Runs:
         if sum(one.ended is None for one in self._active.values()) >= MOST:
             raise ConflictError(f"{MOST} runs are under way; stop one, or wait for the end of one")
 
-    def _mirror(
+    def _mirror_run(
         self, active: Active, plan: Plan, settings: RunSettings, wish: NewRun
     ) -> tuple[RunState, str | None]:
         """Run it in SUMO and in CARLA, in a process that has CARLA's client."""
@@ -391,7 +399,7 @@ class Runs:
             return "failed", last.reason
         return ("stopped" if last.stopped else "completed"), None
 
-    def _settings(self, wish: NewRun) -> RunSettings:
+    def _settings_of_wish(self, wish: NewRun) -> RunSettings:
         """How a run is wished for; a CARLA server is the one that the page was started with.
 
         Raises

@@ -176,12 +176,14 @@ class _Api(FastAPI):
                     operation["responses"]["default"] = {"$ref": "#/components/responses/Error"}
             schema["components"]["responses"] = {"Error": error}
             schemas = schema["components"]["schemas"]
-            schemas |= _components("LiveMessage", LiveMessage, mode="serialization")
-            schemas |= _components("Scenario", Scenario, mode="validation", suffix="-File")
+            schemas |= _schema_components("LiveMessage", LiveMessage, mode="serialization")
+            schemas |= _schema_components("Scenario", Scenario, mode="validation", suffix="-File")
         return super().openapi()
 
 
-def _components(name: str, model: Any, *, mode: JsonSchemaMode, suffix: str = "") -> dict[str, Any]:
+def _schema_components(
+    name: str, model: Any, *, mode: JsonSchemaMode, suffix: str = ""
+) -> dict[str, Any]:
     """Schema of a type and of all that it is made of, by name."""
     template = f"#/components/schemas/{{model}}{suffix}"
     schema = TypeAdapter(model).json_schema(mode=mode, ref_template=template)
@@ -195,7 +197,9 @@ class _BuiltPage(StaticFiles):
     async def get_response(self, path: str, scope: Scope) -> Response:
         """Answer with a file, else with the page."""
         try:
-            response = await self._packed(path, scope) or await super().get_response(path, scope)
+            response = await self._packed_response(path, scope) or await super().get_response(
+                path, scope
+            )
         except HTTPException as error:
             if error.status_code != 404 or "." in Path(path).name:
                 raise
@@ -204,10 +208,10 @@ class _BuiltPage(StaticFiles):
             response.headers["Cache-Control"] = "no-cache"
         return response
 
-    async def _packed(self, path: str, scope: Scope) -> Response | None:
+    async def _packed_response(self, path: str, scope: Scope) -> Response | None:
         """Answer with what the build has packed, if it has and the browser takes it."""
         taken = Headers(scope=scope).get("accept-encoding", "")
-        if "br" not in [one.partition(";")[0].strip() for one in taken.split(",")]:
+        if "br" not in [part.partition(";")[0].strip() for part in taken.split(",")]:
             return None
         try:
             response = await super().get_response(f"{path}.br", scope)

@@ -81,14 +81,14 @@ class Drafts:
 
     def row(self, name: str) -> ScenarioRow:
         """What the list says of a scenario; known until its file changes."""
-        state = _file_state(self._path(name))
+        state = _file_state(self._path_of(name))
         known = self._rows.get(name)
         if known is not None and known[0] == state:
             return known[1]
         if self._large is not None and self._large.is_large(name):
             row = ScenarioRow(**self._large.row_of(name))
         else:
-            row = self._row(name)
+            row = self._describe_draft(name)
         self._rows[name] = state, row
         return row
 
@@ -103,7 +103,7 @@ class Drafts:
             If its file is not a scenario.
         """
         with self._lock, disk_errors("scenarios"):
-            path = self._path(name)
+            path = self._path_of(name)
             if not path.is_file():
                 raise NotFoundError("scenario", name, [row.name for row in self.rows()])
             text = path.read_text(encoding="utf-8", errors="replace")
@@ -112,7 +112,7 @@ class Drafts:
             if known is not None and known.history.sha256 == sha256:
                 return known
             scenario = loads(text, file=f"{name}{SUFFIX}")
-            self._open[name] = Draft(name, scenario, self._history(name).open(text))
+            self._open[name] = Draft(name, scenario, self._history_of(name).open(text))
             return self._open[name]
 
     def create(self, scenario: Scenario, name: str | None, *, stem: str, label: str) -> Draft:
@@ -128,8 +128,8 @@ class Drafts:
         with self._lock, disk_errors("scenarios"), alone:
             name = self._free_name(stem) if name is None else check_name(name, what="scenario")
             self._refuse_taken(name)
-            begun = self._history(name).begin(text, label=label)
-            write_text(self._path(name), text)
+            begun = self._history_of(name).begin(text, label=label)
+            write_text(self._path_of(name), text)
             self._open[name] = Draft(name, scenario, begun)
             return self._open[name]
 
@@ -160,16 +160,16 @@ class Drafts:
             old = self.of_version(name, version)
             scenario, text = written_document(edit(old.scenario))
             data = [message.data for message in edits]
-            new = self._history(name).add(old.history, text, label=label, edits=data)
-            return self._save(Draft(name, scenario, new, old.scenario), text)
+            new = self._history_of(name).add(old.history, text, label=label, edits=data)
+            return self._save_draft(Draft(name, scenario, new, old.scenario), text)
 
     def undo(self, name: str, version: int) -> Draft:
         """Take the last edit back; :class:`ConflictError` if there is none."""
-        return self._move(name, version, -1)
+        return self._move_in_history(name, version, -1)
 
     def redo(self, name: str, version: int) -> Draft:
         """Make the edit again that was taken back last; :class:`ConflictError` if there is none."""
-        return self._move(name, version, +1)
+        return self._move_in_history(name, version, +1)
 
     def rename(self, name: str, new: str) -> Draft:
         """Give a scenario's file another name."""
@@ -177,10 +177,10 @@ class Drafts:
             draft = self.get(name)
             check_name(new, what="scenario")
             self._refuse_taken(new)
-            shutil.rmtree(self._history(new).folder, ignore_errors=True)
+            shutil.rmtree(self._history_of(new).folder, ignore_errors=True)
             with suppress(FileNotFoundError):
-                self._history(name).folder.rename(self._history(new).folder)
-            self._path(name).rename(self._path(new))
+                self._history_of(name).folder.rename(self._history_of(new).folder)
+            self._path_of(name).rename(self._path_of(new))
             del self._open[name]
             self._open[new] = replace(draft, name=new)
             return self._open[new]
@@ -188,19 +188,19 @@ class Drafts:
     def keep(self, name: str, file: str, text: str) -> None:
         """Keep a file beside the history of a scenario; it goes where the scenario goes."""
         with self._lock, disk_errors("scenarios"):
-            write_text(self._history(name).folder / file, text)
+            write_text(self._history_of(name).folder / file, text)
 
     def kept(self, name: str, file: str) -> str | None:
         """What was kept under that name; ``None`` if nothing was, or there is no scenario."""
         try:
-            return (self._history(name).folder / file).read_text(encoding="utf-8")
+            return (self._history_of(name).folder / file).read_text(encoding="utf-8")
         except FileNotFoundError:
             return None
 
     def remove(self, name: str) -> RemovedItem:
         """Move a scenario and its history into the wastebasket."""
         with self._lock:
-            if not self._path(name).is_file():
+            if not self._path_of(name).is_file():
                 raise NotFoundError("scenario", name, [row.name for row in self.rows()])
             self._open.pop(name, None)
             return remove(self._workspace, "scenario", name)
@@ -210,19 +210,19 @@ class Drafts:
         with self._lock:
             return Wastebasket(self._workspace).restore(item)
 
-    def _move(self, name: str, version: int, step: int) -> Draft:
+    def _move_in_history(self, name: str, version: int, step: int) -> Draft:
         with self._lock, disk_errors("scenarios"):
             old = self.of_version(name, version)
             if (old.history.undo if step < 0 else old.history.redo) is None:
                 raise ConflictError(
                     f"there is nothing to {'undo' if step < 0 else 'redo'}", current=version
                 )
-            new, text = self._history(name).move(old.history, step)
+            new, text = self._history_of(name).move(old.history, step)
             scenario = loads(text, file=f"{name}{SUFFIX}")
-            return self._save(Draft(name, scenario, new, old.scenario), text)
+            return self._save_draft(Draft(name, scenario, new, old.scenario), text)
 
-    def _save(self, draft: Draft, text: str) -> Draft:
-        write_text(self._path(draft.name), text)
+    def _save_draft(self, draft: Draft, text: str) -> Draft:
+        write_text(self._path_of(draft.name), text)
         self._open[draft.name] = draft
         return draft
 
@@ -237,8 +237,8 @@ class Drafts:
             )
         return draft
 
-    def _row(self, name: str) -> ScenarioRow:
-        modified = self._path(name).stat().st_mtime
+    def _describe_draft(self, name: str) -> ScenarioRow:
+        modified = self._path_of(name).stat().st_mtime
         try:
             draft = self.get(name)
         except ScenarioError as error:
@@ -256,18 +256,18 @@ class Drafts:
 
     def _free_name(self, stem: str) -> str:
         number = 1
-        while self._path(name := f"{stem[:56]}-{number}").exists():
+        while self._path_of(name := f"{stem[:56]}-{number}").exists():
             number += 1
         return name
 
     def _refuse_taken(self, name: str) -> None:
-        if self._path(name).exists():
+        if self._path_of(name).exists():
             raise ConflictError(f"there is a scenario named {name!r} already")
 
-    def _path(self, name: str) -> Path:
+    def _path_of(self, name: str) -> Path:
         return self._folder / f"{check_name(name, what='scenario')}{SUFFIX}"
 
-    def _history(self, name: str) -> HistoryFolder:
+    def _history_of(self, name: str) -> HistoryFolder:
         return HistoryFolder(self._folder / HISTORY / check_name(name, what="scenario"))
 
 

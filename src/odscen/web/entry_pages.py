@@ -53,7 +53,7 @@ ends in <code>/?token=</code> and a long text. Each start has a token of its own
 <button>Open odscen</button></div>
 </form>
 <p>Came here by a link of another page? <a href="/">Load this page again.</a></p>"""
-    return HTMLResponse(_page("odscen: token needed", body), status_code=401, headers=_HEADERS)
+    return HTMLResponse(_html_page("odscen: token needed", body), status_code=401, headers=_HEADERS)
 
 
 def enter(address: str) -> HTMLResponse:
@@ -66,10 +66,10 @@ def enter(address: str) -> HTMLResponse:
     shown = escape(address, quote=True)
     body = f'<p>Opening <a href="{shown}">odscen</a> ...</p>'
     head = f'<meta http-equiv="refresh" content="0;url={shown}">'
-    return HTMLResponse(_page("odscen", body, head), headers=_HEADERS)
+    return HTMLResponse(_html_page("odscen", body, head), headers=_HEADERS)
 
 
-def _page(title: str, body: str, head: str = "") -> str:
+def _html_page(title: str, body: str, head: str = "") -> str:
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>{title}</title>{head}<style>{_STYLE}</style></head>

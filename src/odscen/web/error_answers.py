@@ -73,7 +73,9 @@ def error_info(error: OdscenError) -> ErrorInfo:
 
 def error_response(status: int, kind: str, message: str, problems: Sequence[str] = ()) -> Response:
     """Answer with an error."""
-    return _response(status, ErrorInfo(kind=kind, message=message, problems=list(problems)))
+    return _error_answer_response(
+        status, ErrorInfo(kind=kind, message=message, problems=list(problems))
+    )
 
 
 def add_error_handlers(app: FastAPI) -> None:
@@ -81,7 +83,7 @@ def add_error_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(OdscenError)
     def ours(_request: Request, error: OdscenError) -> Response:
-        return _response(_status(error), error_info(error))
+        return _error_answer_response(_status_of_error(error), error_info(error))
 
     @app.exception_handler(RequestValidationError)
     def invalid(_request: Request, error: RequestValidationError) -> Response:
@@ -113,21 +115,21 @@ def add_error_handlers(app: FastAPI) -> None:
 def _of_machine(error: OSError | MemoryError) -> Response:
     """Answer with what the disk or the memory refuses, and with what can be done."""
     if isinstance(error, FileNotFoundError):
-        message = f"{_name(error)} is not there any more; it was removed or is damaged"
+        message = f"{_name_of_file(error)} is not there any more; it was removed or is damaged"
         return error_response(404, "NotFound", message)
     if isinstance(error, MemoryError):
         return error_response(503, "OutOfMemory", "memory is short; end a run, then try again")
-    message = f"{error.strerror or error} ({_name(error)})"
+    message = f"{error.strerror or error} ({_name_of_file(error)})"
     if error.errno in _FULL:
         return error_response(507, "DiskFull", f"{message}; make room on the disk, then try again")
     return error_response(503, "DiskFault", message)
 
 
-def _name(error: OSError) -> str:
+def _name_of_file(error: OSError) -> str:
     return printable(str(error.filename or "the server's disk"))
 
 
-def _status(error: OdscenError) -> int:
+def _status_of_error(error: OdscenError) -> int:
     if isinstance(error, NotFoundError):
         return 404
     if isinstance(error, ConflictError | DamagedError):  # what is there is taken, or damaged
@@ -143,6 +145,6 @@ def _status(error: OdscenError) -> int:
     return 503 if isinstance(error, ResourceError) else 409
 
 
-def _response(status: int, info: ErrorInfo) -> Response:
+def _error_answer_response(status: int, info: ErrorInfo) -> Response:
     body = orjson.dumps(ErrorAnswer(error=info).model_dump())
     return Response(body, status_code=status, media_type="application/json")

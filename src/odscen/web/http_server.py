@@ -52,26 +52,26 @@ class PatientProtocol(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait."""
         super().connection_made(transport)
-        self._watch()
+        self._watch_patience()
 
     def data_received(self, data: bytes) -> None:
         """Take what has come, and wait for the rest of a head, if it is one."""
         super().data_received(data)
-        self._watch()
+        self._watch_patience()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait no longer."""
-        self._forget()
+        self._forget_timer()
         super().connection_lost(exc)
 
-    def _watch(self) -> None:
+    def _watch_patience(self) -> None:
         asked = self.cycle is not None and not self.cycle.response_complete
         if asked:
-            self._forget()
+            self._forget_timer()
         elif self._timer is None:
             self._timer = self.loop.call_later(HEAD_TIME, self._hang_up)
 
-    def _forget(self) -> None:
+    def _forget_timer(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -128,7 +128,7 @@ def serve(
         )
     token = None if open_to_all else check_token(token or secrets.token_urlsafe(24))
     hosts = None if host in _ANY else LOOPBACK | {host.lower()}
-    bound = _bind(host, port)
+    bound = _bind_socket(host, port)
     port = bound.getsockname()[1]
     shown = "127.0.0.1" if host in _ANY else f"[{host}]" if ":" in host else host
     url = f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
@@ -147,10 +147,10 @@ def serve(
             opener = threading.Timer(0.5, webbrowser.open, (page,))
             opener.daemon = True
             opener.start()
-        uvicorn.Server(_config(app)).run(sockets=[bound])
+        uvicorn.Server(_server_config(app)).run(sockets=[bound])
 
 
-def _config(app: ASGIApp) -> uvicorn.Config:
+def _server_config(app: ASGIApp) -> uvicorn.Config:
     """How uvicorn serves; it logs no addresses, in which a token might be."""
     return uvicorn.Config(
         app,
@@ -190,7 +190,7 @@ def _allow_many_files() -> None:
             resource.setrlimit(resource.RLIMIT_NOFILE, (min(wanted, hard), hard))
 
 
-def _bind(host: str, port: int) -> socket.socket:
+def _bind_socket(host: str, port: int) -> socket.socket:
     try:
         family, _, _, _, address = socket.getaddrinfo(
             host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

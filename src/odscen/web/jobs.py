@@ -72,7 +72,7 @@ class Jobs:
             name = f"job-{next(self._numbers)}"
             self._subjects[subject] = name
             self._jobs[name] = JobInfo(id=name, state="queued", step="waiting", share=0.0)
-        self._pool.submit(self._run, name, work, subject)
+        self._pool.submit(self._run_job, name, work, subject)
         return name
 
     def info(self, name: str) -> JobInfo:
@@ -84,7 +84,7 @@ class Jobs:
             If there is no such job, or it was long ago.
         """
         with self._lock:
-            return self._known(name)
+            return self._known_job(name)
 
     def cancel(self, name: str) -> JobInfo:
         """Cancel a job; it is over within a second.
@@ -97,7 +97,7 @@ class Jobs:
             If it is over.
         """
         with self._lock:
-            job = self._known(name)
+            job = self._known_job(name)
             if job.state not in _LIVE:
                 raise ConflictError(f"{name} is {job.state}; it cannot be cancelled any more")
             self._cancelled.add(name)
@@ -109,17 +109,19 @@ class Jobs:
             self._cancelled |= {name for name, job in self._jobs.items() if job.state in _LIVE}
         self._pool.shutdown(wait=True)
 
-    def _known(self, name: str) -> JobInfo:
+    def _known_job(self, name: str) -> JobInfo:
         if name not in self._jobs:
             raise NotFoundError("job", name, [])
         return self._jobs[name]
 
-    def _run(self, name: str, work: Callable[[ProgressCallback], JobResult], subject: str) -> None:
+    def _run_job(
+        self, name: str, work: Callable[[ProgressCallback], JobResult], subject: str
+    ) -> None:
         def progress(step: str, share: float) -> None:
             with self._lock:
                 if name in self._cancelled:
                     raise _CancelledJob
-            self._set(JobInfo(id=name, state="running", step=step, share=min(1.0, share)))
+            self._set_info(JobInfo(id=name, state="running", step=step, share=min(1.0, share)))
 
         ended = JobInfo(id=name, state="failed", step="failed", share=0.0)
         try:
@@ -140,9 +142,9 @@ class Jobs:
                 del self._subjects[subject]
                 self._cancelled.discard(name)
             share = ended.share or self.info(name).share
-            self._set(ended.model_copy(update={"share": share}))
+            self._set_info(ended.model_copy(update={"share": share}))
 
-    def _set(self, info: JobInfo) -> None:
+    def _set_info(self, info: JobInfo) -> None:
         with self._lock:
             self._jobs[info.id] = info
             if len(self._jobs) > _KEPT:

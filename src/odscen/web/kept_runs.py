@@ -58,7 +58,7 @@ class KeptRuns:
             If there is none.
         """
         folder = self._runs / check_name(run, what="run")
-        if _shown(folder) is None:
+        if _file_of_run(folder) is None:
             raise NotFoundError("run", run, self.by_age())
         return folder
 
@@ -75,12 +75,12 @@ class KeptRuns:
             If one is not as it was written.
         """
         folder = self.folder(run)
-        states = _states(folder)
+        states = _file_states(folder)
         if self._checked.get(run) != states:
             check_run_files(folder)
             if self._records_only(folder):
                 measured_summary(folder)
-                states = _states(folder)
+                states = _file_states(folder)
             self._checked[run] = states
         return folder
 
@@ -119,7 +119,9 @@ class KeptRuns:
     def by_age(self) -> list[str]:
         """Names of all runs, the newest last."""
         folders = self._runs.iterdir() if self._runs.is_dir() else ()
-        found = [(file.stat().st_mtime, path.name) for path in folders if (file := _shown(path))]
+        found = [
+            (file.stat().st_mtime, path.name) for path in folders if (file := _file_of_run(path))
+        ]
         return [name for _, name in sorted(found)]
 
     def info(self, run: str) -> RunInfo:
@@ -127,7 +129,7 @@ class KeptRuns:
         folder = self.folder(run)
         summary = self.summary(run)
         if unfinished(folder) or not (folder / layout.SUMMARY_FILE).is_file():
-            return _unfinished(folder, summary)
+            return _describe_unfinished(folder, summary)
         state: RunState = "failed"
         if summary is not None and summary.status == "completed":
             state = "stopped" if summary.stopped else "completed"
@@ -193,7 +195,7 @@ class KeptRuns:
         folder = self.folder(run)
         return [
             RunFile(name=path.relative_to(folder).as_posix(), size=path.stat().st_size)
-            for path in sorted(_files(folder))
+            for path in sorted(_files_of_run(folder))
         ]
 
     def file(self, run: str, name: str) -> Path:
@@ -204,7 +206,7 @@ class KeptRuns:
         DamagedError
             If it is not as it was written.
         """
-        known = [one.name for one in self.files(run)]
+        known = [file.name for file in self.files(run)]
         if name not in known:
             raise NotFoundError(f"file of run {run!r}", name, known)
         folder = self.folder(run)
@@ -213,14 +215,14 @@ class KeptRuns:
         return folder / name
 
 
-def _files(folder: Path) -> Iterator[Path]:
+def _files_of_run(folder: Path) -> Iterator[Path]:
     for path in (*folder.glob("*"), *folder.glob("*/*")):
         inner = path.name in _INNER or path.parent.name in _INNER_FOLDERS
         if path.is_file() and path.suffix in SUFFIXES and not inner:
             yield path
 
 
-def _shown(folder: Path) -> Path | None:
+def _file_of_run(folder: Path) -> Path | None:
     """Return the file that makes a folder a run: its summary, or its status if it has not ended."""
     files = (folder / name for name in (layout.SUMMARY_FILE, layout.STATUS_FILE))
     return next((file for file in files if file.is_file()), None)
@@ -233,7 +235,7 @@ The time is that of the file's node, which a program cannot set back.
 """
 
 
-def _states(folder: Path) -> FileStates:
+def _file_states(folder: Path) -> FileStates:
     found = ((path, path.stat()) for path in folder.rglob("*") if path.is_file())
     return {str(path): (state.st_size, state.st_ctime_ns) for path, state in found}
 
@@ -248,7 +250,7 @@ def _summary_damage(folder: Path) -> str | None:
     return None
 
 
-def _unfinished(folder: Path, summary: RunSummary | None) -> RunInfo:
+def _describe_unfinished(folder: Path, summary: RunSummary | None) -> RunInfo:
     """Describe a run in slices that has not ended, from what it last said of itself."""
     status = read_status(folder) or {}
     at, until = float(status.get("time", 0.0)), float(status.get("until", 0.0))

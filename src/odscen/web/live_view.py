@@ -127,16 +127,16 @@ class LiveView:
             with suppress(RuntimeError):  # the server has ended meanwhile
                 loop.call_soon_threadsafe(self._changed.set)
 
-        listening = asyncio.create_task(self._listen())
+        listening = asyncio.create_task(self._listen_for_messages())
         self._run.live.add_watcher(wake)
         try:
             with suppress(WebSocketDisconnect, RuntimeError):
-                await self._serve()
+                await self._serve_frames()
         finally:
             self._run.live.remove_watcher(wake)
             listening.cancel()
 
-    async def _serve(self) -> None:
+    async def _serve_frames(self) -> None:
         live = self._run.live
         while not self._gone:
             self._changed.clear()
@@ -158,17 +158,17 @@ class LiveView:
             else:
                 await self._changed.wait()
         if not self._gone:
-            await self._send(LiveEnd(state=self._run.state, error=self._run.error))
+            await self._send_message(LiveEnd(state=self._run.state, error=self._run.error))
             await self._socket.close()
 
     async def _wait_once(self) -> None:
         """Wait for a client's answer, but not for ever; go on with nothing more to show."""
         with suppress(TimeoutError):
-            await asyncio.wait_for(self._answered(), GRACE)
+            await asyncio.wait_for(self._wait_for_answer(), GRACE)
             return
         self._frame = self._run.live.picture.number
 
-    async def _answered(self) -> None:
+    async def _wait_for_answer(self) -> None:
         while not (self._ready or self._gone):
             await self._changed.wait()
             self._changed.clear()
@@ -182,34 +182,34 @@ class LiveView:
         state = LiveState(state=self._run.state, speed=live.pace.speed)
         if state != self._said:
             self._said = state
-            await self._send(state)
+            await self._send_message(state)
         lights, incidents = live.lights, live.incidents
         changed = {n: state for n, state in lights.items() if self._lights.get(n) != state}
         if changed:
             self._lights = lights
-            await self._send(LiveLights(lights=changed))
+            await self._send_message(LiveLights(lights=changed))
         await self._report_detectors()
         if len(incidents) > self._incidents:
             new = incidents[self._incidents :]
             self._incidents += len(new)
-            await self._send(LiveIncidents(events=[IncidentInfo(**one) for one in new]))
+            await self._send_message(LiveIncidents(events=[IncidentInfo(**one) for one in new]))
 
     async def _report_detectors(self) -> None:
         now, said = self._run.live.detectors, self._detectors
         changed = {name: on for name, on in now.items() if said.get(name) != on}
         if changed:
             self._detectors = now
-            await self._send(LiveDetectors(detectors=changed))
+            await self._send_message(LiveDetectors(detectors=changed))
 
     async def _send_frame(self, picture: LivePicture) -> None:
         self._frame = picture.number
         self._ready = False
         await self._socket.send_bytes(picture.frame)
 
-    async def _send(self, message: Answer) -> None:
+    async def _send_message(self, message: Answer) -> None:
         await self._socket.send_text(message.model_dump_json())
 
-    async def _listen(self) -> None:
+    async def _listen_for_messages(self) -> None:
         while True:
             message = await self._socket.receive()
             if message["type"] == "websocket.disconnect":

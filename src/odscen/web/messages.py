@@ -223,13 +223,18 @@ class OfferedInfo(Answer):
     error: str
 
     @classmethod
-    def of(cls, one: OfferedModel) -> Self:
+    def of(cls, offered_model: OfferedModel) -> Self:
         """What the page is told of one."""
         options = [
             OptionInfo(**{**option._asdict(), "choices": [*option.choices]})
-            for option in one.options
+            for option in offered_model.options
         ]
-        return cls(name=one.name, summary=one.summary, options=options, error=one.error)
+        return cls(
+            name=offered_model.name,
+            summary=offered_model.summary,
+            options=options,
+            error=offered_model.error,
+        )
 
 
 class OfVersion(RequestBody):

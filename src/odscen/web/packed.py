@@ -84,12 +84,12 @@ def graph_columns(entry: MapEntry) -> dict[str, Any]:
         "first_node": lanes.lanes.first_node,
         "lane": lanes.lane,
         "s": np.round(lanes.s, 3),
-        **_places(lanes.x, lanes.y, lanes.hdg, lanes.width),
+        **_pack_places(lanes.x, lanes.y, lanes.hdg, lanes.width),
         "speed_limit": [None if np.isnan(v) else round(v, 3) for v in lanes.speed_limit.tolist()],
         "segment": lanes.segment,
         "left_lane": lanes.left_lane,
         "right_lane": lanes.right_lane,
-        "spawnable": _mask(usable.spawnable, len(lanes.x)),
+        "spawnable": _pack_mask(usable.spawnable, len(lanes.x)),
         "edges": {
             "source": lanes.source,
             "target": lanes.target,
@@ -103,9 +103,9 @@ def graph_columns(entry: MapEntry) -> dict[str, Any]:
             "lane_keys": [str(key) for key in walks.lane_keys],
             "first_node": walks.first_node,
             "lane": walks.lane,
-            **_places(walks.x, walks.y, walks.hdg, walks.width),
+            **_pack_places(walks.x, walks.y, walks.hdg, walks.width),
             "segment": walks.segment,
-            "walkable": _mask(usable.walkable, len(walks.x)),
+            "walkable": _pack_mask(usable.walkable, len(walks.x)),
             "source": walks.source,
             "target": walks.target,
             "kind": walks.kind.astype(np.int32),
@@ -113,7 +113,7 @@ def graph_columns(entry: MapEntry) -> dict[str, Any]:
     }
 
 
-def _places(*columns: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+def _pack_places(*columns: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     x, y, hdg, width = columns
     return {
         "x": np.round(x, 3),
@@ -123,5 +123,5 @@ def _places(*columns: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def _mask(mask: NDArray[np.bool_] | None, count: int) -> NDArray[np.int32]:
+def _pack_mask(mask: NDArray[np.bool_] | None, count: int) -> NDArray[np.int32]:
     return np.ones(count, dtype=np.int32) if mask is None else mask.astype(np.int32)

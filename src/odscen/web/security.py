@@ -78,10 +78,10 @@ class Guard:
             await self._app(scope, receive, send)
             return
         headers, send = Headers(scope=scope), _with_headers(scope, send)
-        refused = self._foreign(headers)
+        refused = self._foreign_origin(headers)
         if refused is not None:
-            await _refuse(403, "ForeignRequest", refused, scope, receive, send)
-        elif self._token is not None and not self._known(headers, scope):
+            await _refuse_request(403, "ForeignRequest", refused, scope, receive, send)
+        elif self._token is not None and not self._has_token(headers, scope):
             await _ask_for_token(headers, scope, receive, send)
         elif self._token is not None and (clean := _without_token(scope)) is not None:
             response = enter(clean) if _is_page(headers) else RedirectResponse(clean, 303)
@@ -91,19 +91,19 @@ class Guard:
         elif scope["type"] == "websocket":
             await self._app(scope, receive, send)
         else:
-            await self._limited(headers, scope, receive, send)
+            await self._limit_body(headers, scope, receive, send)
 
-    def _foreign(self, headers: Headers) -> str | None:
+    def _foreign_origin(self, headers: Headers) -> str | None:
         host = headers.get("host", "")
         name = _PORT.sub("", host).strip("[]").lower()
         if self._hosts is not None and name not in self._hosts:
             return f"this server does not answer to the name {name!r}"
         origin = headers.get("origin")
-        if origin is not None and _netloc(origin) != host.lower():
+        if origin is not None and _netloc_of_origin(origin) != host.lower():
             return f"a page of {origin!r} may not use this server"
         return None
 
-    def _known(self, headers: Headers, scope: Scope) -> bool:
+    def _has_token(self, headers: Headers, scope: Scope) -> bool:
         shown = [headers.get("authorization", "").removeprefix("Bearer ")]
         shown += parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
         try:
@@ -115,13 +115,15 @@ class Guard:
         token = (self._token or "").encode()
         return any(hmac.compare_digest(one.encode("utf-8", "replace"), token) for one in shown)
 
-    async def _limited(self, headers: Headers, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _limit_body(
+        self, headers: Headers, scope: Scope, receive: Receive, send: Send
+    ) -> None:
         multipart = headers.get("content-type", "").startswith("multipart/form-data")
         limit = self._max_upload if multipart else min(MAX_BODY, self._max_upload)
         words = f"more than {limit:,} bytes cannot be taken"
         length = headers.get("content-length", "")
         if length.isdigit() and int(length) > limit:
-            await _refuse(413, "TooLarge", words, scope, receive, send)
+            await _refuse_request(413, "TooLarge", words, scope, receive, send)
             return
         taken, end, whole = 0, time.monotonic() + MAX_UPLOAD_TIME, False
 
@@ -188,10 +190,10 @@ async def _ask_for_token(headers: Headers, scope: Scope, receive: Receive, send:
         "this server needs the token that it printed when it was started: open that link again, "
         "or send it as Authorization: Bearer TOKEN"
     )
-    await _refuse(401, "TokenNeeded", message, scope, receive, send)
+    await _refuse_request(401, "TokenNeeded", message, scope, receive, send)
 
 
-def _netloc(origin: str) -> str | None:
+def _netloc_of_origin(origin: str) -> str | None:
     """Host and port of an origin; ``None`` if it is none."""
     try:
         return urlsplit(origin).netloc.lower()
@@ -199,7 +201,7 @@ def _netloc(origin: str) -> str | None:
         return None
 
 
-async def _refuse(
+async def _refuse_request(
     status: int, kind: str, message: str, scope: Scope, receive: Receive, send: Send
 ) -> None:
     if scope["type"] == "websocket":  # before it is accepted: the server answers 403

@@ -87,11 +87,11 @@ class Services:
         """
         if self.large is None:  # this is a child
             return read_any(content, file=file)
-        with self._reading():
+        with self._hold_reader():
             return read_scenario_in_child(content, file=file)
 
     @contextmanager
-    def _reading(self) -> Iterator[None]:
+    def _hold_reader(self) -> Iterator[None]:
         if not self._readers.acquire(timeout=_WAIT):
             raise ConflictError("the server is reading other uploads; try again in a minute")
         try:

@@ -72,7 +72,11 @@ def correct_matrix(
     loaded = map_of(workspace, scenario)
     if not wants_assignment(scenario):
         return corrected(scenario, loaded.sumo, pair_passages(scenario, loaded.sumo), trust=trust)
-    net, assets, current = loaded.entry.checked("net"), workspace.assets(), _compared(scenario)
+    net, assets, current = (
+        loaded.entry.checked("net"),
+        workspace.assets(),
+        _disable_count_demand(scenario),
+    )
     passages: dict[Pair, PairPassages] = {}
     for _ in range(rounds):
         found = assign_routes(
@@ -103,7 +107,7 @@ def write_fit_page(fits: Sequence[tuple[str, CountFits]], out: Path, *, title: s
             ],
             heading=heading,
             rmse=fit.rmse or 0.0,
-            hours=(sum(one.met for one in fit.hours), len(fit.hours)),
+            hours=(sum(hour.met for hour in fit.hours), len(fit.hours)),
         )
         for heading, fit in fits
     ]
@@ -111,8 +115,8 @@ def write_fit_page(fits: Sequence[tuple[str, CountFits]], out: Path, *, title: s
     return write_text(out, html_page(f"{title} - counts", join([head, *sections])))
 
 
-def _compared(scenario: Scenario) -> Scenario:
+def _disable_count_demand(scenario: Scenario) -> Scenario:
     """Let the counts of a scenario generate nothing."""
-    counts = tuple(one.model_copy(update={"use": "compare"}) for one in scenario.demand.counts)
+    counts = tuple(count.model_copy(update={"use": "compare"}) for count in scenario.demand.counts)
     demand = scenario.demand.model_copy(update={"counts": counts})
     return scenario.model_copy(update={"demand": demand})

@@ -84,7 +84,7 @@ class DemandTrial:
     def words(self) -> str:
         """One line for people."""
         return (
-            f"{_percent(self.share)} of the demand and {_percent(MARGIN - 1.0)} more, "
+            f"{_format_percent(self.share)} of the demand and {_format_percent(MARGIN - 1.0)} more, "
             f"{self.vehicles:,} road users in {self.seconds / 60.0:.0f} min, seed {self.seed}: "
             f"{self.headline}"
         )
@@ -101,11 +101,11 @@ class DemandSizing:
     @property
     def words(self) -> str:
         """A sentence for people."""
-        refused = [one.share for one in self.trials if not one.usable]
-        also = f"; {_percent(min(refused))} is too much" if refused else ""
+        refused = [trial.share for trial in self.trials if not trial.usable]
+        also = f"; {_format_percent(min(refused))} is too much" if refused else ""
         amount = f" ({self.trips:,.0f} trips)" if self.trips else ""
         return (
-            f"{_percent(self.share)} of the demand{amount} fits: with {_percent(MARGIN - 1.0)} "
+            f"{_format_percent(self.share)} of the demand{amount} fits: with {_format_percent(MARGIN - 1.0)} "
             f"more its busiest hour is usable with {SEEDS} seeds{also} ({len(self.trials)} runs)"
         )
 
@@ -115,7 +115,7 @@ class DemandSizing:
         return {
             "share": self.share,
             "margin": MARGIN,
-            "trials": [{key: getattr(one, key) for key in keys} for one in self.trials],
+            "trials": [{key: getattr(trial, key) for key in keys} for trial in self.trials],
         }
 
 
@@ -176,7 +176,9 @@ def sized(
     share = largest_share(trials.usable)
     if share is None:
         last = trials.done[-1]
-        raise InputError(f"even {_percent(last.share)} of the demand is too much: {last.headline}")
+        raise InputError(
+            f"even {_format_percent(last.share)} of the demand is too much: {last.headline}"
+        )
     if share < 1.0:
         demand = scaled(scenario.demand, share, only=only)
         scenario = scenario.model_copy(update={"demand": demand})
@@ -216,9 +218,9 @@ class _Trials:
         """Whether a share of the demand is usable with every seed; ends with the first not so."""
         more = scaled(self.scenario.demand, share * MARGIN, only=self.only)
         hour = excerpt(self.scenario.model_copy(update={"demand": more}))
-        return all(self._tried(hour, share, number) for number in range(SEEDS))
+        return all(self._run_trial(hour, share, number) for number in range(SEEDS))
 
-    def _tried(self, hour: Scenario, share: float, number: int) -> bool:
+    def _run_trial(self, hour: Scenario, share: float, number: int) -> bool:
         settings = RunSettings(
             seed=(hour.seed + number) % 2**31,
             recording=Recording(trajectories=False, emissions=False),
@@ -239,9 +241,7 @@ class _Trials:
                 backlog = True
             if backlog:
                 level = UsabilityLevel.NOT_USABLE
-                headline = (
-                    f"{level}: more than {_percent(BACKLOG)} had no room to depart at one time"
-                )
+                headline = f"{level}: more than {_format_percent(BACKLOG)} had no room to depart at one time"
         plan = prepared.plan
         usable = level == UsabilityLevel.USABLE
         trial = DemandTrial(share, plan.seed, len(plan.actors), plan.until, usable, headline)
@@ -279,5 +279,5 @@ def _most_waiting(run: Run, until: float) -> int:
     return int(np.cumsum(change[happened][order]).max(initial=0))
 
 
-def _percent(share: float) -> str:
+def _format_percent(share: float) -> str:
     return f"{100.0 * share:.0f} %"

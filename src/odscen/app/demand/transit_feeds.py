@@ -72,7 +72,7 @@ def import_transit(
     header = parse(entry.read("xodr"), file=entry.path("xodr").name).header
     project = projection(header)
     with in_file(str(file)):
-        feed = read_feed(_tables(file), day=day)
+        feed = read_feed(_read_feed_tables(file), day=day)
         placed = place_feed(
             feed,
             region := Region.of(map_of(workspace, scenario).sumo.graph, scenario.roi),
@@ -119,7 +119,7 @@ def projection(
     return project
 
 
-def _tables(file: Path) -> dict[str, str]:
+def _read_feed_tables(file: Path) -> dict[str, str]:
     """Tables of a feed by name; of an archive, wherever in it they are."""
     names = (*NEEDED, *CALENDARS)
     if file.is_dir():

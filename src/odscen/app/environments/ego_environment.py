@@ -102,12 +102,12 @@ class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without 
             )
         self._ego = int(egos[0])
         seen = self._run.see()
-        while seen is not None and not self._find(seen):
+        while seen is not None and not self._find_ego_row(seen):
             self._run.drive(*accelerated(seen, self._run.scene, {}))
             seen = self._run.see()
         if seen is None:
             raise InputError("the ego never departs")
-        return self._look(), {"time": seen.time}
+        return self._observe_ego(), {"time": seen.time}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Drive for a step."""
@@ -119,10 +119,10 @@ class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without 
         seen = self._run.see()
         if seen is None:
             return self._last, 0.0, False, True, {}
-        if not self._find(seen):
+        if not self._find_ego_row(seen):
             return self._last, 0.0, True, False, {"time": seen.time}
         reward = float(self._reward(seen, scene)[self._row])
-        return self._look(), reward, False, False, {"time": seen.time}
+        return self._observe_ego(), reward, False, False, {"time": seen.time}
 
     def close(self) -> None:
         """End the run."""
@@ -130,13 +130,13 @@ class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without 
             self._run.close()
             self._run = None
 
-    def _find(self, seen: RoadObservation) -> bool:
+    def _find_ego_row(self, seen: RoadObservation) -> bool:
         rows = np.flatnonzero(seen.index == self._ego)
         if len(rows):
             self._seen, self._row = seen, int(rows[0])
         return bool(len(rows))
 
-    def _look(self) -> Array:
+    def _observe_ego(self) -> Array:
         if self._run is not None:
             self._last = features(self._seen, self._run.scene)[self._row]
         return self._last

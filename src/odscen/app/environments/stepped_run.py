@@ -103,10 +103,10 @@ class SteppedRun:
             listener.listen(1)
             listener.settimeout(_LISTEN)
             self._thread.start()
-            self._connection = self._accepted(listener)
-        first = self._message()
+            self._connection = self._accept_worker(listener)
+        first = self._read_message()
         if first is None:
-            raise self._why()
+            raise self._explain_early_end()
         self.scene: BehaviourScene = scene_from_bytes(first)[0]
         self._connection.sendall(framed(b""))
 
@@ -118,12 +118,12 @@ class SteppedRun:
         SimulationError
             If it has failed.
         """
-        data = self._message()
+        data = self._read_message()
         if data is not None:
             return observation_from_bytes(data)
         self._thread.join()
         if self._run is None or self._run.status is not RunStatus.COMPLETED:
-            raise self._why()
+            raise self._explain_early_end()
         return None
 
     def drive(self, action: DrivingAction, controlled: BoolArray) -> None:
@@ -136,22 +136,22 @@ class SteppedRun:
         self._thread.join()
         self._scratch.close()
 
-    def _accepted(self, listener: socket.socket) -> socket.socket:
+    def _accept_worker(self, listener: socket.socket) -> socket.socket:
         while True:
             try:
                 found, _ = listener.accept()
             except TimeoutError:
                 if not self._thread.is_alive():
-                    raise self._why() from None
+                    raise self._explain_early_end() from None
             else:
                 found.settimeout(None)
                 return found
 
-    def _message(self) -> bytes | None:
-        head = self._bytes(HEAD.size)
-        return None if head is None else self._bytes(HEAD.unpack(head)[0])
+    def _read_message(self) -> bytes | None:
+        head = self._read_bytes(HEAD.size)
+        return None if head is None else self._read_bytes(HEAD.unpack(head)[0])
 
-    def _bytes(self, size: int) -> bytes | None:
+    def _read_bytes(self, size: int) -> bytes | None:
         blocks = bytearray()
         while len(blocks) < size:
             block = self._connection.recv(size - len(blocks))
@@ -160,7 +160,7 @@ class SteppedRun:
             blocks += block
         return bytes(blocks)
 
-    def _why(self) -> BaseException:
+    def _explain_early_end(self) -> BaseException:
         self._thread.join()
         if self._failure is not None:
             return self._failure

@@ -107,8 +107,8 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
         self._seen = self._run.see()
         if self._seen is None:
             raise InputError("no vehicle ever departs")
-        self.agents = self._names(self._seen)
-        return self._views(self._seen), {name: {} for name in self.agents}
+        self.agents = self._agent_names(self._seen)
+        return self._observe_agents(self._seen), {name: {} for name in self.agents}
 
     def step(
         self, actions: Mapping[str, Any]
@@ -123,7 +123,7 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
         if self._run is None or self._seen is None:
             raise InputError("reset the environment first")
         before = self._seen
-        rows = {name: row for row, name in enumerate(self._names(before))}
+        rows = {name: row for row, name in enumerate(self._agent_names(before))}
         wanted = {
             rows[name]: float(np.asarray(action).reshape(-1)[0])
             for name, action in actions.items()
@@ -131,16 +131,16 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
         }
         self._run.drive(*accelerated(before, self._run.scene, wanted))
         self._seen = self._run.see()
-        last = self._views(before)
+        last = self._observe_agents(before)
         if self._seen is None:
             gone, now, rewards = list(rows), [], {}
         else:
-            now = self._names(self._seen)
+            now = self._agent_names(self._seen)
             gone = [name for name in rows if name not in set(now)]
             given = self._reward(self._seen, self._run.scene)
             rewards = dict(zip(now, map(float, given), strict=True))
         told = [*now, *gone]
-        views = {} if self._seen is None else self._views(self._seen)
+        views = {} if self._seen is None else self._observe_agents(self._seen)
         over = self._seen is None
         self.agents = now
         return (
@@ -157,10 +157,10 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
             self._run.close()
             self._run, self._seen, self.agents = None, None, []
 
-    def _names(self, seen: RoadObservation) -> list[str]:
+    def _agent_names(self, seen: RoadObservation) -> list[str]:
         return [self.possible_agents[row] for row in seen.index.tolist()]
 
-    def _views(self, seen: RoadObservation) -> dict[str, Array]:
+    def _observe_agents(self, seen: RoadObservation) -> dict[str, Array]:
         if self._run is None:
             return {}
-        return dict(zip(self._names(seen), features(seen, self._run.scene), strict=True))
+        return dict(zip(self._agent_names(seen), features(seen, self._run.scene), strict=True))

@@ -171,7 +171,7 @@ def export_runs(
     """
     from odscen.runs.layout import SUMMARY_FILE
 
-    inside = sorted(one.parent for one in folder.glob(f"*/{SUMMARY_FILE}"))
+    inside = sorted(path.parent for path in folder.glob(f"*/{SUMMARY_FILE}"))
     if (folder / SUMMARY_FILE).is_file() or not inside:
         return export_run(workspace, folder, out, to=to, options=options)
     written = (export_run(workspace, run, out / run.name, to=to, options=options) for run in inside)

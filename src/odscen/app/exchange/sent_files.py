@@ -93,15 +93,17 @@ def read_sent_scenario(
     """
     chosen = find_format(of)
     named = [
-        SentFile(printable(PurePosixPath(one.name.replace("\\", "/")).name) or "file", one.content)
-        for one in files
+        SentFile(
+            printable(PurePosixPath(file.name.replace("\\", "/")).name) or "file", file.content
+        )
+        for file in files
     ]
     stories = [one for one in named if not _is_map(one.name)]
     if not stories:
         raise InputError(f"no {chosen.title} file ({' or '.join(chosen.suffixes[:1])}) was sent")
     if len(named) > _MOST_FILES:
         raise InputError(f"more than {_MOST_FILES} files were sent")
-    size = sum(len(one.content) for one in stories)
+    size = sum(len(story.content) for story in stories)
     with scratch_folder() as folder:
         given = []
         for row, story in enumerate(stories):  # under names of ours
@@ -151,7 +153,7 @@ def _settle_map(
 ) -> tuple[MapEntry, bool]:
     """The map that a file names: the one that was sent with it, else that of the workspace."""
     bare = bare_map_name(wanted)
-    maps = [one for one in files if _is_map(one.name)]
+    maps = [file for file in files if _is_map(file.name)]
     if not bare:
         if len(maps) == 1:
             return _known_or_added(workspace, maps[0], progress)
@@ -233,7 +235,7 @@ def read_sent(
         that was not given and nothing was written.
     """
     progress("reading the scenario" if map_name else "reading the file", 0.0)
-    given = tuple((one["name"], Path(one["path"])) for one in files)
+    given = tuple((file["name"], Path(file["path"])) for file in files)
     chosen, store = find_format(of), Workspace.open(Path(workspace))
     main = _choose_main(chosen, [_FileAmongSent(row, given) for row in range(len(given))])
 
@@ -276,7 +278,7 @@ def _choose_main(chosen: Format, files: Sequence[GivenFile]) -> int:
     if len(rows) != 1:
         raise InputError(
             f"{len(rows)} of the files end with {' or '.join(chosen.suffixes)}: send one at a time",
-            file=", ".join(one.name for one in files),
+            file=", ".join(file.name for file in files),
         )
     return rows[0]
 

@@ -50,8 +50,8 @@ def scenes_of(workspace: Workspace, shards: Sequence[Shard]) -> list[TrafficScen
 def placed_at_random(on: WholeMap, request: FillRequest, rng: np.random.Generator) -> Fill:
     """Place vehicles as sampling does: anywhere, from rest."""
     spots = place_at_random(on.places, request.vehicles, rng)
-    node = np.array([one.node for one in spots], dtype=np.int64)
-    return Fill(node, np.array([str(one.category) for one in spots], dtype=np.str_))
+    node = np.array([spot.node for spot in spots], dtype=np.int64)
+    return Fill(node, np.array([str(spot.category) for spot in spots], dtype=np.str_))
 
 
 def scene_of_actors(
@@ -59,7 +59,7 @@ def scene_of_actors(
 ) -> TrafficScene:
     """Vehicles that depart at the beginning; those without an initial speed are stopped."""
     names = [*Category]
-    places = [place_of(on.region.graph, one.spawn) for one in actors]
+    places = [place_of(on.region.graph, actor.spawn) for actor in actors]
     kept = [
         (place.node, names.index(one.category), one.initial_speed or 0.0)
         for place, one in zip(places, actors, strict=True)
@@ -78,7 +78,7 @@ def scene_of_scenario(
     """Vehicles of a scenario on allowed nodes, and the share of those that are on no such node."""
     scene = scene_of_actors(on, scenario.actors, lights, name=scenario.name)
     good = on.learned.allowed[scene.category, scene.node]
-    vehicles = sum(one.category is not Category.PEDESTRIAN for one in scenario.actors)
+    vehicles = sum(actor.category is not Category.PEDESTRIAN for actor in scenario.actors)
     kept = TrafficScene(
         scene.node[good], scene.category[good], scene.speed[good], lights, scene.name
     )

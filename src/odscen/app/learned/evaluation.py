@@ -131,7 +131,7 @@ def evaluate_model(
     draws
         Of the bootstrap for the intervals.
     """
-    towns = {one.town for one in shards}
+    towns = {shard.town for shard in shards}
     known = [one for one in others if one.town not in towns]
     count = known if baselines else []
     statistics = binned_statistics(examples_of(workspace, count)) if count else None
@@ -156,8 +156,8 @@ def evaluate_model(
     if not baselines:
         del sources[RANDOM]
     found = []
-    for name in sorted({one.map_name for one in shards}):
-        mine = [one for one in shards if one.map_name == name]
+    for name in sorted({shard.map_name for shard in shards}):
+        mine = [shard for shard in shards if shard.map_name == name]
         on = whole_map(workspace.map_for(name, mine[0].map_sha256))
         compared = _ComparedMap(on, scenes_of(workspace, mine), workspace, draws)
         found.append(compared.floor(mine))
@@ -183,10 +183,10 @@ def evaluate_scenarios(
     """
     scenarios = [read_scenario(file) for file in scenario_files([folder])]
     found = []
-    for name in sorted({one.map.name for one in scenarios}):
-        mine = [one for one in shards if one.map_name == name]
+    for name in sorted({scenario.map.name for scenario in scenarios}):
+        mine = [shard for shard in shards if shard.map_name == name]
         if not mine:
-            known = ", ".join(sorted({one.map_name for one in shards}))
+            known = ", ".join(sorted({shard.map_name for shard in shards}))
             raise InputError(
                 f"there are no snapshots of map {name!r} to compare with; there are of {known}",
                 file=str(folder),
@@ -194,7 +194,7 @@ def evaluate_scenarios(
             )
         on = whole_map(workspace.map_for(name, mine[0].map_sha256))
         compared = _ComparedMap(on, scenes_of(workspace, mine), workspace)
-        own = [one for one in scenarios if one.map.name == name]
+        own = [scenario for scenario in scenarios if scenario.map.name == name]
         lights = lights_at_start(on.loaded.sumo)
         scenes, off = zip(*(scene_of_scenario(on, one, lights) for one in own), strict=True)
         made = _MadeTraffic(list(scenes), float(np.mean(off)), own)
@@ -222,11 +222,11 @@ class _ComparedMap:
     ) -> None:
         self._draws = draws
         self._on, self._scenes, self._workspace = on, scenes, workspace
-        self._rows = self._seen(scenes)
+        self._rows = self._scene_rows(scenes)
 
     def floor(self, shards: Sequence[Shard]) -> TrafficQuality:
         """SUMO's own traffic: runs of even numbers compared with those of odd ones."""
-        runs = list(dict.fromkeys(one.name for one in self._scenes))
+        runs = list(dict.fromkeys(scene.name for scene in self._scenes))
         even = [place for place, one in enumerate(self._scenes) if runs.index(one.name) % 2]
         odd = [place for place in range(len(self._scenes)) if place not in even]
         values: dict[str, MeasuredValue] = {}
@@ -235,17 +235,19 @@ class _ComparedMap:
             rows = [self._rows[place] for place in even]
             reference = [self._rows[place] for place in odd]
             known = [self._scenes[place] for place in odd]
-            values = _values(scenes, rows, reference, self._draws)
-            values["novelty"] = _alone(novelty(scenes, known, near=NEAR))
+            values = _measure_values(scenes, rows, reference, self._draws)
+            values["novelty"] = _value_without_interval(novelty(scenes, known, near=NEAR))
         stopped = MEASURES["stopped"]
         values["stopped"] = _with_interval(
             self._scenes,
-            lambda some: stopped(self._rows[0], self._pick(self._rows, some)),
+            lambda some: stopped(self._rows[0], self._pick_rows(self._rows, some)),
             self._draws,
         )
         examples = examples_of(self._workspace, shards)
-        values["hard_braking"] = _braking([one.snapshot.braking[placed(one)] for one in examples])
-        return self._quality(FLOOR, self._scenes, values)
+        values["hard_braking"] = _measure_hard_braking(
+            [example.snapshot.braking[placed(example)] for example in examples]
+        )
+        return self._measure_quality(FLOOR, self._scenes, values)
 
     def filled(
         self,
@@ -257,7 +259,9 @@ class _ComparedMap:
         on, scenes, off = self._on, [], []
         for number, place in enumerate(_even_steps(len(self._scenes), most)):
             scene = self._scenes[place]
-            actors, dropped = self._asked(source, len(scene.node), scene.lights, seed, number)
+            actors, dropped = self._ask_generator(
+                source, len(scene.node), scene.lights, seed, number
+            )
             scenes.append(scene_of_actors(on, actors, scene.lights, name=scene.name))
             off.append(dropped)
         lights = lights_at_start(on.loaded.sumo)
@@ -265,24 +269,32 @@ class _ComparedMap:
         scenarios = []
         for number in (by_size[place] for place in _even_steps(len(by_size), RUN)):
             wanted = len(self._scenes[number].node)
-            actors, _ = self._asked(source, wanted, lights, seed, len(scenes) + number)
+            actors, _ = self._ask_generator(source, wanted, lights, seed, len(scenes) + number)
             scenarios.append(scenario_of(on, actors, number))
         return _MadeTraffic(scenes, float(np.mean(off)), scenarios)
 
     def quality(self, source: str, made: _MadeTraffic, *, run: bool) -> TrafficQuality:
         """Compare scenes, and run what is to be run."""
-        values = _values(made.scenes, self._seen(made.scenes), self._rows, self._draws)
-        values["novelty"] = _alone(novelty(made.scenes, self._scenes, near=NEAR))
-        values["off_road"] = _alone(made.off_road)
-        runnable = [one for one in made.scenarios if one.actors]
+        values = _measure_values(
+            made.scenes, self._scene_rows(made.scenes), self._rows, self._draws
+        )
+        values["novelty"] = _value_without_interval(novelty(made.scenes, self._scenes, near=NEAR))
+        values["off_road"] = _value_without_interval(made.off_road)
+        runnable = [scenario for scenario in made.scenarios if scenario.actors]
         if run and runnable:
             outcomes = first_seconds(self._workspace, runnable)
-            values["hard_braking"] = _braking([one.braking for one in outcomes])
-            values["collided"] = _alone(float(np.mean([one.collided for one in outcomes])))
-            values["inserted"] = _alone(float(np.mean([one.inserted for one in outcomes])))
-        return self._quality(source, made.scenes, values)
+            values["hard_braking"] = _measure_hard_braking(
+                [outcome.braking for outcome in outcomes]
+            )
+            values["collided"] = _value_without_interval(
+                float(np.mean([outcome.collided for outcome in outcomes]))
+            )
+            values["inserted"] = _value_without_interval(
+                float(np.mean([outcome.inserted for outcome in outcomes]))
+            )
+        return self._measure_quality(source, made.scenes, values)
 
-    def _asked(
+    def _ask_generator(
         self,
         place: Callable[[WholeMap, FillRequest, np.random.Generator], Fill],
         wanted: int,
@@ -297,17 +309,17 @@ class _ComparedMap:
         dropped = 1.0 - len(checked.actors) / checked.given if checked.given else 0.0
         return checked.actors, dropped
 
-    def _seen(self, scenes: Sequence[TrafficScene]) -> list[VehicleRows]:
+    def _scene_rows(self, scenes: Sequence[TrafficScene]) -> list[VehicleRows]:
         lanes, site = self._on.region.graph.lanes, self._on.learned.site
-        return [scene_features(lanes, site, one) for one in scenes]
+        return [scene_features(lanes, site, scene) for scene in scenes]
 
-    def _pick(self, rows: Sequence[VehicleRows], some: Sequence[int]) -> VehicleRows:
+    def _pick_rows(self, rows: Sequence[VehicleRows], some: Sequence[int]) -> VehicleRows:
         return together([rows[place] for place in some])
 
-    def _quality(
+    def _measure_quality(
         self, source: str, scenes: Sequence[TrafficScene], values: dict[str, MeasuredValue]
     ) -> TrafficQuality:
-        mean = float(np.mean([len(one.node) for one in scenes])) if scenes else 0.0
+        mean = float(np.mean([len(scene.node) for scene in scenes])) if scenes else 0.0
         name = self._on.region.graph.map_name
         return TrafficQuality(name, source, len(scenes), mean, values)
 
@@ -318,14 +330,14 @@ def _even_steps(count: int, most: int) -> list[int]:
     return [int((place + 0.5) / wanted * count) for place in range(wanted)]
 
 
-def _values(
+def _measure_values(
     scenes: Sequence[TrafficScene],
     rows: Sequence[VehicleRows],
     reference: Sequence[VehicleRows],
     draws: int,
 ) -> dict[str, MeasuredValue]:
     against = together(reference)
-    if sum(len(one.speed) for one in rows) < 2:
+    if sum(len(row.speed) for row in rows) < 2:
         return {}
     return {
         name: _with_interval(
@@ -343,14 +355,14 @@ def _with_interval(
     return MeasuredValue(measure(range(len(scenes))), *interval(scenes, measure, draws=draws))
 
 
-def _alone(value: float) -> MeasuredValue:
+def _value_without_interval(value: float) -> MeasuredValue:
     """A value without an interval."""
     return MeasuredValue(value, float("nan"), float("nan"))
 
 
-def _braking(groups: Sequence[FloatArray]) -> MeasuredValue:
+def _measure_hard_braking(groups: Sequence[FloatArray]) -> MeasuredValue:
     """Share of vehicles that brake hard, of groups that are drawn together for the interval."""
-    hard = [one[~np.isnan(one)] > HARD for one in groups]
+    hard = [group[~np.isnan(group)] > HARD for group in groups]
     nobody = np.empty(0, dtype=np.int64)
     scenes = [TrafficScene(nobody, nobody, np.empty(0), no_lights(0)) for _ in hard]
 

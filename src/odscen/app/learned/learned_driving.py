@@ -80,7 +80,7 @@ def learn_driving(
     """
     recorded = {}
     for name in maps:
-        recorded[name] = [_recorded(workspace, name, seed + k, duration) for k in range(runs)]
+        recorded[name] = [_record_driving(workspace, name, seed + k, duration) for k in range(runs)]
         if told is not None:
             told(f"{name}: {sum(len(x) for x, _ in recorded[name]):,} seen")
     kept = [name for name in maps if town_of(name) not in hold_out]
@@ -89,7 +89,7 @@ def learn_driving(
         raise InputError(
             "nothing is left to learn from: no maps, or all are held out", element="hold-out"
         )
-    x, acceleration = (np.concatenate([one[k] for one in rows]) for k in (0, 1))
+    x, acceleration = (np.concatenate([row[k] for row in rows]) for k in (0, 1))
     network = learned_driver(x, acceleration, np.random.default_rng(seed))
     about = {"maps": kept, "runs": runs, "rows": len(x), "seed": seed, "odscen": __version__}
     write_file(out, network_bytes(network, about))
@@ -98,11 +98,18 @@ def learn_driving(
     for name in measured:
         x, acceleration = (np.concatenate([one[k] for one in recorded[name]]) for k in (0, 1))
         guess = softmax(network(x)) @ BINS
-        found.append(DrivingError(name, len(x), _rms(guess - acceleration), _rms(acceleration)))
+        found.append(
+            DrivingError(
+                name,
+                len(x),
+                _root_mean_square(guess - acceleration),
+                _root_mean_square(acceleration),
+            )
+        )
     return tuple(found)
 
 
-def _recorded(
+def _record_driving(
     workspace: Workspace, name: str, seed: int, duration: float
 ) -> tuple[Array, FloatArray]:
     """What drivers of a run with background traffic saw, and how they accelerated."""
@@ -125,5 +132,5 @@ def _recorded(
             return arrays["x"].astype(np.float32), arrays["acceleration"]
 
 
-def _rms(values: FloatArray) -> float:
+def _root_mean_square(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.square(values))))

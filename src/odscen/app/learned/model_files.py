@@ -63,9 +63,9 @@ def train_on(
 ) -> TrafficModel:
     """Train a model on shards; errors of :func:`train`."""
     about = {
-        "maps": sorted({one.map_name for one in shards}),
+        "maps": sorted({shard.map_name for shard in shards}),
         "runs": len(shards),
-        "snapshots": sum(len(one.snapshots) for one in shards),
+        "snapshots": sum(len(shard.snapshots) for shard in shards),
     }
     settings = settings or TrainingSettings()
     return train_model(examples_of(workspace, shards), settings=settings, about=about, told=told)
@@ -79,14 +79,14 @@ def kept(shards: Sequence[Shard], hold_out: Sequence[str]) -> list[Shard]:
     InputError
         If there is no such town.
     """
-    towns = sorted({one.town for one in shards})
+    towns = sorted({shard.town for shard in shards})
     for town in hold_out:
         if town not in towns:
             raise InputError(
                 f"there is no town {town!r} in the data; there are {', '.join(towns)}",
                 element="hold-out",
             )
-    return [one for one in shards if one.town not in hold_out]
+    return [shard for shard in shards if shard.town not in hold_out]
 
 
 def read_model(file: Path) -> TrafficModel:

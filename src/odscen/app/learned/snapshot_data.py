@@ -155,7 +155,9 @@ def make_shards(
     for entry in entries:
         for seed in range(settings.seed, settings.seed + settings.runs):
             file = out / f"{entry.name}-{seed:04d}{SUFFIX}"
-            found = _there(file) or _made(workspace, entry.name, seed, file, settings)
+            found = _read_earlier_shard(file) or _make_shard(
+                workspace, entry.name, seed, file, settings
+            )
             made.append(found)
             if done is not None:
                 done(found)
@@ -183,23 +185,23 @@ def town_of(map_name: str) -> str:
     return re.sub(r"(?i)[-_. ]?((19|20)\d\d|carla)[-_. ]?", "", map_name) or map_name
 
 
-def _there(file: Path) -> MadeShard | None:
+def _read_earlier_shard(file: Path) -> MadeShard | None:
     """What an earlier call has made of a run."""
     if file.is_file():
         shard = shard_from_bytes(file.read_bytes(), file=str(file))
-        return MadeShard(file, sum(len(one.node) for one in shard.snapshots), None)
+        return MadeShard(file, sum(len(snapshot.node) for snapshot in shard.snapshots), None)
     note = file.with_name(file.name.removesuffix(SUFFIX) + SKIPPED)
     if note.is_file():
         return MadeShard(file, 0, str(json.loads(note.read_text(encoding="utf-8"))["why"]))
     return None
 
 
-def _made(
+def _make_shard(
     workspace: Workspace, name: str, seed: int, file: Path, settings: DataSettings
 ) -> MadeShard:
     density = float(stream(seed, "density", name).uniform(*settings.density))
     for _ in range(ATTEMPTS):
-        found = _attempted(workspace, name, seed, density, file, settings)
+        found = _attempt_shard(workspace, name, seed, density, file, settings)
         if found.skipped is None:
             break
         density /= 2.0
@@ -209,7 +211,7 @@ def _made(
     return found
 
 
-def _attempted(
+def _attempt_shard(
     workspace: Workspace,
     name: str,
     seed: int,
@@ -228,17 +230,17 @@ def _attempted(
             settings=RunSettings(recording=Recording(emissions=False)),
         )
         (run,) = run_all([checked], reports=False, figures=False)
-        why, snapshots = _judged(run, loaded, settings, seed)
+        why, snapshots = _judge_run(run, loaded, settings, seed)
     if why is not None:
         return MadeShard(file, 0, why)
     about: dict[str, Any] = {"seed": seed, "per_km": round(density, 3), "odscen": __version__}
     graph = loaded.sumo.graph
     shard = Shard(graph.map_name, graph.map_sha256, town_of(name), about, snapshots)
     strips = road_strips(graph.lanes)
-    views = [seen_ahead(graph.lanes, strips, one) for one in snapshots]
-    data = shard_bytes(shard, queues=[one[0] for one in views], ahead=[one[1] for one in views])
+    views = [seen_ahead(graph.lanes, strips, snapshot) for snapshot in snapshots]
+    data = shard_bytes(shard, queues=[view[0] for view in views], ahead=[view[1] for view in views])
     write_file(file, data)
-    return MadeShard(file, sum(len(one.node) for one in snapshots), None)
+    return MadeShard(file, sum(len(snapshot.node) for snapshot in snapshots), None)
 
 
 def traffic_scenario(loaded: LoadedMap, *, seed: int, density: float, duration: float) -> Scenario:
@@ -271,7 +273,7 @@ def connected_segments(graph: MapGraph) -> tuple[str, ...]:
     )
 
 
-def _judged(
+def _judge_run(
     run: Run, loaded: LoadedMap, settings: DataSettings, seed: int
 ) -> tuple[str | None, tuple[Snapshot, ...]]:
     """Why a run is left out, or its snapshots."""
@@ -291,7 +293,7 @@ def _judged(
     span = settings.duration - settings.warm_up - BRAKING_SECONDS - 0.5
     each = span / settings.snapshots
     times = settings.warm_up + each * (np.arange(settings.snapshots) + rng.random())
-    snapshots = snapshots_of(run, loaded, [round(float(2 * one)) / 2 for one in times])
+    snapshots = snapshots_of(run, loaded, [round(float(2 * time)) / 2 for time in times])
     stopped = most_stopped(snapshots)
     if stopped > settings.stopped_most:
         return f"gridlocked: {stopped:.0%} of the vehicles are stopped", ()
@@ -313,8 +315,10 @@ def snapshots_of(run: Run, loaded: LoadedMap, times: Sequence[float]) -> tuple[S
     """
     rows = _vehicles_of(run)
     logs = _light_logs(run)
-    tree = _tree(loaded)
-    return tuple(_snapshot(rows, one, tree, lights_at(loaded.sumo, logs, one)) for one in times)
+    tree = _build_node_tree(loaded)
+    return tuple(
+        _make_snapshot(rows, time, tree, lights_at(loaded.sumo, logs, time)) for time in times
+    )
 
 
 def _vehicles_of(run: Run) -> pl.DataFrame:
@@ -324,13 +328,13 @@ def _vehicles_of(run: Run) -> pl.DataFrame:
     return run.trajectories().filter(pl.col("category") != str(Category.PEDESTRIAN))
 
 
-def _tree(loaded: LoadedMap) -> Any:
+def _build_node_tree(loaded: LoadedMap) -> Any:
     from scipy.spatial import cKDTree
 
-    return cKDTree(_points(loaded.sumo.graph.lanes))
+    return cKDTree(_stack_poses(loaded.sumo.graph.lanes))
 
 
-def _points(of: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _stack_poses(of: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Places in which headings count as metres, ``(N, 4)``."""
     x, y, hdg = (np.asarray(one, dtype=np.float64) for one in (of.x, of.y, of.hdg))
     return np.column_stack([x, y, _HEADING * np.cos(hdg), _HEADING * np.sin(hdg)])
@@ -342,11 +346,11 @@ class _PlacedBodies(NamedTuple):
     hdg: Any
 
 
-def _snapshot(rows: pl.DataFrame, time: float, tree: Any, lights: LightView) -> Snapshot:
+def _make_snapshot(rows: pl.DataFrame, time: float, tree: Any, lights: LightView) -> Snapshot:
     import polars as pl
 
     near = rows.filter((pl.col("time") > time - 0.01) & (pl.col("time") < time + 0.01))
-    points = _points(_PlacedBodies(near["x"], near["y"], near["hdg"]))
+    points = _stack_poses(_PlacedBodies(near["x"], near["y"], near["hdg"]))
     far, node = tree.query(points) if len(points) else (np.empty(0), np.empty(0, dtype=np.int64))
     good = far < OFF_NODE
     names = [str(one) for one in Category]
@@ -373,7 +377,9 @@ def braking_of(rows: pl.DataFrame, time: float, ids: Sequence[str]) -> Any:
     )
     found = dict(zip(strongest["id"].to_list(), strongest["braking"].to_list(), strict=True))
     values = [found.get(one) for one in ids]
-    return np.array([np.nan if one is None else max(one, 0.0) for one in values], dtype=np.float64)
+    return np.array(
+        [np.nan if value is None else max(value, 0.0) for value in values], dtype=np.float64
+    )
 
 
 def _light_logs(run: Run) -> dict[str, LightLog]:

@@ -44,7 +44,7 @@ def stopped_growth(rows: pl.DataFrame, *, start: float, middle: float) -> float:
 
 def most_stopped(snapshots: Sequence[Snapshot]) -> float:
     """Largest share of stopped vehicles; snapshots of few count together."""
-    few = [one.speed for one in snapshots if len(one.speed) < FEW]
-    many = [one.speed for one in snapshots if len(one.speed) >= FEW]
+    few = [snapshot.speed for snapshot in snapshots if len(snapshot.speed) < FEW]
+    many = [snapshot.speed for snapshot in snapshots if len(snapshot.speed) >= FEW]
     groups = [*many, np.concatenate([np.empty(0), *few])]
-    return max((float(np.mean(one < STOPPED)) for one in groups if len(one)), default=0.0)
+    return max((float(np.mean(group < STOPPED)) for group in groups if len(group)), default=0.0)

@@ -80,7 +80,7 @@ class Confidence:
     @property
     def words(self) -> str:
         """One line for people."""
-        unit = _unit(self.figure)
+        unit = _unit_suffix(self.figure)
         wanted = f"the interval wanted, +- {100.0 * self.share:g} %"
         if self.mean is None or self.half_width is None:
             return f"{self.figure}: {self.seeds} seeds are too few for {wanted}"
@@ -96,7 +96,7 @@ class Confidence:
         return {**asdict(self), "enough": self.enough, "words": self.words}
 
 
-def _unit(figure: str) -> str:
+def _unit_suffix(figure: str) -> str:
     entry = run_figure(figure)
     return f" {entry.unit}" if entry is not None and entry.unit else ""
 
@@ -118,11 +118,13 @@ def confidence_of(
     half = _half_width(scatter, len(known))
     needed = None
     if mean:
-        needed = next((n for n in _counts() if _half_width(scatter, n) <= share * abs(mean)), None)
+        needed = next(
+            (n for n in _seed_counts() if _half_width(scatter, n) <= share * abs(mean)), None
+        )
     return Confidence(scenario, figure, mean, half, share, len(known), needed)
 
 
-def _counts() -> Sequence[int]:
+def _seed_counts() -> Sequence[int]:
     return range(2, _MOST)
 
 
@@ -204,23 +206,23 @@ def run_until_confident(
             processes=processes, reports=reports, figures=reports, reporter=reporter,
         )  # fmt: skip
         found = confidence_of(
-            [_value(run, figure) for run in done],
+            [_figure_value(run, figure) for run in done],
             share=share,
             figure=figure,
             scenario=scenario_name(scenario),
         )
         reporter.said(f"{found.scenario}: {found.words}")
         missing = min(found.needed or most, most) - len(done)
-        if found.enough or len(done) >= most or not any(map(_completed, done)):
+        if found.enough or len(done) >= most or not any(map(_has_completed, done)):
             return tuple(done), found
         first = max(batch) + 1
         batch = list(range(first, first + min(max(1, missing), most - len(done))))
 
 
-def _completed(run: Run) -> bool:
+def _has_completed(run: Run) -> bool:
     return run.status is RunStatus.COMPLETED
 
 
-def _value(run: Run, figure: str) -> float | None:
+def _figure_value(run: Run, figure: str) -> float | None:
     entry = run_figure(figure)
-    return run.value_of(entry) if entry is not None and _completed(run) else None
+    return run.value_of(entry) if entry is not None and _has_completed(run) else None

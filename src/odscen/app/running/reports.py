@@ -98,11 +98,11 @@ def write_report(
         figures = read_tables(folder / layout.FIGURES_FOLDER) if data is None else data.traffic
         own = folder / layout.FIGURES_FOLDER
         stations = read_stations(own) if data is None else data.stations
-        page = _page(folder, summary, loaded, corridor, figures, stations)
+        page = _render_page(folder, summary, loaded, corridor, figures, stations)
     return write_text(out or folder / layout.REPORT_FILE, page)
 
 
-def _page(
+def _render_page(
     folder: Path,
     summary: Mapping[str, Any],
     loaded: LoadedMap | None,
@@ -132,25 +132,25 @@ def _page(
         shapes=None if sumo_map is None else place_shapes(sumo_map.graph),
         corridor=followed,
         conflicts=read_conflicts(folder),
-        lights=_lights(folder),
+        lights=_read_lights(folder),
         visits=read_visits(folder),
         stations=stations,
-        parking=_parking(folder, summary),
-        assignment=_assignment(folder),
+        parking=_read_parking_use(folder, summary),
+        assignment=_read_assignment(folder),
     )
 
 
-def _parking(folder: Path, summary: Mapping[str, Any]) -> ParkingUse | None:
+def _read_parking_use(folder: Path, summary: Mapping[str, Any]) -> ParkingUse | None:
     begin, end = AnalysisTimes.of_summary(summary).warm_up, float(summary.get("sim_seconds") or 0)
     return read_parking(folder, begin=begin, end=end)
 
 
-def _assignment(folder: Path) -> Assignment | None:
+def _read_assignment(folder: Path) -> Assignment | None:
     file = folder / layout.ASSIGNMENT_FILE
     return Assignment.from_json(file.read_text(encoding="utf-8")) if file.is_file() else None
 
 
-def _lights(folder: Path) -> LightsOfRun | None:
+def _read_lights(folder: Path) -> LightsOfRun | None:
     """What lights were told to show, what they showed, and what came of it."""
     file, table = folder / layout.LIGHTS_FILE, folder / layout.FIGURES_FOLDER / SIGNALS_TABLE
     states = read_light_states(folder)
@@ -204,17 +204,19 @@ def renew_report(
         If a file of the run is not as it was written; that of the report is reported only.
     """
     folder = _folder_of(workspace, run)
-    _completed(folder)  # which may have figures computed, and takes the run's lock for that
+    _read_completed_summary(
+        folder
+    )  # which may have figures computed, and takes the run's lock for that
     own = out is None and not unfinished(folder)
     with run_lock(folder) if own else nullcontext():
-        summary = _completed(folder)
+        summary = _read_completed_summary(folder)
         loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
         graph = loaded.sumo.graph
         segments = path_between(graph, *ends) if ends is not None else corridor
         along = corridor_along(graph, segments) if segments else None
         data = None
         if (warm_up, interval) != (None, None):
-            summary, data = _analysed(folder, summary, warm_up=warm_up, interval=interval)
+            summary, data = _analyse_run(folder, summary, warm_up=warm_up, interval=interval)
         report = write_report(folder, summary, loaded=loaded, corridor=along, out=out, data=data)
         if out is None:
             seal_again(folder, layout.REPORT_FILE)
@@ -231,7 +233,7 @@ def _folder_of(workspace: Workspace, run: Run | Path) -> Path:
     return folder
 
 
-def _analysed(
+def _analyse_run(
     folder: Path, summary: Mapping[str, Any], *, warm_up: float | None, interval: float | None
 ) -> tuple[dict[str, Any], RunData]:
     """Summary with the figures of other times, and what they were computed from."""
@@ -269,7 +271,9 @@ def interval_rows(
         If it has not completed, or times do not fit what was measured.
     """
     folder = _folder_of(workspace, run)
-    summary, data = _analysed(folder, _completed(folder), warm_up=warm_up, interval=interval)
+    summary, data = _analyse_run(
+        folder, _read_completed_summary(folder), warm_up=warm_up, interval=interval
+    )
     found = {name: summary.get(name) for name in ("warm_up", "interval", "figures")}
     if data.stations is not None:
         found["stations"] = [rounded(row) for row in data.stations.to_dicts()]
@@ -279,11 +283,11 @@ def interval_rows(
     return {**found, **{name: [rounded(row) for row in table] for name, table in rows.items()}}
 
 
-def _completed(folder: Path) -> dict[str, Any]:
+def _read_completed_summary(folder: Path) -> dict[str, Any]:
     """Summary of a run that has completed, with all of its files as they were written."""
     summary = whole_summary(folder, leave=(layout.REPORT_FILE,))
-    for one in damaged_in(folder, only=layout.REPORT_FILE):
-        logging.getLogger("odscen").warning("%s: %s; it is written anew", folder, one)
+    for damaged_file in damaged_in(folder, only=layout.REPORT_FILE):
+        logging.getLogger("odscen").warning("%s: %s; it is written anew", folder, damaged_file)
     if summary["status"] != RunStatus.COMPLETED:
         raise InputError(f"run {folder.name!r} has not completed, it is {summary['status']!r}")
     return summary

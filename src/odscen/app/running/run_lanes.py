@@ -58,10 +58,10 @@ def traffic_on_map(workspace: Workspace, run: Path) -> TrafficOnMap:
     measured = read_parts(run, end=end, meso=bool(summary.get("meso")))
     found = lane_traffic(lanes, places, end=end, measured=measured)
     scenario = read_scenario(run / SCENARIO_FILE)
-    return TrafficOnMap(found, _stretches(map_of(workspace, scenario).sumo, found.names))
+    return TrafficOnMap(found, _find_node_stretches(map_of(workspace, scenario).sumo, found.names))
 
 
-def _stretches(sumo: SumoMap, names: list[tuple[str, str]]) -> NodeStretches:
+def _find_node_stretches(sumo: SumoMap, names: list[tuple[str, str]]) -> NodeStretches:
     """Stretches of lanes of the map whose nodes lie on one of these SUMO lanes and segments."""
     rows: dict[str, list[int]] = {}
     for row, (lane, _) in enumerate(names):
@@ -76,7 +76,7 @@ def _stretches(sumo: SumoMap, names: list[tuple[str, str]]) -> NodeStretches:
             nodes = np.flatnonzero(places.lane == number)
             of_segment = {names[row][1]: row for row in rows[lane]}
             segments = ids[sumo.graph.lanes.segment[nodes]]
-            wanted[nodes] = [of_segment.get(str(one), -1) for one in segments]
+            wanted[nodes] = [of_segment.get(str(segment), -1) for segment in segments]
     changes = (np.diff(wanted) != 0) | (np.diff(own) != 0)
     first = np.concatenate([[0], np.flatnonzero(changes) + 1]).astype(np.int32)
     end = np.append(first[1:], len(wanted)).astype(np.int32)

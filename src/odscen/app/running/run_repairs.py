@@ -45,10 +45,10 @@ def see_to_run(workspace: Workspace, run: Path, *, repair: bool) -> Iterator[Rep
     """Yield a step if a run is damaged, or has no checksums; none for one that is going on."""
     if is_locked(run) or not _is_run(run):
         return
-    damaged = _damage(run)
+    damaged = _list_damage(run)
     step = RepairStep("run", run.name, "found", listed(damaged))
     if damaged:
-        yield _repaired(workspace, run, damaged, step) if repair else step
+        yield _repair_files(workspace, run, damaged, step) if repair else step
     elif without_sums(run):
         if repair:
             with run_lock(run):
@@ -61,18 +61,18 @@ def _is_run(run: Path) -> bool:
     return any((run / name).is_file() for name in names)
 
 
-def _damage(run: Path) -> list[DamagedFile]:
+def _list_damage(run: Path) -> list[DamagedFile]:
     damaged = damaged_in(run)
     return [*damaged, _STATUS] if read_status(run) == {} else damaged
 
 
-def _repaired(
+def _repair_files(
     workspace: Workspace, run: Path, damaged: Sequence[DamagedFile], step: RepairStep
 ) -> RepairStep:
     with run_lock(run):
         try:
-            done = [_rebuild(workspace, run, one) for one in _in_order(damaged)]
-            if left := _damage(run):
+            done = [_rebuild_file(workspace, run, one) for one in _in_order(damaged)]
+            if left := _list_damage(run):
                 raise InputError(f"still: {listed(left)}")
         except (OdscenError, ValueError, KeyError) as error:
             root = workspace.root if run.parent == workspace.runs else run.parent
@@ -91,7 +91,7 @@ def _in_order(damaged: Sequence[DamagedFile]) -> list[DamagedFile]:
     return sorted([*others, *figures], key=lambda one: one.file == layout.REPORT_FILE)
 
 
-def _rebuild(workspace: Workspace, run: Path, one: DamagedFile) -> str:
+def _rebuild_file(workspace: Workspace, run: Path, damaged_file: DamagedFile) -> str:
     """Rebuild a file of a run; what was done, in words.
 
     Raises
@@ -99,21 +99,23 @@ def _rebuild(workspace: Workspace, run: Path, one: DamagedFile) -> str:
     InputError
         If it cannot be rebuilt.
     """
-    if one.file == SUMS_FILE:
+    if damaged_file.file == SUMS_FILE:
         return _list_again(run)
-    if one.file == _NET:
-        return _net_again(workspace, run, one)
-    if one.file == layout.STATUS_FILE:
+    if damaged_file.file == _NET:
+        return _net_again(workspace, run, damaged_file)
+    if damaged_file.file == layout.STATUS_FILE:
         return _status_again(run)
-    if _is_figures(one.file):
+    if _is_figures(damaged_file.file):
         return _figures_again(run)
-    if one.file == layout.REPORT_FILE:
+    if damaged_file.file == layout.REPORT_FILE:
         return _report_again(workspace, run)
-    if one.expected == MISSING:  # somebody has put it there
-        return _without(run, one.file)
-    if one.file == layout.LOG_FILE or (one.file == layout.SUMMARY_FILE and unfinished(run)):
-        return _without(run, one.file)
-    raise InputError(f"nothing else says what was in {one.file}")
+    if damaged_file.expected == MISSING:  # somebody has put it there
+        return _set_file_aside(run, damaged_file.file)
+    if damaged_file.file == layout.LOG_FILE or (
+        damaged_file.file == layout.SUMMARY_FILE and unfinished(run)
+    ):
+        return _set_file_aside(run, damaged_file.file)
+    raise InputError(f"nothing else says what was in {damaged_file.file}")
 
 
 def _is_figures(name: str) -> bool:
@@ -125,7 +127,7 @@ def _list_again(run: Path) -> str:
     lines = (run / SUMS_FILE).read_bytes().splitlines()
     found = [_LINE.fullmatch(line) for line in lines[:-1]]
     names = [match[2].decode("utf-8", "replace") for match in found if match]
-    wrong = [match for match in found if match is None or not _true(run, match)]
+    wrong = [match for match in found if match is None or not _holds_true(run, match)]
     if len(wrong) > 1:
         raise InputError(f"{len(wrong)} of its lines are not true")
     whole = {name: file_digest(run / name) for name in names if (run / name).is_file()}
@@ -141,20 +143,20 @@ def _seal_all(run: Path) -> None:
     seal_run(run)
 
 
-def _true(run: Path, match: re.Match[bytes]) -> bool:
+def _holds_true(run: Path, match: re.Match[bytes]) -> bool:
     with suppress(OSError, ValueError):
         return file_digest(run / match[2].decode()) == match[1].decode()
     return False
 
 
-def _net_again(workspace: Workspace, run: Path, one: DamagedFile) -> str:
+def _net_again(workspace: Workspace, run: Path, damaged_file: DamagedFile) -> str:
     """Take the network of the run's map, if it is the same."""
     known = about(run) if unfinished(run) else read_summary(run)
     entry = workspace.map_for(str(known.get("map")), str(known.get("map_sha256")))
     net = entry.checked("net")
-    if file_digest(net) != one.expected:
+    if file_digest(net) != damaged_file.expected:
         raise InputError(f"map {entry.name!r} has another network today")
-    target = run / one.file
+    target = run / damaged_file.file
     target.unlink(missing_ok=True)
     try:
         os.link(net, target)
@@ -188,7 +190,7 @@ def _report_again(workspace: Workspace, run: Path) -> str:
     return "wrote the report anew" if loaded else "wrote the report anew, without the map"
 
 
-def _without(run: Path, name: str) -> str:
+def _set_file_aside(run: Path, name: str) -> str:
     """Set a file aside that nothing is computed from."""
     place = set_aside(run / name, run.parent)
     sums = read_sums(run) or {}

@@ -161,12 +161,12 @@ def unsupported_parts(
     InputError
         If it breaks while it says so.
     """
-    with _guarded(simulator):
+    with _name_simulator_in_errors(simulator):
         return tuple(simulator.unsupported(scenario, on))
 
 
 @contextmanager
-def _guarded(simulator: AnySimulator) -> Iterator[None]:
+def _name_simulator_in_errors(simulator: AnySimulator) -> Iterator[None]:
     """Name the simulator in what its code raises."""
     try:
         yield
@@ -227,7 +227,7 @@ def prepare_run(run: CheckedRun, *, reporter: Reporter = SILENT) -> PreparedRun:
     InputError
         If a simulator from outside breaks.
     """
-    with _guarded(run.simulator):
+    with _name_simulator_in_errors(run.simulator):
         prepared: PreparedRun = run.simulator.prepare(
             run.scenario, run.run_map, run.settings, reporter
         )
@@ -296,7 +296,7 @@ def carry_out(
             result = run_in_new_folder(
                 prepared,
                 run.folder,
-                lambda folder: _simulate(run.simulator, prepared, folder, reporter),
+                lambda folder: _run_simulator(run.simulator, prepared, folder, reporter),
                 finish=finish,
                 figures=figures,
             )
@@ -304,7 +304,7 @@ def carry_out(
     return result
 
 
-def _simulate(
+def _run_simulator(
     simulator: AnySimulator, prepared: PreparedRun, folder: Path, reporter: Reporter
 ) -> SimulationOutcome:
     """Let a simulator run; code from outside that breaks is a failed run."""

@@ -51,11 +51,11 @@ def attach_trajectory(
     ScenarioError
         If there is no such actor, or its id is too long for a rule.
     """
-    if actor not in {one.id for one in scenario.actors}:
-        known = ", ".join(one.id for one in scenario.actors[:8]) or "none"
+    if actor not in {actor.id for actor in scenario.actors}:
+        known = ", ".join(actor.id for actor in scenario.actors[:8]) or "none"
         raise ScenarioError(f"there is no actor {actor!r}; there are {known}")
     with in_file(str(source)):
-        recorded, rows = trajectory_rows(_table(source), of=of)
+        recorded, rows = trajectory_rows(_read_table(source), of=of)
     name, step = f"replay-{actor}", scenario.simulation.step_length
     starts = max(recorded if begin is None else begin, step)
     (_, x, y, hdg), (seconds, x1, y1, _) = rows[:2]
@@ -73,11 +73,11 @@ def attach_trajectory(
             ],
         },
     )
-    others = tuple(one for one in scenario.rules if one.id != name)
+    others = tuple(rule for rule in scenario.rules if rule.id != name)
     return scenario.model_copy(update={"rules": (*others, rule)})
 
 
-def _table(source: Path) -> pl.DataFrame:
+def _read_table(source: Path) -> pl.DataFrame:
     if source.is_dir():
         return Run.open(source).trajectories()
     parquet = source.suffix.lower() == PARQUET

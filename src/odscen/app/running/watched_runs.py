@@ -65,7 +65,7 @@ class WatchedRun:
         self._closing = self._over = self._handed = False
         self._run: Run | None = None
         self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._follow, name="odscen-watch", daemon=True)
+        self._thread = threading.Thread(target=self._follow_run, name="odscen-watch", daemon=True)
         self._thread.start()
 
     def __iter__(self) -> Iterator[Step]:
@@ -77,7 +77,7 @@ class WatchedRun:
             raise StopIteration
         if self._handed:
             self._wanted.release()
-        step = self._next()
+        step = self._wait_for_step()
         self._handed = step is not None
         if step is None:
             self._over = True
@@ -159,7 +159,7 @@ class WatchedRun:
             self._over = True
             self._refuse_error()
 
-    def _next(self) -> Step | None:
+    def _wait_for_step(self) -> Step | None:
         while True:
             try:
                 return self._steps.get(timeout=_LISTEN)
@@ -176,7 +176,7 @@ class WatchedRun:
         if self._closing:
             self._in_step.stop()
 
-    def _follow(self) -> None:
+    def _follow_run(self) -> None:
         try:
             self._run = carry_out(self._checked, self._prepared, live=self._in_step)
         except BaseException as error:  # raised again where the steps are asked for

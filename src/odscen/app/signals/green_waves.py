@@ -78,7 +78,9 @@ class Coordination:
 
     def to_words(self) -> tuple[str, ...]:
         """What has come of it, in sentences."""
-        offsets = ", ".join(f"{', '.join(one.junctions)}: {one.offset:g} s" for one in self.lights)
+        offsets = ", ".join(
+            f"{', '.join(light.junctions)}: {light.offset:g} s" for light in self.lights
+        )
         bands = zip(("along", "back"), (self.out, self.back), self.before, strict=True)
         return (
             f"All {len(self.lights)} lights have a cycle of {self.cycle:g} s; offsets: {offsets}.",
@@ -100,15 +102,15 @@ class Coordination:
             "bands_before": dict(zip(("out", "back"), self.before, strict=True)),
             "lights": [
                 {
-                    "junctions": list(one.junctions),
-                    "metres": one.metres,
-                    "offset": one.offset,
-                    "out_time": one.wave.out_time,
-                    "back_time": one.wave.back_time,
-                    "out": [window._asdict() for window in one.wave.out],
-                    "back": [window._asdict() for window in one.wave.back],
+                    "junctions": list(light.junctions),
+                    "metres": light.metres,
+                    "offset": light.offset,
+                    "out_time": light.wave.out_time,
+                    "back_time": light.wave.back_time,
+                    "out": [window._asdict() for window in light.wave.out],
+                    "back": [window._asdict() for window in light.wave.back],
                 }
-                for one in self.lights
+                for light in self.lights
             ],
         }
 
@@ -116,17 +118,17 @@ class Coordination:
         """Time-space diagram: time to the right, distance upwards."""
         lights = [
             DiagramLight(
-                ", ".join(one.junctions), one.metres, one.offset,
-                tuple(one.wave.out), tuple(one.wave.back),
+                ", ".join(light.junctions), light.metres, light.offset,
+                tuple(light.wave.out), tuple(light.wave.back),
             )
-            for one in self.lights
+            for light in self.lights
         ]  # fmt: skip
         bands = []
         if self.out.seconds:
-            times = tuple(self.out.begin + one.wave.out_time for one in self.lights)
+            times = tuple(self.out.begin + light.wave.out_time for light in self.lights)
             bands.append(DiagramBand("out", times, self.out.seconds))
         if self.back.seconds:
-            times = tuple(self.back.begin + one.wave.back_time for one in self.lights)
+            times = tuple(self.back.begin + light.wave.back_time for light in self.lights)
             bands.append(DiagramBand("back", times, self.back.seconds))
         return time_space_svg(lights, bands, cycle=self.cycle, title=self.scenario.name)
 
@@ -188,7 +190,7 @@ def coordinate_signals(
         raise InputError(f"a progression speed of {speed:g} m/s: it has to be positive")
     refuse_errors(signal_problems(scenario.signals, loaded.lights))
     finder = CorridorFinder(loaded.sumo)
-    numbers = chosen_lights(loaded, junctions) if junctions else _along(loaded, along)
+    numbers = chosen_lights(loaded, junctions) if junctions else _order_lights_along(loaded, along)
     if len(numbers) < 2:
         named = ", ".join(junctions or along)
         raise InputError(
@@ -196,10 +198,10 @@ def coordinate_signals(
         )
     if along:
         numbers = finder.in_order(numbers)
-    return _coordinated(scenario, loaded, finder, numbers, favoured, speed, cycle)
+    return _coordinate_lights(scenario, loaded, finder, numbers, favoured, speed, cycle)
 
 
-def _coordinated(
+def _coordinate_lights(
     scenario: Scenario,
     loaded: LoadedMap,
     finder: CorridorFinder,
@@ -216,7 +218,7 @@ def _coordinated(
         raise InputError(
             f"one cannot drive through junctions {' - '.join(names)} in this order, nor back"
         )
-    shown = [one.shown for one in realized_lights(scenario, loaded.sumo)]
+    shown = [realized_light.shown for realized_light in realized_lights(scenario, loaded.sumo)]
     plans = [plan_at(shown[n], 0.0) for n in numbers]
     cycle = cycle or max(plan.cycle for plan in plans)
     times = [
@@ -230,12 +232,12 @@ def _coordinated(
     waves = wave_lights(out, back, phases)
     offsets = widest_offsets(waves, cycle, favoured=favoured)
     entries = [
-        _entry(scenario, one, offset, default=loaded.sumo.lights[n].offset)
+        _retime_with_offset(scenario, one, offset, default=loaded.sumo.lights[n].offset)
         for one, offset, n in zip(times, offsets, numbers, strict=True)
     ]
     new = with_timings(scenario, entries)
     refuse_errors(signal_problems(new.signals, loaded.lights))
-    metres = _metres(out, back)
+    metres = _distances_from_first(out, back)
     lights = tuple(
         CoordinatedLight(view.names, at, offset, wave)
         for view, at, offset, wave in zip(views, metres, offsets, waves, strict=True)
@@ -245,7 +247,9 @@ def _coordinated(
     return Coordination(new, cycle, lights, *bands, (before[0].seconds, before[1].seconds))
 
 
-def _metres(out: CorridorDirection | None, back: CorridorDirection | None) -> tuple[float, ...]:
+def _distances_from_first(
+    out: CorridorDirection | None, back: CorridorDirection | None
+) -> tuple[float, ...]:
     """Metres of each light from the first one."""
     if out is not None:
         return out.metres
@@ -253,7 +257,7 @@ def _metres(out: CorridorDirection | None, back: CorridorDirection | None) -> tu
     return tuple(back.metres[-1] - metres for metres in back.metres[::-1])
 
 
-def _entry(
+def _retime_with_offset(
     scenario: Scenario, times: LightTimes, offset: float, *, default: float
 ) -> JunctionTiming:
     timing = timing_of(scenario, times.junctions)
@@ -265,7 +269,7 @@ def _entry(
     return retimed(scenario, times, offset=own, control="fixed")
 
 
-def _along(loaded: LoadedMap, roads: Sequence[str]) -> list[int]:
+def _order_lights_along(loaded: LoadedMap, roads: Sequence[str]) -> list[int]:
     """Lights that one comes to over roads."""
     segments = loaded.sumo.graph.segments
     chosen: set[str] = set()
@@ -284,7 +288,7 @@ def _along(loaded: LoadedMap, roads: Sequence[str]) -> list[int]:
     return [
         number
         for number, light in enumerate(loaded.lights)
-        if chosen & {one.approach for one in light.movements if not one.walk}
+        if chosen & {movement.approach for movement in light.movements if not movement.walk}
     ]
 
 

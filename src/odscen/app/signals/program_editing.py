@@ -64,7 +64,7 @@ def stretch_cycle(
     if plan is not None:
         own = [one for one in shown.plans if one.id == plan]
         if not own:
-            raise NotFoundError("plan of the day", plan, [one.id for one in shown.plans])
+            raise NotFoundError("plan of the day", plan, [plan.id for plan in shown.plans])
         shown = replace(shown, plans=tuple(own))
     timing = timing_of(scenario, shown.junctions)
     times = stretched(shown, loaded.lights[number], timing, cycle)
@@ -112,9 +112,9 @@ def _own_program(shown: LightProgram, was: LightProgram, old: JunctionTiming) ->
     """Entry of the scenario with groups and stages as they are shown, and the bounds they had."""
     plan = shown.plans[0]
     bounds = {
-        one.id: (one.least, one.most)
-        for one in stage_spans(was.plans[0])
-        if was.control == "actuated" and one.most > one.least
+        stage_span.id: (stage_span.least, stage_span.most)
+        for stage_span in stage_spans(was.plans[0])
+        if was.control == "actuated" and stage_span.most > stage_span.least
     }
     stages = []
     for span in stage_spans(plan):
@@ -130,7 +130,7 @@ def _own_program(shown: LightProgram, was: LightProgram, old: JunctionTiming) ->
                 max_green=most,
             )
         )
-    groups = tuple(ProgramGroup(id=one.id, movements=one.movements) for one in shown.groups)
+    groups = tuple(ProgramGroup(id=group.id, movements=group.movements) for group in shown.groups)
     return old.model_copy(
         update={"groups": groups, "stages": tuple(stages), "green": (), "offset": plan.offset}
     )

@@ -67,11 +67,11 @@ class TimedSignals:
     def to_words(self) -> tuple[str, ...]:
         """What has come of it, a sentence for each light."""
         found = [
-            f"Junction {', '.join(one.times.junctions)}: cycle {one.times.cycle:g} s "
-            f"(was {one.before.cycle:g} s), green "
-            f"{', '.join(f'{green:g}' for green in one.times.green)} s "
-            f"(was {', '.join(f'{green:g}' for green in one.before.green)} s)."
-            for one in self.lights
+            f"Junction {', '.join(light.times.junctions)}: cycle {light.times.cycle:g} s "
+            f"(was {light.before.cycle:g} s), green "
+            f"{', '.join(f'{green:g}' for green in light.times.green)} s "
+            f"(was {', '.join(f'{green:g}' for green in light.before.green)} s)."
+            for light in self.lights
         ]
         found += [
             f"Junction {name}: no vehicle comes; it keeps its times." for name in self.without
@@ -143,7 +143,7 @@ def time_signals(
     chosen = chosen_lights(loaded, junctions)
     problems = signal_problems(scenario.signals, loaded.lights)
     # Lights of one coordination get one cycle here, as when an arrow has made that of one longer.
-    refuse_errors(one for one in problems if one.code != "cycles_of_coordination")
+    refuse_errors(problem for problem in problems if problem.code != "cycles_of_coordination")
     vehicles = list(planned_vehicles(scenario, loaded.sumo))
     volumes = turning_volumes(vehicles, duration=scenario.simulation.duration, begin=begin, end=end)
     timer = _Timer(scenario, loaded, volumes, saturation, bounds)
@@ -155,7 +155,7 @@ def time_signals(
             "traffic light"
         )
     without = tuple(", ".join(loaded.lights[n].names) for n, one in lights.items() if one is None)
-    entries = [retimed(scenario, one.times) for one in timed.values()]
+    entries = [retimed(scenario, light.times) for light in timed.values()]
     new = with_timings(scenario, entries)
     refuse_errors(signal_problems(new.signals, loaded.lights))
     return TimedSignals(new, volumes.begin, volumes.end, tuple(timed.values()), without)
@@ -275,7 +275,7 @@ def _light_fields(light: TimedLight) -> dict[str, Any]:
                 times.stages, times.green, light.before.green, splits.ratios, strict=True
             )
         ],
-        "movements": [one._asdict() for one in light.movements],
+        "movements": [movement._asdict() for movement in light.movements],
         "lanes": [
             {
                 "lane": lane.load.lane,

@@ -185,7 +185,7 @@ def take_signals(
             if light.id not in found:
                 continue
             loops = taken_loops(parsed.loops.values(), light, loaded.sumo.net)
-            plans = _plans(parsed, light.id, scenario.demand.clock, notes)
+            plans = _take_day_plans(parsed, light.id, scenario.demand.clock, notes)
             timing, more = taken_timing(views[light.id], plans, loops=loops)
             notes += more
             for name in views[light.id].names:
@@ -196,11 +196,13 @@ def take_signals(
     return with_fields(scenario, signals=signals), tuple(notes)
 
 
-def _plans(parsed: SignalFile, light: str, clock: float, notes: list[str]) -> list[TakenPlan]:
+def _take_day_plans(
+    parsed: SignalFile, light: str, clock: float, notes: list[str]
+) -> list[TakenPlan]:
     """Programs of a light that are run, with the times of day at which they begin."""
     from odscen.formats.tll_program import TakenPlan
 
-    programs = {one.id: one for one in parsed.programs if one.light == light}
+    programs = {program.id: program for program in parsed.programs if program.light == light}
     switches = parsed.switches.get(light)
     if switches is None:
         last = list(programs.values())[-1]

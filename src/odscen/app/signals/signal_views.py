@@ -39,7 +39,9 @@ def program_origin(
     """Whose the program of a light is, in a scenario with these signals."""
     if light.own:
         return "scenario"
-    timing = next((one for one in signals.junctions if one.junction in light.junctions), None)
+    timing = next(
+        (junction for junction in signals.junctions if junction.junction in light.junctions), None
+    )
     priority = signals.bus_priority if timing is None else bool(timing.bus_priority)
     changed = timing is not None and (bool(timing.green) or timing.offset != 0.0)
     if changed or priority or light.control != "fixed":
@@ -134,20 +136,20 @@ def group_pairs(timing: JunctionTiming, light: Light) -> tuple[GroupPair, ...]:
     program = DesignedProgram(timing, light, "fixed")
     given = {row[:2]: row[2] for row in timing.intergreens}
     found = []
-    for one in program.groups.values():
+    for group in program.groups.values():
         for other in program.groups.values():
-            if one is other:
+            if group is other:
                 continue
-            needed, _ = program.needed(one.id, other.id)
-            together = _together(light, one, other)
-            if needed or together != "free" or (one.id, other.id) in given:
-                pair = one.id, other.id
+            needed, _ = program.needed(group.id, other.id)
+            together = _rank_turn_against(light, group, other)
+            if needed or together != "free" or (group.id, other.id) in given:
+                pair = group.id, other.id
                 used = program.intergreen(*pair)
                 found.append(GroupPair(*pair, needed, given.get(pair), used, together))
     return tuple(found)
 
 
-def _together(
+def _rank_turn_against(
     light: Light, one: DesignedGroup, other: DesignedGroup
 ) -> Literal["free", "yields", "first", "never"]:
     own = set(one.movements)

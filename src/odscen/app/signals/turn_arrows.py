@@ -142,7 +142,9 @@ def with_turn_arrows(
             for n, link in enumerate(loaded.sumo.lights[number].links)
             if link.turn != CROSSED and net.lanes[link.source].allows(DRIVEN)
         }
-        asked = _asked(view, counts, driven, across="right" if net.lefthand else "left")
+        asked = _find_wanted_arrows(
+            view, counts, driven, across="right" if net.lefthand else "left"
+        )
         if not asked:
             continue
         own = timing_of(scenario, view.names)
@@ -152,20 +154,20 @@ def with_turn_arrows(
         timing = timing_of(changed, view.names)
         assert timing is not None  # it was taken over
         control = timing.control or scenario.signals.control
-        given = _given(timing, view, asked, on_call=control == "actuated")
+        given = _place_arrows(timing, view, asked, on_call=control == "actuated")
         if given is not None:
             scenario = with_timings(changed, [given[0]])
             arrows += given[1]
     return scenario, tuple(arrows)
 
 
-def _given(
+def _place_arrows(
     timing: JunctionTiming, view: Light, asked: Sequence[TurnArrow], *, on_call: bool
 ) -> tuple[JunctionTiming, list[TurnArrow]] | None:
     """The timing with arrows in at most four stages, and the turns that have got one."""
     found, had = [], {stage.id for stage in timing.stages}
     for arrow in asked:
-        if _protected(timing, view, arrow):
+        if _has_protected_stage(timing, view, arrow):
             continue
         new = with_turn(
             timing, view, approach=arrow.approach, turn=arrow.turn, treatment="both"
@@ -182,7 +184,7 @@ def _given(
     return changed_part(timing, {"stages": stages}), found
 
 
-def _protected(timing: JunctionTiming, view: Light, arrow: TurnArrow) -> bool:
+def _has_protected_stage(timing: JunctionTiming, view: Light, arrow: TurnArrow) -> bool:
     """Whether a turn has a stage without giving way already."""
     own = next(t for t in crossing_turns(view) if (t.approach, t.turn) == arrow[1:3])
     program = DesignedProgram(timing, view, "fixed")
@@ -190,30 +192,30 @@ def _protected(timing: JunctionTiming, view: Light, arrow: TurnArrow) -> bool:
     return any(groups & set(stage.protected) for stage in timing.stages)
 
 
-def _asked(
+def _find_wanted_arrows(
     view: Light, counts: _Counts, driven: AbstractSet[int], *, across: str
 ) -> list[TurnArrow]:
     """Turns whose volumes ask for an arrow, and their opposites that can share it."""
     turns = {t.approach: t for t in crossing_turns(view) if t.turn == across and t.alone}
-    loads = {name: _load(view, turn, counts, driven) for name, turn in turns.items()}
+    loads = {name: _load_of_turn(view, turn, counts, driven) for name, turn in turns.items()}
     asked = {name for name, (load, _) in loads.items() if load.product_reached}
     for name in sorted(asked):
         opposite = loads[name][1]
-        if opposite in turns and not _meet(view, turns[name], turns[opposite]):
+        if opposite in turns and not _turns_meet(view, turns[name], turns[opposite]):
             asked.add(opposite)
     return [loads[name][0] for name in turns if name in asked]
 
 
-def _vehicles(counts: _Counts, movements: Collection[int]) -> float:
+def _count_vehicles(counts: _Counts, movements: Collection[int]) -> float:
     """All vehicles of the turns that have one of these movements, whichever lane they take."""
     return sum(vehicles for links, vehicles in counts if not links.isdisjoint(movements))
 
 
-def _meet(view: Light, one: CrossingTurn, other: CrossingTurn) -> bool:
+def _turns_meet(view: Light, one: CrossingTurn, other: CrossingTurn) -> bool:
     return any((min(i, j), max(i, j)) in view.met for i in one.movements for j in other.movements)
 
 
-def _load(
+def _load_of_turn(
     view: Light, turn: CrossingTurn, counts: _Counts, driven: AbstractSet[int]
 ) -> tuple[TurnArrow, str]:
     """What a turn has to find gaps for, and the approach from which most lanes of it come."""
@@ -230,6 +232,6 @@ def _load(
     opposite = max(dict.fromkeys(approaches), key=approaches.count, default="")
     arrow = TurnArrow(
         view.names[0], turn.approach, turn.turn,
-        _vehicles(counts, turn.movements), _vehicles(counts, before), len(lanes),
+        _count_vehicles(counts, turn.movements), _count_vehicles(counts, before), len(lanes),
     )  # fmt: skip
     return arrow, opposite

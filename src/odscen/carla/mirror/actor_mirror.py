@@ -147,15 +147,15 @@ class Mirror:
         -----
         After each batch :meth:`answered` is to be called before the next one is taken.
         """
-        wanted = self._wanted(step)
+        wanted = self._rows_to_show(step)
         last, self._last = self._last, step
         for share in shares:
             if share >= 1.0:
                 self.shown = step
-                yield self._batch(step, wanted, whole=True)
+                yield self._plan_batch(step, wanted, whole=True)
             elif last is not None:
                 self.shown = self._on_ground(between(last, step, share))
-                yield self._batch(self.shown, self._among(self.shown), whole=False)
+                yield self._plan_batch(self.shown, self._mask_of_shown(self.shown), whole=False)
             else:
                 yield Batch()
 
@@ -175,9 +175,9 @@ class Mirror:
                 self._wait[row] = PAUSE
         self._asked = ()
 
-    def _wanted(self, step: Step) -> np.ndarray:
-        centre = self._centre(step)
-        wanted = self._nearby.chosen(step.x, step.y, self._among(step), centre)
+    def _rows_to_show(self, step: Step) -> np.ndarray:
+        centre = self._centre_of_interest(step)
+        wanted = self._nearby.chosen(step.x, step.y, self._mask_of_shown(step), centre)
         awake = centre or self._spectator
         if awake is not None and self._walkers_within is not None:
             away = np.hypot(step.x - awake[0], step.y - awake[1])
@@ -186,23 +186,23 @@ class Mirror:
             wanted &= step.index != self._left_out
         return wanted
 
-    def _among(self, step: Step) -> np.ndarray:
+    def _mask_of_shown(self, step: Step) -> np.ndarray:
         return np.array([row in self._actor for row in step.index.tolist()], dtype=np.bool_)
 
-    def _centre(self, step: Step) -> tuple[float, float] | None:
+    def _centre_of_interest(self, step: Step) -> tuple[float, float] | None:
         if self._ego is None:
             return None
         found = np.flatnonzero(step.index == self._ego)
         return (float(step.x[found[0]]), float(step.y[found[0]])) if len(found) else None
 
-    def _batch(self, step: Step, here: np.ndarray, *, whole: bool) -> Batch:
+    def _plan_batch(self, step: Step, here: np.ndarray, *, whole: bool) -> Batch:
         """Plan one tick; who comes and who goes does so when the step is ``whole``."""
         rows = step.index[here].tolist()
         gone = sorted(self._actor.keys() - set(rows)) if whole else []
         destroy = tuple(self._actor.pop(row) for row in gone)
         for row in gone:
             self._flags.pop(row, None)
-        places, velocities = self._places(step, here)
+        places, velocities = self._actor_places(step, here)
         speeds = step.speed[here].tolist()
         flags = self._all_flags(step.signals[here])
         moves, shines, spawns, asked = [], [], [], []
@@ -221,24 +221,26 @@ class Mirror:
                 spawns.append(
                     Spawn(
                         self._blueprints[row],
-                        self._role(row),
+                        self._role_name_of(row),
                         at,
                         velocity,
                         speed,
                         walks,
-                        self._lift(row) + (self._height[row] if walks else 0.0),
+                        self._lift_of(row) + (self._height[row] if walks else 0.0),
                         own,
                     )
                 )
         self._asked = tuple(asked)
         return Batch(destroy, tuple(spawns), tuple(moves), tuple(shines))
 
-    def _role(self, row: int) -> str:
+    def _role_name_of(self, row: int) -> str:
         if row == self._ego and self._ego_role is not None:
             return self._ego_role
         return ROLE + self._plan.actors[row].id
 
-    def _places(self, step: Step, here: np.ndarray) -> tuple[list[ActorPlace], list[Velocity]]:
+    def _actor_places(
+        self, step: Step, here: np.ndarray
+    ) -> tuple[list[ActorPlace], list[Velocity]]:
         """Origins of the actors: the box's middle is where the body centre is.
 
         Vehicles and walkers are put on the ground; walkers are upright, and the server itself adds
@@ -292,7 +294,7 @@ class Mirror:
             self._wait[row] = left - 1
         return not left
 
-    def _lift(self, row: int) -> float:
+    def _lift_of(self, row: int) -> float:
         refusal = self.refusals.get(row)
         return LIFTS[refusal.tries % len(LIFTS)] if refusal else LIFTS[0]
 

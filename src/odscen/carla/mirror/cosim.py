@@ -130,7 +130,7 @@ class CarlaMirror(Simulator[MirroredRun]):
             xodr = on.file("xodr").read_bytes().decode()
             may_load = options.load_map and not options.follow
             report.map = ensure_map(server, on.name, xodr, load=may_load)
-            clock = _clock(server, options, plan.step_length)
+            clock = _choose_clock(server, options, plan.step_length)
             report.warnings = server.warnings
             mirrored = MirroredPlan.on(server, prepared.scenario, on, plan, options)
             report.sizes = mirrored.sizes
@@ -205,7 +205,7 @@ def cosim(
     return result, mirror.report
 
 
-def _clock(server: Server, options: CosimOptions, step_length: float) -> StepClock:
+def _choose_clock(server: Server, options: CosimOptions, step_length: float) -> StepClock:
     """Have ticks made, by us unless another client does."""
     if options.follow:
         return FollowedTicks(server, step_length)

@@ -51,9 +51,9 @@ class Doors:
 
     def before(self, step: Step) -> None:
         """Learn where everybody will be after the next ticks."""
-        last, self._at_stop = self._at_stop, self._stopped(step)
+        last, self._at_stop = self._at_stop, self._doors_of_stopped(step)
         stay = {row: bits & last.get(row, 0) for row, bits in self._at_stop.items()}
-        near = self._near(step)
+        near = self._rows_near_ego(step)
         self._wanted = {
             row: sum((doors for side, doors in _DOORS.items() if bits & side), ())
             for row, bits in stay.items()
@@ -83,12 +83,12 @@ class Doors:
                 moves[actors[row]] = tuple(DoorMove(door, opens=True) for door in doors)
         return moves
 
-    def _stopped(self, step: Step) -> dict[int, int]:
+    def _doors_of_stopped(self, step: Step) -> dict[int, int]:
         bits = step.signals & (_LEFT | _RIGHT)
         found = np.flatnonzero((bits > 0) & self._able[step.index])
         return {int(step.index[k]): int(bits[k]) for k in found.tolist()}
 
-    def _near(self, step: Step) -> set[int]:
+    def _rows_near_ego(self, step: Step) -> set[int]:
         """Rows of those near the ego."""
         found = [] if self._ego is None else np.flatnonzero(step.index == self._ego).tolist()
         if not found or not self._at_stop:

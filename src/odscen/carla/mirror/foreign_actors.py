@@ -94,38 +94,38 @@ class ForeignActors:
         there = [actor for actor in snapshot if actor.id not in ours]
         fresh = [actor.id for actor in there if actor.id not in self._known]
         if fresh:
-            self._meet(fresh)
+            self._register_fresh(fresh)
         now = float(snapshot.timestamp.elapsed_seconds)
         passed = now - self._time if self._time is not None else 0.0
         users, places = [], {}
         for actor in sorted(there, key=lambda one: one.id):
             known = self._known[actor.id]
             if known is not None:
-                user, place = self._user(actor, known, passed)
+                user, place = self._describe_user(actor, known, passed)
                 users.append(user)
                 places[actor.id] = place
         self._last, self._time = places, now
         return users
 
-    def _meet(self, fresh: list[int]) -> None:
+    def _register_fresh(self, fresh: list[int]) -> None:
         self._known.update(dict.fromkeys(fresh))
         for actor in self._server.actors(fresh):
             role = actor.attributes.get("role_name", "")
             if not actor.type_id.startswith(_BODIES) or role.startswith(ROLE):
                 continue
             if self._roles.has(role):
-                kind = self._kind(actor)
+                kind = self._kind_of(actor)
                 self._known[actor.id] = _Known(
                     actor.type_id, role, kind, self._server.shape(actor.id)
                 )
                 self.seen[actor.id] = actor.type_id, role
 
-    def _kind(self, actor: Any) -> str:
+    def _kind_of(self, actor: Any) -> str:
         model = self._assets.blueprints.get(actor.type_id)
         category = category_of(actor.type_id, actor.attributes) if model is None else model.category
         return KINDS[Category(category)].vclass
 
-    def _user(
+    def _describe_user(
         self, actor: Any, known: _Known, passed: float
     ) -> tuple[ForeignUser, tuple[float, float]]:
         at, velocity = actor.get_transform(), actor.get_velocity()

@@ -63,7 +63,7 @@ class LaneSurface:
 
     def __init__(self, table: RoadTable) -> None:
         self.kinds = tuple(sorted(set(table.lane_type)))
-        corners, lane = _strips(table)
+        corners, lane = _triangulate_lanes(table)
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         real = np.abs(across[:, 2]) > 2.0 * _THIN
         self._corners, lane, across = corners[real], lane[real], across[real]
@@ -79,7 +79,7 @@ class LaneSurface:
         return cls(RoadTable.of(parse(xodr)))
 
     @cached_property
-    def _tree(self) -> shapely.STRtree:
+    def _build_triangle_tree(self) -> shapely.STRtree:
         # Made when somebody is on foot: many runs have nobody who is.
         return shapely.STRtree(shapely.polygons(self._corners[..., :2]))
 
@@ -99,14 +99,16 @@ class LaneSurface:
         if not len(x) or not len(self._corners):
             return Surface(z, kind)
         xy = np.column_stack([x, y])
-        place, triangle = self._tree.query(shapely.points(xy), predicate="intersects")
-        self._choose(place, triangle, xy[place], near, raised, z, kind)
+        place, triangle = self._build_triangle_tree.query(
+            shapely.points(xy), predicate="intersects"
+        )
+        self._choose_uppermost(place, triangle, xy[place], near, raised, z, kind)
         off = np.flatnonzero(kind == NOWHERE)
         if len(off):
-            self._beside(off, xy, near, raised, z, kind)
+            self._fill_beside_lanes(off, xy, near, raised, z, kind)
         return Surface(z, kind)
 
-    def _beside(
+    def _fill_beside_lanes(
         self,
         off: IntArray,
         xy: FloatArray,
@@ -117,18 +119,22 @@ class LaneSurface:
     ) -> None:
         """Fill in what is nearest to places that are on no lane."""
         points = shapely.points(xy[off])
-        number, triangle = self._tree.query(points, predicate="dwithin", distance=BESIDE)
+        number, triangle = self._build_triangle_tree.query(
+            points, predicate="dwithin", distance=BESIDE
+        )
         fits = np.abs(self._corners[triangle, :, 2].mean(axis=1) - near[off[number]]) <= STOREY
         number, triangle = number[fits], triangle[fits]
-        lines = shapely.shortest_line(points[number], self._tree.geometries[triangle])
+        lines = shapely.shortest_line(
+            points[number], self._build_triangle_tree.geometries[triangle]
+        )
         away = shapely.length(lines)
         least = np.full(len(off), np.inf)
         np.minimum.at(least, number, away)
         best = away <= least[number] + 1e-9
         ends = shapely.get_coordinates(lines).reshape(-1, 2, 2)[best, 1]
-        self._choose(off[number[best]], triangle[best], ends, near, raised, z, kind)
+        self._choose_uppermost(off[number[best]], triangle[best], ends, near, raised, z, kind)
 
-    def _choose(
+    def _choose_uppermost(
         self,
         place: IntArray,
         triangle: IntArray,
@@ -139,14 +145,14 @@ class LaneSurface:
         kind: IntArray,
     ) -> None:
         """Write the uppermost of the triangles at each place, if it is about as high as wanted."""
-        height, kinds = self._height(triangle, xy), self._kind[triangle]
+        height, kinds = self._height_on_triangle(triangle, xy), self._kind[triangle]
         fits = np.abs(height - near[place]) <= STOREY
         place, height, kinds = place[fits], height[fits], kinds[fits]
         order = np.lexsort((height + (raised + self._first)[kinds], place))
         # Of several values for one place numpy keeps the last, which is the uppermost.
         z[place[order]], kind[place[order]] = height[order], kinds[order]
 
-    def _height(self, triangle: IntArray, xy: FloatArray) -> FloatArray:
+    def _height_on_triangle(self, triangle: IntArray, xy: FloatArray) -> FloatArray:
         corner = self._corners[triangle]
         z = corner[:, 0, 2] + ((xy - corner[:, 0, :2]) * self._slope[triangle]).sum(axis=1)
         # A sliver's slope is not worth much, its corners are.
@@ -154,14 +160,14 @@ class LaneSurface:
         return clipped
 
 
-def _strips(table: RoadTable) -> tuple[FloatArray, IntArray]:
+def _triangulate_lanes(table: RoadTable) -> tuple[FloatArray, IntArray]:
     """Triangles of all lanes, corners of shape ``(N, 3, 3)``, and their lanes."""
     lanes = np.flatnonzero(table.lane_s1 > table.lane_s0)
     if not len(lanes):
         return np.empty((0, 3, 3)), np.empty(0, dtype=np.int64)
-    every = _spacing(table, lanes)
-    row, s, last = _stations(table, lanes, every)
-    inner, outer = (_corners(table, row, s, at) for at in (0.0, 1.0))
+    every = _section_spacing(table, lanes)
+    row, s, last = _section_stations(table, lanes, every)
+    inner, outer = (_corner_points(table, row, s, at) for at in (0.0, 1.0))
     a = np.flatnonzero(~last)
     b = a + 1
     first = np.stack([inner[a], outer[a], inner[b]], axis=1)
@@ -169,14 +175,14 @@ def _strips(table: RoadTable) -> tuple[FloatArray, IntArray]:
     return np.concatenate([first, second]), np.concatenate([row[a], row[a]])
 
 
-def _corners(table: RoadTable, row: IntArray, s: FloatArray, at: float) -> FloatArray:
+def _corner_points(table: RoadTable, row: IntArray, s: FloatArray, at: float) -> FloatArray:
     points = table.lane_points(row, s, at=at)
     return np.column_stack([points.x, points.y, points.z])
 
 
-def _spacing(table: RoadTable, lanes: IntArray) -> FloatArray:
+def _section_spacing(table: RoadTable, lanes: IntArray) -> FloatArray:
     """Metres of road between two cross-sections of each lane, by its sharpest bend."""
-    row, s, _ = _stations(table, lanes, np.full(len(lanes), _LOOK))
+    row, s, _ = _section_stations(table, lanes, np.full(len(lanes), _LOOK))
     sharpest = np.zeros(len(table.lane_keys))
     for at in (0.0, 1.0):
         np.maximum.at(sharpest, row, np.abs(table.lane_points(row, s, at=at).curvature))
@@ -185,7 +191,7 @@ def _spacing(table: RoadTable, lanes: IntArray) -> FloatArray:
     return spacing
 
 
-def _stations(
+def _section_stations(
     table: RoadTable, lanes: IntArray, every: FloatArray
 ) -> tuple[IntArray, FloatArray, BoolArray]:
     """Lane and s of cross-sections, and which are the last of their lane."""

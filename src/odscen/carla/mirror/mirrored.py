@@ -101,7 +101,7 @@ class MirroredPlan:
             left_out=ego.row if ego else None,
             ego_role=HEROES[0] if free else None,
             walkers_within=WAKE * server.active_distance(),
-            spectator=_spectator(server) if free else None,
+            spectator=_spectator_position(server) if free else None,
             on_ground=ground.between,
         )
         foreign = None
@@ -123,7 +123,7 @@ class MirroredPlan:
         return cls(mirror, blueprints, shapes, ego, foreign, ground, wheels, doors, sizes)
 
 
-def _spectator(server: Server) -> tuple[float, float]:
+def _spectator_position(server: Server) -> tuple[float, float]:
     """X and y of where the server's window looks from, OpenDRIVE frame."""
     at = server.spectator_place()
     return at.x, -at.y

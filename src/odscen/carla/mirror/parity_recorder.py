@@ -70,7 +70,7 @@ class StateRecorder:
             State in SUMO and state in CARLA of each signal that both have.
         """
         rows = step.index.tolist()
-        shown = np.array([self._centre(snapshot, row, actors.get(row)) for row in rows])
+        shown = np.array([self._ground_pose(snapshot, row, actors.get(row)) for row in rows])
         mine = np.column_stack(
             [np.full(len(rows), step.time), step.index, step.x, step.y, step.z, step.hdg]
         )
@@ -103,7 +103,7 @@ class StateRecorder:
         page = render_parity(figures, states, drawing=drawing)
         (folder / layout.PARITY_FILE).write_text(page, encoding="utf-8")
 
-    def _centre(
+    def _ground_pose(
         self, snapshot: Any, row: int, actor: int | None
     ) -> tuple[float, float, float, float]:
         """Ground below the body's centre, OpenDRIVE frame, and heading; NaN for none."""

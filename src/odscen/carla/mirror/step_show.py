@@ -88,7 +88,7 @@ class StepShow:
             return None
         try:
             step = self._ground.under(step)
-            self._show(step)
+            self._show_step(step)
             for witness in self.witnesses:
                 witness(step)
             if not self.on_shown(step):
@@ -150,14 +150,14 @@ class StepShow:
             median, worst = np.percentile(np.array(self._own) * 1e3, [50, 95])
             report.own_ms = round(float(median), 3), round(float(worst), 3)
 
-    def _show(self, step: Step) -> None:
+    def _show_step(self, step: Step) -> None:
         if self._doors is not None:
             self._doors.before(step)
-        for batch in self._timed(step):
+        for batch in self._planned_batches(step):
             if self._mirror.shown is step:
                 changed = self._changed_lights(step)
                 batch.signals.update({} if self._leads else changed)
-            self._look(batch)
+            self._point_cameras(batch)
             waited = self._server.waited
             start = time.perf_counter()
             self._move_parts(batch)
@@ -169,7 +169,7 @@ class StepShow:
             for hook in self.hooks:
                 hook()
 
-    def _look(self, batch: Batch) -> None:
+    def _point_cameras(self, batch: Batch) -> None:
         """Let cameras follow what the tick shows."""
         shown = self._mirror.shown
         if shown is not None:
@@ -196,7 +196,7 @@ class StepShow:
                     f"{len(self._mirror.refusals)} were tried: {refusal.reason}"
                 )
 
-    def _timed(self, step: Step) -> Iterator[Batch]:
+    def _planned_batches(self, step: Step) -> Iterator[Batch]:
         """Batches of a step; what planning each one takes is counted as ours."""
         batches = self._mirror.batches(step, self._clock.shares(step))
         while True:

@@ -111,10 +111,10 @@ class WalkingGround:
             return step
         x, y, near = step.x[on_foot], step.y[on_foot], step.z[on_foot]
         self._ask_ahead(step, on_foot, passed)
-        here = self._below(x, y, near)
-        known = [self._cells.get(cell) for cell in self._cell(x, y, near, here.kind)]
+        here = self._surface_below(x, y, near)
+        known = [self._cells.get(cell) for cell in self._cells_of_places(x, y, near, here.kind)]
         rise = np.where(here.kind == self._now.kind[rows], self._now.rise[rows], np.nan)
-        rise = np.where(np.isnan(rise), self._usual(here.kind), rise)
+        rise = np.where(np.isnan(rise), self._usual_heights(here.kind), rise)
         rise = np.where([one is None for one in known], rise, np.array(known, dtype=np.float64))
         stand = self._now.then(rows, np.stack([x, y, here.z, rise]), here.kind)
         self._last, self._now = self._now, stand
@@ -130,18 +130,18 @@ class WalkingGround:
         rows = shown.index[on_foot]
         x, y = shown.x[on_foot], shown.y[on_foot]
         last, now = self._last, self._now
-        share = self._share(x, y, rows)
-        here = self._below(x, y, last.z[rows] + share * (now.z[rows] - last.z[rows]))
+        share = self._share_of_way(x, y, rows)
+        here = self._surface_below(x, y, last.z[rows] + share * (now.z[rows] - last.z[rows]))
         left, right = here.kind == last.kind[rows], here.kind == now.kind[rows]
         # On the far side of a kerb the ground is as it is there, all the way up to the kerb.
         share = np.where(left & right, share, np.where(right, 1.0, 0.0))
         rise = last.rise[rows] + share * (now.rise[rows] - last.rise[rows])
-        rise = np.where(left | right, rise, self._usual(here.kind))
+        rise = np.where(left | right, rise, self._usual_heights(here.kind))
         z = shown.z.copy()
         z[on_foot] = here.z + rise
         return replace(shown, z=z)
 
-    def _share(self, x: FloatArray, y: FloatArray, rows: IntArray) -> FloatArray:
+    def _share_of_way(self, x: FloatArray, y: FloatArray, rows: IntArray) -> FloatArray:
         """How far places are on the way from the last step to this one; 1 for who stands."""
         ax, ay = self._last.x[rows], self._last.y[rows]
         bx, by = self._now.x[rows] - ax, self._now.y[rows] - ay
@@ -150,7 +150,7 @@ class WalkingGround:
         along = (x - ax) * bx + (y - ay) * by
         return np.where(moves, np.clip(along / np.where(moves, whole, 1.0), 0.0, 1.0), 1.0)
 
-    def _below(self, x: FloatArray, y: FloatArray, near: FloatArray) -> Surface:
+    def _surface_below(self, x: FloatArray, y: FloatArray, near: FloatArray) -> Surface:
         """Give the map's surface; where it has none, ``near``."""
         if self._surface is None:
             self._surface = self._make_surface()
@@ -158,7 +158,7 @@ class WalkingGround:
         found = self._surface.at(x, y, near, self._raised)
         return found._replace(z=np.where(found.kind == NOWHERE, near, found.z))
 
-    def _usual(self, kind: IntArray) -> FloatArray:
+    def _usual_heights(self, kind: IntArray) -> FloatArray:
         """What the server has last said of lanes of each kind."""
         return np.append(self._raised, 0.0)[kind]
 
@@ -170,8 +170,8 @@ class WalkingGround:
         x = step.x[on_foot] + ahead * np.cos(step.hdg[on_foot])
         y = step.y[on_foot] + ahead * np.sin(step.hdg[on_foot])
         near = step.z[on_foot] + ahead * np.tan(step.pitch[on_foot])
-        there = self._below(x, y, near)
-        cells = self._cell(x, y, near, there.kind)
+        there = self._surface_below(x, y, near)
+        cells = self._cells_of_places(x, y, near, there.kind)
         left = MOST_CALLS
         for k in np.argsort(self._asked[rows], kind="stable").tolist():
             if not left:
@@ -180,9 +180,9 @@ class WalkingGround:
                 left -= 1
                 self._asked[rows[k]] = self._time
                 at = float(x[k]), float(y[k]), float(there.z[k])
-                self._ask(cells[k], *at, int(there.kind[k]))
+                self._ask_server(cells[k], *at, int(there.kind[k]))
 
-    def _ask(self, cell: _Cell, x: float, y: float, z: float, kind: int) -> None:
+    def _ask_server(self, cell: _Cell, x: float, y: float, z: float, kind: int) -> None:
         ground = self._server.ground_below(x, -y, z + HIGHEST, 2.0 * HIGHEST)
         if ground is None:
             self._blind[cell] = self._time
@@ -195,7 +195,9 @@ class WalkingGround:
         return cell not in self._cells and self._time >= self._blind.get(cell, -AGAIN) + AGAIN
 
     @staticmethod
-    def _cell(x: FloatArray, y: FloatArray, z: FloatArray, kind: IntArray) -> list[_Cell]:
+    def _cells_of_places(
+        x: FloatArray, y: FloatArray, z: FloatArray, kind: IntArray
+    ) -> list[_Cell]:
         """Cells of places: half a metre of one kind of lane of one storey."""
         parts = np.floor(x / _CELL), np.floor(y / _CELL), np.round(z / 4.0), kind
         cells = np.column_stack(parts).astype(np.int64).tolist()

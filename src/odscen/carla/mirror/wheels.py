@@ -64,18 +64,18 @@ class Wheels:
         spent
             Calls of the tick that something else has taken: so many fewer are made.
         """
-        near = self._near(shown, actors)
+        near = self._nearest_vehicles(shown, actors)
         last, self._last = self._last, {}
         turns, self._turns = self._turns, {}
         for k in near:
             row = int(shown.index[k])
             at = self._last[row] = (float(shown.x[k]), float(shown.y[k]), float(shown.hdg[k]))
             before = turns.get(row, WheelTurn(0.0, 0.0))
-            self._turns[row] = self._on(row, before, last.get(row, at), at)
+            self._turns[row] = self._roll_and_steer(row, before, last.get(row, at), at)
         most = max(self._calls - spent, 0) // WHEEL_CALLS
         return {actors[row]: turn for row, turn in list(self._turns.items())[:most]}
 
-    def _near(self, shown: Step, actors: Mapping[int, int]) -> list[int]:
+    def _nearest_vehicles(self, shown: Step, actors: Mapping[int, int]) -> list[int]:
         """Positions in a step of the vehicles whose wheels are turned, the nearest first."""
         found = [] if self._ego is None else np.flatnonzero(shown.index == self._ego).tolist()
         if not found or not self._most:
@@ -87,7 +87,7 @@ class Wheels:
         near = [k for k in order[away[order] <= NEAR].tolist() if int(shown.index[k]) in actors]
         return near[: self._most]
 
-    def _on(
+    def _roll_and_steer(
         self,
         row: int,
         turn: WheelTurn,

@@ -101,14 +101,14 @@ def native_actors(scenario: Scenario, graph: MapGraph, plan: Plan) -> tuple[Nati
         user = users[planned.id]
         nodes = region.path_over((user.spawn, *user.places), walk=user.person)
         if len(nodes) > 1:
-            make = _walker if user.person else _driver
+            make = _plan_walker if user.person else _plan_driver
             kind = kind_of(user, scenario.drivers, scenario.seed)
             one = make(row, user, planned, graph, nodes)
-            actors.append(replace(one, gap=_gap(kind, user.category)))
+            actors.append(replace(one, gap=_following_distance(kind, user.category)))
     return tuple(actors)
 
 
-def _walker(
+def _plan_walker(
     row: int, user: RoadUser, planned: PlannedActor, graph: MapGraph, nodes: Int32Array
 ) -> NativeActor:
     walks = graph.walks
@@ -116,28 +116,28 @@ def _walker(
     usual = KINDS[Category.PEDESTRIAN].max_speed * planned.speed_factor
     speed = np.full(len(route), usual if user.speed is None else user.speed)
     pose = XodrPose(planned.x, planned.y, planned.z, planned.hdg)
-    return _actor(row, user, pose, route, speed)
+    return _make_actor(row, user, pose, route, speed)
 
 
-def _driver(
+def _plan_driver(
     row: int, user: RoadUser, planned: PlannedActor, graph: MapGraph, nodes: Int32Array
 ) -> NativeActor:
     lanes = graph.lanes
     pose = XodrPose(planned.x, planned.y, planned.z, planned.hdg, float(lanes.pitch[user.spawn]))
-    beyond = _onward(lanes, int(nodes[-1]))
+    beyond = _nodes_after_goal(lanes, int(nodes[-1]))
     longer = np.concatenate([nodes, beyond])
-    return _actor(
+    return _make_actor(
         row,
         user,
         pose,
-        _points(lanes, nodes),
-        _speeds(user, planned, lanes.speed_limit[nodes]),
-        path=_points(lanes, longer[_marks(lanes, longer)]),
-        changes=_changes(lanes, nodes),
+        _node_points(lanes, nodes),
+        _wanted_speeds(user, planned, lanes.speed_limit[nodes]),
+        path=_node_points(lanes, longer[_junction_marks(lanes, longer)]),
+        changes=_lane_changes(lanes, nodes),
     )
 
 
-def _actor(
+def _make_actor(
     row: int,
     user: RoadUser,
     at: XodrPose,
@@ -164,7 +164,7 @@ def _actor(
     )
 
 
-def _speeds(user: RoadUser, planned: PlannedActor, limit: FloatArray) -> FloatArray:
+def _wanted_speeds(user: RoadUser, planned: PlannedActor, limit: FloatArray) -> FloatArray:
     """Speed wanted under each limit; the rule of :func:`odscen.sumo.realize.driving.driver`."""
     known = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)
     most = KINDS[user.category].max_speed if user.speed is None else user.speed
@@ -172,7 +172,7 @@ def _speeds(user: RoadUser, planned: PlannedActor, limit: FloatArray) -> FloatAr
     return wanted
 
 
-def _gap(kind: DriverKind, category: Category) -> float:
+def _following_distance(kind: DriverKind, category: Category) -> float:
     """Metres for ``distance_to_leading_vehicle``: the driver's gap and some of its headway."""
     style = STYLES[kind.style]
     share = TWO_WHEELER_MIN_GAP if category in (Category.MOTORCYCLE, Category.BICYCLE) else 1.0
@@ -180,21 +180,21 @@ def _gap(kind: DriverKind, category: Category) -> float:
     return round(gap * kind.drawn.get("tau", style.headway * HEADWAY), 2)
 
 
-def _points(lanes: LaneGraph, nodes: Int32Array) -> FloatArray:
+def _node_points(lanes: LaneGraph, nodes: Int32Array) -> FloatArray:
     return np.column_stack([lanes.x[nodes], lanes.y[nodes], lanes.z[nodes]])
 
 
-def _changes(lanes: LaneGraph, nodes: Int32Array) -> tuple[tuple[int, bool], ...]:
+def _lane_changes(lanes: LaneGraph, nodes: Int32Array) -> tuple[tuple[int, bool], ...]:
     here, there = nodes[:-1], nodes[1:]
     left = lanes.left_lane[here] == lanes.lane[there]
     right = lanes.right_lane[here] == lanes.lane[there]
     return tuple((int(k), bool(right[k])) for k in np.flatnonzero(left | right))
 
 
-def _marks(lanes: LaneGraph, nodes: Int32Array) -> list[int]:
+def _junction_marks(lanes: LaneGraph, nodes: Int32Array) -> list[int]:
     """Indices of the nodes a little beyond each junction that the route leaves."""
     inside = np.array([lanes.lanes.junctions[row] is not None for row in lanes.lane[nodes]])
-    turns = {k for k, _ in _changes(lanes, nodes)}
+    turns = {k for k, _ in _lane_changes(lanes, nodes)}
     marks = []
     for k in np.flatnonzero(inside[:-1] & ~inside[1:]).tolist():
         mark = k + 1
@@ -209,7 +209,7 @@ def _marks(lanes: LaneGraph, nodes: Int32Array) -> list[int]:
     return marks
 
 
-def _onward(lanes: LaneGraph, goal: int) -> Int32Array:
+def _nodes_after_goal(lanes: LaneGraph, goal: int) -> Int32Array:
     """Nodes after the goal, straight on as far as there are any, for :data:`AHEAD` metres."""
     nodes: list[int] = []
     gone, node = 0.0, goal

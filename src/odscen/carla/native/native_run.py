@@ -266,9 +266,9 @@ def run_native(
 def left_out(scenario: Scenario) -> list[tuple[str, str]]:
     """What CARLA alone does not do of a scenario: where each part and rule is, and words for it."""
     having = {
-        "crosses_anywhere": [one.id for one in scenario.actors if one.crosses_anywhere],
-        "ignores_red": [one.id for one in scenario.actors if one.ignores_red],
-        "initial_speed": [one.id for one in scenario.actors if one.initial_speed is not None],
+        "crosses_anywhere": [actor.id for actor in scenario.actors if actor.crosses_anywhere],
+        "ignores_red": [actor.id for actor in scenario.actors if actor.ignores_red],
+        "initial_speed": [actor.id for actor in scenario.actors if actor.initial_speed is not None],
     }
     parts = [("actors", f"{name} of {', '.join(ids)}") for name, ids in having.items() if ids]
     for index, measure in enumerate(scenario.measures):
@@ -312,7 +312,7 @@ class _Follower:
         process.start()
         there.close()
         try:
-            last = self._follow(here, interrupted)
+            last = self._follow_worker(here, interrupted)
         finally:
             here.close()  # the worker sees that, and gives the server back
             process.join(0.0 if self._silent else GRACE)
@@ -328,10 +328,14 @@ class _Follower:
         seconds = time.perf_counter() - start
         if isinstance(last, Done):
             return SimulationOutcome(last.sim_seconds, last.steps, seconds, stopped=last.stopped)
-        failure = last.reason if isinstance(last, Failed) else self._crash(process.exitcode or 0)
+        failure = (
+            last.reason if isinstance(last, Failed) else self._explain_crash(process.exitcode or 0)
+        )
         return SimulationOutcome(None, None, seconds, error=failure)
 
-    def _follow(self, pipe: Connection, interrupted: threading.Event) -> Done | Failed | None:
+    def _follow_worker(
+        self, pipe: Connection, interrupted: threading.Event
+    ) -> Done | Failed | None:
         last: Done | Failed | None = None
         asked = False
         heard = time.monotonic()
@@ -342,7 +346,7 @@ class _Follower:
                     pipe.send("stop")
             try:
                 if not pipe.poll(_LOOK):
-                    if self._times and time.monotonic() - heard > self._patience:
+                    if self._times and time.monotonic() - heard > self._silence_limit:
                         self._silent = time.monotonic() - heard
                         return last
                     continue
@@ -358,13 +362,13 @@ class _Follower:
                 if self._on_picture is not None:
                     self._on_picture(message.jpeg)
             else:
-                self._take(message)
+                self._take_tick(message)
 
     @property
-    def _patience(self) -> float:
+    def _silence_limit(self) -> float:
         return max(SILENCE, 6.0 * self._job.address.timeout)
 
-    def _take(self, tick: Tick) -> None:
+    def _take_tick(self, tick: Tick) -> None:
         self._own = tick.own
         self._events += tick.events
         self._notes += tick.notes
@@ -389,7 +393,7 @@ class _Follower:
             "there, if it still runs, could not be taken back"
         )
 
-    def _crash(self, code: int) -> str:
+    def _explain_crash(self, code: int) -> str:
         """Say what an exit code means: the Traffic Manager aborts when it meets an error."""
         job = self._job
         if self._silent:

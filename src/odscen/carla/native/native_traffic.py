@@ -158,9 +158,9 @@ class Traffic:
         snapshot = self._server.world.get_snapshot()
         self._start_controllers()
         for one in new:
-            happened.events.append(self._departed(one, snapshot, time))
+            happened.events.append(self._departure_event(one, snapshot, time))
             self._hand_over(one)
-        self._follow(snapshot, time + delta, happened)
+        self._follow_actors(snapshot, time + delta, happened)
         return happened
 
     def rows(self, delta: float) -> np.ndarray:
@@ -175,7 +175,7 @@ class Traffic:
             state = snapshot.find(one.number)
             if state is None:
                 continue
-            pose = seen[row] = _pose(state)
+            pose = seen[row] = _pose_of_state(state)
             speed = _ground_speed(state, pose)
             if one.plan.person or not self._physics:
                 # The walker AI, and the Traffic Manager without physics, put road users where
@@ -193,7 +193,7 @@ class Traffic:
         """
         for one in self._underway.values():
             self._let_go(one)
-        self._destroy(list(self._underway.values()))
+        self._destroy_actors(list(self._underway.values()))
         self._underway.clear()
 
     # ------------------------------------------------------------------------------- coming
@@ -202,26 +202,31 @@ class Traffic:
         self._underway |= {one.plan.row: one for one in new}
         return new
 
-    def _departed(self, one: _Underway, snapshot: Any, time: float) -> Event:
-        state = snapshot.find(one.number)
+    def _departure_event(self, underway: _Underway, snapshot: Any, time: float) -> Event:
+        state = snapshot.find(underway.number)
         if state is None:
-            return Event(time, EventKind.DEPARTED, one.plan.id)
-        pose = _pose(state)
-        planned = one.plan.at
+            return Event(time, EventKind.DEPARTED, underway.plan.id)
+        pose = _pose_of_state(state)
+        planned = underway.plan.at
         error = math.hypot(float(pose.x - planned.x), float(pose.y - planned.y))
         return Event(
-            time, EventKind.DEPARTED, one.plan.id, x=float(pose.x), y=float(pose.y), error=error
+            time,
+            EventKind.DEPARTED,
+            underway.plan.id,
+            x=float(pose.x),
+            y=float(pose.y),
+            error=error,
         )
 
-    def _hand_over(self, one: _Underway) -> None:
+    def _hand_over(self, underway: _Underway) -> None:
         """Give a road user that has just come to CARLA's drivers or walkers."""
-        one.handle = self._server.world.get_actor(one.number)
-        plan = one.plan
+        underway.handle = self._server.world.get_actor(underway.number)
+        plan = underway.plan
         if plan.person:
             if self.has_navigation:
-                self._give_controller(one)
+                self._give_controller(underway)
             return
-        manager, car = self._manager, one.handle
+        manager, car = self._manager, underway.handle
         car.set_autopilot(True, self._port)
         manager.auto_lane_change(car, False)
         manager.random_left_lanechange_percentage(car, 0)
@@ -232,22 +237,22 @@ class Traffic:
         if plan.offset:
             manager.vehicle_lane_offset(car, -plan.offset)  # CARLA's is to the right
         if len(plan.path):
-            manager.set_path(car, [self._location(point) for point in plan.path])
-        self._set_speed(one)
+            manager.set_path(car, [self._carla_location(point) for point in plan.path])
+        self._set_speed(underway)
 
-    def _give_controller(self, one: _Underway) -> None:
+    def _give_controller(self, underway: _Underway) -> None:
         """Let CARLA's walker AI find the route; on its own mesh, which is not the scenario's.
 
         A controller can be started when a tick has shown it: the next one, which is made anyway.
         """
         world, carla = self._server.world, self._server.package
         blueprint = world.get_blueprint_library().find(CONTROLLER)
-        command = carla.command.SpawnActor(blueprint, carla.Transform(), one.number)
+        command = carla.command.SpawnActor(blueprint, carla.Transform(), underway.number)
         (controller,) = self._server.spawn([command])
         if not isinstance(controller, int):  # then it is led, as without a mesh
             return
-        one.guide = controller
-        self._starting.append(one)
+        underway.guide = controller
+        self._starting.append(underway)
 
     def _start_controllers(self) -> None:
         """Start the controllers that were made before the last tick."""
@@ -255,70 +260,73 @@ class Traffic:
             if one.plan.row in self._underway:
                 one.controller = self._server.world.get_actor(one.guide)
                 one.controller.start()
-                one.controller.go_to_location(self._location(one.plan.route[-1]))
+                one.controller.go_to_location(self._carla_location(one.plan.route[-1]))
                 one.controller.set_max_speed(float(one.plan.speed[0]))
         self._starting.clear()
 
     # ------------------------------------------------------------------------------- under way
-    def _follow(self, snapshot: Any, time: float, happened: Happened) -> None:
+    def _follow_actors(self, snapshot: Any, time: float, happened: Happened) -> None:
         gone = []
         for one in self._underway.values():
             state = snapshot.find(one.number)
             if state is None:
-                if self._vanished(one, time, happened):
+                if self._report_vanished(one, time, happened):
                     gone.append(one)
                 continue
-            left = self._advance(one, _pose(state), happened)
+            left = self._advance_on_route(one, _pose_of_state(state), happened)
             if left <= ARRIVED:
                 gone.append(one)
-                happened.events.append(_arrival(one, time))
+                happened.events.append(_arrival_event(one, time))
             elif not one.plan.person:
                 self._set_speed(one)
                 self._change_lane(one)
         for one in gone:
             del self._underway[one.plan.row]
             self._let_go(one)
-        self._destroy(gone)
+        self._destroy_actors(gone)
 
-    def _advance(self, one: _Underway, pose: XodrPose, happened: Happened) -> float:
+    def _advance_on_route(self, underway: _Underway, pose: XodrPose, happened: Happened) -> float:
         """Move on to the nearest point of the route; metres from here to the goal, straight."""
-        route = one.plan.route
-        ahead = route[one.at : one.at + _SEARCH, :2] - (float(pose.x), float(pose.y))
+        route = underway.plan.route
+        ahead = route[underway.at : underway.at + _SEARCH, :2] - (float(pose.x), float(pose.y))
         distance = np.hypot(ahead[:, 0], ahead[:, 1])
         nearest = int(np.argmin(distance))
-        one.at += nearest
-        if distance[nearest] > STRAYED and not one.strayed:
-            one.strayed = True
+        underway.at += nearest
+        if distance[nearest] > STRAYED and not underway.strayed:
+            underway.strayed = True
             happened.notes.append(
-                f"{one.plan.id}: left its route {_left(one):.0f} m before its goal"
+                f"{underway.plan.id}: left its route {_metres_left(underway):.0f} m before its goal"
             )
         return math.hypot(route[-1, 0] - float(pose.x), route[-1, 1] - float(pose.y))
 
-    def _vanished(self, one: _Underway, time: float, happened: Happened) -> bool:
+    def _report_vanished(self, underway: _Underway, time: float, happened: Happened) -> bool:
         """Report the outcome of one that the server has no longer; false if it is yet to come."""
-        if time - one.since < 2 * RETRY_SECONDS and one.at == 0:
+        if time - underway.since < 2 * RETRY_SECONDS and underway.at == 0:
             return False
-        left = _left(one)
+        left = _metres_left(underway)
         if left <= END_OF_ROAD:
-            happened.events.append(_arrival(one, time))
+            happened.events.append(_arrival_event(underway, time))
             self.road_ends.append(left)
             return True
         happened.notes.append(
-            f"{one.plan.id}: the Traffic Manager took it away {left:.0f} m before its goal"
+            f"{underway.plan.id}: the Traffic Manager took it away {left:.0f} m before its goal"
         )
         return True
 
-    def _set_speed(self, one: _Underway) -> None:
-        wanted = float(one.plan.speed[one.at])
-        if wanted != one.speed:
-            one.speed = wanted
-            self._manager.set_desired_speed(one.handle, wanted * 3.6)
+    def _set_speed(self, underway: _Underway) -> None:
+        wanted = float(underway.plan.speed[underway.at])
+        if wanted != underway.speed:
+            underway.speed = wanted
+            self._manager.set_desired_speed(underway.handle, wanted * 3.6)
 
-    def _change_lane(self, one: _Underway) -> None:
-        changes = one.plan.changes
-        while one.turned < len(changes) and one.at + _TURN_AHEAD >= changes[one.turned][0]:
-            self._manager.force_lane_change(one.handle, changes[one.turned][1])
-            one.turned += 1
+    def _change_lane(self, underway: _Underway) -> None:
+        changes = underway.plan.changes
+        while (
+            underway.turned < len(changes)
+            and underway.at + _TURN_AHEAD >= changes[underway.turned][0]
+        ):
+            self._manager.force_lane_change(underway.handle, changes[underway.turned][1])
+            underway.turned += 1
 
     def _lead_walkers(self) -> None:
         """Without a navigation mesh: every pedestrian walks to the next point of its route."""
@@ -330,7 +338,7 @@ class Traffic:
             state = snapshot.find(one.number)
             if state is None:
                 continue
-            pose = _pose(state)
+            pose = _pose_of_state(state)
             target = one.plan.route[min(one.at + 1, len(one.plan.route) - 1)]
             dx, dy = float(target[0] - pose.x), float(target[1] - pose.y)
             norm = math.hypot(dx, dy) or 1.0
@@ -340,36 +348,36 @@ class Traffic:
         self._server.send(commands)
 
     # ------------------------------------------------------------------------------- leaving
-    def _let_go(self, one: _Underway) -> None:
+    def _let_go(self, underway: _Underway) -> None:
         """Take it from the Traffic Manager before it is destroyed, or the manager would ask."""
-        if one.handle is None:
+        if underway.handle is None:
             return
         with suppress(RuntimeError):
-            if one.controller is not None:
-                one.controller.stop()
-            elif not one.plan.person:
-                one.handle.set_autopilot(False, self._port)
+            if underway.controller is not None:
+                underway.controller.stop()
+            elif not underway.plan.person:
+                underway.handle.set_autopilot(False, self._port)
 
-    def _destroy(self, gone: Sequence[_Underway]) -> None:
+    def _destroy_actors(self, gone: Sequence[_Underway]) -> None:
         controllers = [one.guide for one in gone if one.guide is not None]
         self._server.destroy([*controllers, *(one.number for one in gone)])
 
-    def _location(self, point: np.ndarray) -> Any:
+    def _carla_location(self, point: np.ndarray) -> Any:
         x, y, z = (float(value) for value in point)
         return self._server.package.Location(x, -y, z)
 
 
-def _arrival(one: _Underway, time: float) -> Event:
-    return Event(time, EventKind.ARRIVED, one.plan.id, travel_time=time - one.since)
+def _arrival_event(underway: _Underway, time: float) -> Event:
+    return Event(time, EventKind.ARRIVED, underway.plan.id, travel_time=time - underway.since)
 
 
-def _left(one: _Underway) -> float:
+def _metres_left(underway: _Underway) -> float:
     """Metres of route from the last known point to the goal."""
-    rest = np.diff(one.plan.route[one.at :, :2], axis=0)
+    rest = np.diff(underway.plan.route[underway.at :, :2], axis=0)
     return float(np.sum(np.hypot(rest[:, 0], rest[:, 1])))
 
 
-def _pose(state: Any) -> XodrPose:
+def _pose_of_state(state: Any) -> XodrPose:
     at = state.get_transform()
     place, turn = at.location, at.rotation
     return carla_to_xodr(CarlaPose(place.x, place.y, place.z, turn.yaw, turn.pitch))

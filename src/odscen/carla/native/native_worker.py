@@ -140,7 +140,7 @@ def work(job: NativeJob, pipe: Connection) -> None:
 
     with captured_output(job.log):
         try:
-            tell(_run(job, tell, asked))
+            tell(_run_job(job, tell, asked))
         except OdscenError as error:
             tell(Failed(str(error)))
         except RuntimeError as error:  # the client's own, met outside of our door
@@ -153,7 +153,7 @@ def work(job: NativeJob, pipe: Connection) -> None:
     os._exit(0)
 
 
-def _run(job: NativeJob, tell: Callable[[Told], None], asked: Callable[[], bool]) -> Done:
+def _run_job(job: NativeJob, tell: Callable[[Told], None], asked: Callable[[], bool]) -> Done:
     with ExitStack() as stack:
         server = stack.enter_context(Server(job.address))
         ensure_map(server, job.map_name, job.xodr, load=job.load_map)
@@ -168,13 +168,13 @@ def _run(job: NativeJob, tell: Callable[[Told], None], asked: Callable[[], bool]
             camera = stack.enter_context(watch_from_above(server, job.view, job.pictures, shoot))
         if not traffic.has_navigation and any(actor.person for actor in job.actors):
             tell(Note(NO_NAVIGATION))
-        done = _steps(job, tell, asked, traffic, camera)
+        done = _step_until_done(job, tell, asked, traffic, camera)
     for words in server.left_behind:
         tell(Note(words))
     return done
 
 
-def _steps(
+def _step_until_done(
     job: NativeJob,
     tell: Callable[[Told], None],
     asked: Callable[[], bool],

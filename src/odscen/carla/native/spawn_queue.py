@@ -65,7 +65,9 @@ class SpawnQueue:
 
     def spawn_due(self, time: float) -> Iterator[tuple[NativeActor, int]]:
         """Spawn who is due at ``time``, seconds; yields each with the number of its actor."""
-        due = [actor for actor in self._waiting if actor.depart <= time and self._may(actor, time)]
+        due = [
+            actor for actor in self._waiting if actor.depart <= time and self._may_try(actor, time)
+        ]
         for _ in LIFTS:  # all in this tick: a body on the ground is refused, and one above it taken
             commands = [self._spawn_command(actor) for actor in due]
             answers = self._server.spawn(commands) if commands else []
@@ -75,15 +77,15 @@ class SpawnQueue:
                     self._waiting.remove(actor)
                     yield actor, answer
                 else:
-                    self._refused(actor, answer, time)
+                    self._note_refusal(actor, answer, time)
                     refused.append(actor)
             due = refused
 
-    def _may(self, actor: NativeActor, time: float) -> bool:
+    def _may_try(self, actor: NativeActor, time: float) -> bool:
         tries = self._tries.get(actor.row)
         return tries is None or tries.next <= time
 
-    def _refused(self, actor: NativeActor, reason: str, time: float) -> None:
+    def _note_refusal(self, actor: NativeActor, reason: str, time: float) -> None:
         tries = self._tries.setdefault(actor.row, _Tries())
         tries.next, tries.reason = time + RETRY_SECONDS, reason
         tries.count += 1

@@ -50,7 +50,7 @@ class TickWatch:
         self._patience = patience
         self._before: int | None = None
         self.freed = 0
-        threading.Thread(target=self._look, name="tick-watch", daemon=True).start()
+        threading.Thread(target=self._watch_ticks, name="tick-watch", daemon=True).start()
 
     @contextmanager
     def tick(self) -> Iterator[None]:
@@ -61,7 +61,7 @@ class TickWatch:
         finally:
             self._before = None
 
-    def _look(self) -> None:
+    def _watch_ticks(self) -> None:
         watched, since = None, 0.0
         while True:
             time.sleep(_LOOK)

@@ -71,7 +71,7 @@ def usual_car(server: Server) -> str:
     described = server.describe(("vehicle.",))
     cars = [name for name, said in described.items() if said.get("number_of_wheels") == "4"]
     known = [name for name in cars if name == "vehicle.tesla.model3"]
-    return _first(known or sorted(cars), "car")
+    return _first_name(known or sorted(cars), "car")
 
 
 def usual_walker(server: Server) -> str:
@@ -82,10 +82,10 @@ def usual_walker(server: Server) -> str:
     CarlaError
         If the server has none.
     """
-    return _first(sorted(server.describe(("walker.pedestrian.",))), "pedestrian")
+    return _first_name(sorted(server.describe(("walker.pedestrian.",))), "pedestrian")
 
 
-def _first(names: list[str], what: str) -> str:
+def _first_name(names: list[str], what: str) -> str:
     if not names:
         raise CarlaError(f"the CARLA server has no blueprint of a {what}")
     return names[0]
@@ -119,18 +119,20 @@ class BodyChecks:
             If the map has no places for vehicles, or the server no models.
         """
         server = self.server
-        places = self._free(server.spawn_places())
+        places = self._free_places(server.spawn_places())
         if not places:
             raise CarlaError(f"the map {server.map_name} has no free place for vehicles")
         off = []
         for place in places[:_PLACES]:
-            ground = server.ground_below(*_above(place), _REACH)
+            ground = server.ground_below(*_point_above(place), _REACH)
             surface = server.lane_place(place)
             if ground is not None and surface is not None:
                 off.append(abs(ground - surface.z))
-        self._car_at = self._grounded(places[0], server.lane_place(places[0]))
-        beside = server.lane_place(places[0], sidewalk=True) or _ahead(self._car_at, 2 * _ROOM)
-        self._walker_at = self._grounded(beside, beside)
+        self._car_at = self._place_on_ground(places[0], server.lane_place(places[0]))
+        beside = server.lane_place(places[0], sidewalk=True) or _place_ahead(
+            self._car_at, 2 * _ROOM
+        )
+        self._walker_at = self._place_on_ground(beside, beside)
         self._car, self._walker = usual_car(server), usual_walker(server)
         self._shapes = server.shapes((self._car, self._walker))
         looked = min(len(places), _PLACES)
@@ -156,14 +158,14 @@ class BodyChecks:
 
     def car(self) -> list[CheckLine]:
         """A car without physics, put elsewhere in each tick."""
-        actor = self._made(self._car, self._car_at, walks=False)
-        wanted = self._moved(actor)
+        actor = self._spawn_body(self._car, self._car_at, walks=False)
+        wanted = self._move_forward(actor)
         self.server.apply(Batch(shine=(Shine(actor, BRAKE | LOW_BEAM),)))
         with answering(self.server.address):
             (handle,) = self.server.actors([actor])
             lamps = int(handle.get_light_state())
-        seen, speed = self.server.place(actor), self._speed(actor)
-        self._remove(actor)
+        seen, speed = self.server.place(actor), self._speed_of(actor)
+        self._remove_body(actor)
         turn = abs((seen.yaw - wanted.yaw + 180.0) % 360.0 - 180.0)
         off = math.hypot(seen.x - wanted.x, seen.y - wanted.y)
         up = seen.z - wanted.z
@@ -200,10 +202,10 @@ class BodyChecks:
         """A car with physics and without gravity, that goes the last of each step by itself."""
         self.server.synchronize(self.delta, sensed_speed=True)
         try:
-            actor = self._made(self._car, self._car_at, walks=False)
-            wanted = self._moved(actor)
-            seen, speed = self.server.place(actor), self._speed(actor)
-            self._remove(actor)
+            actor = self._spawn_body(self._car, self._car_at, walks=False)
+            wanted = self._move_forward(actor)
+            seen, speed = self.server.place(actor), self._speed_of(actor)
+            self._remove_body(actor)
         finally:
             self.server.synchronize(self.delta)
         off = math.dist(seen[:3], wanted[:3])
@@ -226,13 +228,13 @@ class BodyChecks:
     def walker(self) -> list[CheckLine]:
         """A walker that is put a step further in each tick."""
         first = self._walker_at
-        path = [_ahead(first, WALK * self.delta * k) for k in (1, 2)]
-        path = [self._grounded(at, at) for at in path]  # asked now: later it is in between
-        actor = self._made(self._walker, first, walks=True)
+        path = [_place_ahead(first, WALK * self.delta * k) for k in (1, 2)]
+        path = [self._place_on_ground(at, at) for at in path]  # asked now: later it is in between
+        actor = self._spawn_body(self._walker, first, walks=True)
         for at in path:
             self.server.apply(Batch(move=(Move(actor, at, _STILL, WALK, True),)))
         seen, shape = self.server.place(actor), self.server.shape(actor)
-        self._remove(actor)
+        self._remove_body(actor)
         feet = seen.z + shape.centre[2] - shape.extent[2] - path[-1].z
         off = math.hypot(seen.x - path[-1].x, seen.y - path[-1].y)
         limits = self.limits
@@ -261,19 +263,19 @@ class BodyChecks:
             (answer,) = self.server.spawn([command])
             if isinstance(answer, int):
                 taken.append(lift)
-                self._remove(answer)
+                self._remove_body(answer)
             else:
                 refused.append(lift)
-        seen = f"refused at {_listed(refused)}; taken at {_listed(taken)}"
+        seen = f"refused at {_list_lifts(refused)}; taken at {_list_lifts(taken)}"
         return judged(
             name,
             f"taken {LIFTS[0]:g} m above the ground",
             seen,
             ok=LIFTS[0] in taken,
-            note=f"tried at {_listed(list(LIFTS))} above the ground",
+            note=f"tried at {_list_lifts(list(LIFTS))} above the ground",
         )
 
-    def _made(self, blueprint: str, at: ActorPlace, *, walks: bool) -> int:
+    def _spawn_body(self, blueprint: str, at: ActorPlace, *, walks: bool) -> int:
         shape = self._shapes[blueprint]
         lift = LIFTS[0] + (shape.extent[2] - shape.centre[2] if walks else 0.0)
         spawn = Spawn(blueprint, _NAME, at, _STILL, 0.0, walks, lift, 0)
@@ -284,33 +286,33 @@ class BodyChecks:
             )
         return answer
 
-    def _moved(self, actor: int) -> ActorPlace:
+    def _move_forward(self, actor: int) -> ActorPlace:
         """Put a car forward in two ticks; where it is to be then."""
         at = self._car_at
         ahead = Velocity(
             SPEED * math.cos(math.radians(at.yaw)), SPEED * math.sin(math.radians(at.yaw)), 0.0
         )
         for _ in range(2):
-            at = _ahead(at, SPEED * self.delta)
+            at = _place_ahead(at, SPEED * self.delta)
             self.server.apply(Batch(move=(Move(actor, at, ahead, SPEED, False),)))
         return at
 
-    def _remove(self, actor: int) -> None:
+    def _remove_body(self, actor: int) -> None:
         self.server.destroy([actor])
         self.server.tick()
 
-    def _speed(self, actor: int) -> float:
+    def _speed_of(self, actor: int) -> float:
         velocity = self.server.world.get_snapshot().find(actor).get_velocity()
         return math.hypot(velocity.x, velocity.y, velocity.z)
 
-    def _grounded(self, at: ActorPlace, surface: ActorPlace | None) -> ActorPlace:
+    def _place_on_ground(self, at: ActorPlace, surface: ActorPlace | None) -> ActorPlace:
         """The same place on the server's ground, or else on the map's surface."""
-        ground = self.server.ground_below(*_above(at), _REACH)
+        ground = self.server.ground_below(*_point_above(at), _REACH)
         if ground is None:
             ground = at.z if surface is None else surface.z
         return ActorPlace(at.x, at.y, ground, 0.0, at.yaw)
 
-    def _free(self, places: list[ActorPlace]) -> list[ActorPlace]:
+    def _free_places(self, places: list[ActorPlace]) -> list[ActorPlace]:
         """Places with nobody near."""
         with answering(self.server.address):
             actors = self.server.world.get_actors()
@@ -323,14 +325,14 @@ class BodyChecks:
         ]
 
 
-def _above(at: ActorPlace) -> tuple[float, float, float]:
+def _point_above(at: ActorPlace) -> tuple[float, float, float]:
     return at.x, at.y, at.z + 1.0
 
 
-def _ahead(at: ActorPlace, metres: float) -> ActorPlace:
+def _place_ahead(at: ActorPlace, metres: float) -> ActorPlace:
     yaw = math.radians(at.yaw)
     return at._replace(x=at.x + metres * math.cos(yaw), y=at.y + metres * math.sin(yaw))
 
 
-def _listed(lifts: list[float]) -> str:
+def _list_lifts(lifts: list[float]) -> str:
     return ", ".join(f"{lift:g}" for lift in lifts) + " m" if lifts else "none"

@@ -69,8 +69,8 @@ def selfcheck_page(report: SelfcheckReport) -> str:
     body = join(
         [
             page_head("Self-check", title, element("p", sentence), verdict=words, style=style),
-            _checks("The server and its world", report, bodies=False),
-            _checks("A car and a walker", report, bodies=True),
+            _render_checks("The server and its world", report, bodies=False),
+            _render_checks("A car and a walker", report, bodies=True),
             report_section(
                 "Versions",
                 html_table(("Of", "Version"), versions),
@@ -82,17 +82,17 @@ def selfcheck_page(report: SelfcheckReport) -> str:
     return html_page(f"{title} - self-check", body)
 
 
-def _checks(heading: str, report: SelfcheckReport, *, bodies: bool) -> Markup:
+def _render_checks(heading: str, report: SelfcheckReport, *, bodies: bool) -> Markup:
     lines = [line for line in report.lines if (line.name in BODY_NAMES) == bodies]
     return report_section(
         heading,
-        html_table(_HEADS, [_row(line) for line in lines]),
+        html_table(_HEADS, [_render_row(line) for line in lines]),
         explained="metres, degrees, m/s, and milliseconds of wall time.",
         ident="bodies" if bodies else "world",
     )
 
 
-def _row(line: CheckLine) -> Markup:
+def _render_row(line: CheckLine) -> Markup:
     return element(
         "tr",
         element("th", line.name, scope="row"),

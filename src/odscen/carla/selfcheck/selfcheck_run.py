@@ -67,7 +67,7 @@ def selfcheck(
     """
     within = limits or CheckLimits()
     wanted = _map_of(workspace, scenario)
-    report = SelfcheckReport(str(address), _versions())
+    report = SelfcheckReport(str(address), _package_versions())
     try:
         server = Server(address)
     except CarlaReleaseError as error:
@@ -85,8 +85,8 @@ def selfcheck(
         before = WorldState.of(server)
         server.synchronize(DELTA)
         before = _with_actors(before, WorldState.of(server))
-        name, text = wanted or _known(workspace, report.map)
-        report.lines = _all(server, within, name, text, interrupted, notify)
+        name, text = wanted or _find_known_map(workspace, report.map)
+        report.lines = _run_all_checks(server, within, name, text, interrupted, notify)
         report.interrupted = interrupted.is_set()
     report.lines += attempt(
         [world_checks.GIVEN_BACK],
@@ -112,7 +112,7 @@ _NAMES = (
 """Of all lines behind the first."""
 
 
-def _all(
+def _run_all_checks(
     server: Server,
     limits: CheckLimits,
     name: str,
@@ -138,7 +138,7 @@ def _all(
     for k, (names, check) in enumerate(checks):
         why = _why_not(interrupted, lines, names)
         if why:
-            lines += [unchecked(one, "-", why) for one in names]
+            lines += [unchecked(name, "-", why) for name in names]
             continue
         if notify is not None:
             notify(names[0], k / len(checks))
@@ -168,7 +168,7 @@ def _map_of(workspace: Workspace, scenario: Path | None) -> tuple[str, str | Non
     return entry.name, entry.read("xodr").decode()
 
 
-def _known(workspace: Workspace, name: str) -> tuple[str, str | None]:
+def _find_known_map(workspace: Workspace, name: str) -> tuple[str, str | None]:
     """The catalogue's map of a name, if there is one."""
     try:
         return name, workspace.map(name).read("xodr").decode()
@@ -181,9 +181,9 @@ def _with_actors(before: WorldState, now: WorldState) -> WorldState:
     return WorldState(before.settings, before.weather, now.frozen, now.actors)
 
 
-def _versions() -> dict[str, str]:
+def _package_versions() -> dict[str, str]:
     carla = import_carla()
-    package = str(getattr(carla, "__version__", "")) or _distribution()
+    package = str(getattr(carla, "__version__", "")) or _distribution_version()
     return {
         "carla": package,
         "odscen": __version__,
@@ -192,7 +192,7 @@ def _versions() -> dict[str, str]:
     }
 
 
-def _distribution() -> str:
+def _distribution_version() -> str:
     from importlib.metadata import PackageNotFoundError, version
 
     try:

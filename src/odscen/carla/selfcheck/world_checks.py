@@ -170,7 +170,7 @@ class WorldState:
             return cls(
                 (
                     ("fixed_delta_seconds", server.release.fixed_delta(settings)),
-                    *((name, _value(settings, name)) for name in _SETTINGS),
+                    *((name, _read_setting(settings, name)) for name in _SETTINGS),
                 ),
                 str(world.get_weather()),
                 tuple(sorted(light.is_frozen() for light in lights)),
@@ -200,5 +200,5 @@ def given_back_line(before: WorldState, after: WorldState, left_behind: list[str
     )
 
 
-def _value(settings: Any, name: str) -> object:
+def _read_setting(settings: Any, name: str) -> object:
     return getattr(settings, name, None)

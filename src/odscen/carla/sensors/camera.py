@@ -96,13 +96,13 @@ class Camera:
 
     def follow(self, x: float, y: float, z: float) -> None:
         """Look at another place from the next tick on; does not wait for the server."""
-        self._handle.set_transform(_above(self._server, View(x, y, z, self._span)))
+        self._handle.set_transform(_view_from_above(self._server, View(x, y, z, self._span)))
 
     def listen(self) -> None:
         """Let pictures come."""
-        self._handle.listen(self._take)
+        self._handle.listen(self._take_image)
 
-    def _take(self, image: Any) -> None:
+    def _take_image(self, image: Any) -> None:
         self.taken += 1
         if self._pictures.qsize() >= _WAITING:
             with suppress(queue.Empty):
@@ -201,7 +201,7 @@ def watch_from_above(
 
 
 def _put_up(server: Server, view: View, *, width: int, height: int, rate: float) -> int:
-    place = _above(server, view)
+    place = _view_from_above(server, view)
     blueprint = server.world.get_blueprint_library().find(BLUEPRINT)
     values = {
         "role_name": ROLE + "camera",
@@ -222,7 +222,7 @@ def _put_up(server: Server, view: View, *, width: int, height: int, rate: float)
     return answer
 
 
-def _above(server: Server, view: View) -> Any:
+def _view_from_above(server: Server, view: View) -> Any:
     carla = server.package
     place = carla.Location(float(view.x), -float(view.y), float(view.z) + view.altitude)
     return carla.Transform(place, carla.Rotation(-90.0, _NORTH, 0.0))

@@ -41,10 +41,13 @@ def still(picture: Picture, kind: Literal["png", "jpeg"]) -> bytes:
         If PyAV is not installed.
     """
     name, pixels = _STILL[kind]
-    codec = _av().CodecContext.create(name, "w")
+    codec = _import_av().CodecContext.create(name, "w")
     codec.width, codec.height, codec.pix_fmt = picture.width, picture.height, pixels
     codec.time_base = Fraction(1, 25)
-    packets = [*codec.encode(_frame(picture).reformat(format=pixels)), *codec.encode(None)]
+    packets = [
+        *codec.encode(_make_video_frame(picture).reformat(format=pixels)),
+        *codec.encode(None),
+    ]
     return b"".join(bytes(packet) for packet in packets)
 
 
@@ -81,7 +84,7 @@ class Wish:
         MissingDependencyError
             If PyAV is not installed.
         """
-        _av()
+        _import_av()
         if self.film is not None and self.film.suffix.lower() not in _FILM_SUFFIXES:
             raise InputError(f"a video ends in {', '.join(_FILM_SUFFIXES)}", file=str(self.film))
 
@@ -125,7 +128,7 @@ def picture_files(wish: Wish) -> Iterator[Callable[[Picture], None]]:
 class _Film:
     def __init__(self, path: Path, wish: Wish) -> None:
         rate = Fraction(wish.rate).limit_denominator(1000)
-        self._container = _av().open(str(path), "w")
+        self._container = _import_av().open(str(path), "w")
         self._stream = self._container.add_stream(
             "libvpx-vp9" if path.suffix.lower() == ".webm" else "libx264", rate=rate
         )
@@ -134,7 +137,7 @@ class _Film:
         self._stream.pix_fmt = "yuv420p"
 
     def add(self, picture: Picture) -> None:
-        frame = _frame(picture).reformat(
+        frame = _make_video_frame(picture).reformat(
             width=self._stream.width, height=self._stream.height, format="yuv420p"
         )
         self._container.mux(self._stream.encode(frame))
@@ -144,13 +147,15 @@ class _Film:
         self._container.close()
 
 
-def _frame(picture: Picture) -> Any:
+def _make_video_frame(picture: Picture) -> Any:
     pixels = np.frombuffer(picture.bgra, dtype=np.uint8)
     shape = (picture.height, picture.width, 4)
-    return _av().VideoFrame.from_ndarray(np.ascontiguousarray(pixels.reshape(shape)), format="bgra")
+    return _import_av().VideoFrame.from_ndarray(
+        np.ascontiguousarray(pixels.reshape(shape)), format="bgra"
+    )
 
 
-def _av() -> Any:
+def _import_av() -> Any:
     try:
         import av
     except ImportError as error:

@@ -61,7 +61,7 @@ class SensorList(_SensorPart):
 
     @model_validator(mode="after")
     def _names_differ(self) -> SensorList:
-        names = [one.name for one in self.sensors]
+        names = [sensor.name for sensor in self.sensors]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"two sensors are named {twice[0]}")
         return self

@@ -76,11 +76,11 @@ class SensorRecording:
                 (self._folder / wish.name).mkdir(parents=True, exist_ok=True)
                 self._write_row(wish, COLUMNS)
         except OSError as error:
-            raise self._trouble(error) from error
+            raise self._describe_disk_error(error) from error
         if self._worker is None:
-            self._worker = threading.Thread(target=self._work, name="sensors", daemon=True)
+            self._worker = threading.Thread(target=self._write_queued, name="sensors", daemon=True)
             self._worker.start()
-        commands = [self._command(wish, actor) for wish in self._wishes]
+        commands = [self._spawn_command(wish, actor) for wish in self._wishes]
         answers = self._server.spawn(commands)
         for wish, answer in zip(self._wishes, answers, strict=True):
             if not isinstance(answer, int):
@@ -91,7 +91,7 @@ class SensorRecording:
         self._handles = {handle.id: handle for handle in made}
         for wish, number in zip(self._wishes, answers, strict=True):
             handle = self._handles[int(number)]
-            handle.listen(lambda data, wish=wish: self._queue.put((wish, _copied(data))))
+            handle.listen(lambda data, wish=wish: self._queue.put((wish, _copy_measurement(data))))
 
     def detach(self) -> None:
         """Take all sensors away: their actor goes, or the run ends."""
@@ -116,9 +116,9 @@ class SensorRecording:
             self._worker.join(_LAST)
             self._worker = None
         if self._failed is not None:
-            raise self._trouble(self._failed) from self._failed
+            raise self._describe_disk_error(self._failed) from self._failed
 
-    def _command(self, wish: SensorWish, actor: int) -> Any:
+    def _spawn_command(self, wish: SensorWish, actor: int) -> Any:
         carla, place = self._server.package, wish.place
         blueprint = self._server.blueprint(wish.type)
         for name, value in {"role_name": ROLE + wish.name, **wish.values()}.items():
@@ -132,21 +132,21 @@ class SensorRecording:
         )
         return carla.command.SpawnActor(blueprint, at, actor)
 
-    def _work(self) -> None:
+    def _write_queued(self) -> None:
         while (item := self._queue.get()) is not None:
             if self._failed is not None:
                 continue
             wish, (data, row) = item
             number = self.counts[wish.name] + 1
             try:
-                self._write(self._folder / wish.name, number, data)
+                self._write_measurement(self._folder / wish.name, number, data)
                 self._write_row(wish, (number, *row))
             except OSError as error:
                 self._failed = error
             else:
                 self.counts[wish.name] = number
 
-    def _write(self, folder: Path, number: int, data: Picture | np.ndarray) -> None:
+    def _write_measurement(self, folder: Path, number: int, data: Picture | np.ndarray) -> None:
         if isinstance(data, Picture):
             (folder / f"{number:06d}.png").write_bytes(still(data, "png"))
         else:
@@ -157,11 +157,11 @@ class SensorRecording:
         with (self._folder / wish.name / "index.csv").open("a", encoding="utf-8") as file:
             file.write(",".join(texts) + "\n")
 
-    def _trouble(self, error: OSError) -> WorkspaceError:
+    def _describe_disk_error(self, error: OSError) -> WorkspaceError:
         return WorkspaceError(f"sensors: {error.filename or ''}: {error.strerror or error}")
 
 
-def _copied(data: Any) -> tuple[Picture | np.ndarray, tuple[object, ...]]:
+def _copy_measurement(data: Any) -> tuple[Picture | np.ndarray, tuple[object, ...]]:
     """Copy a measurement, which the client takes back after the call, and describe it."""
     at = data.transform
     where, turn = at.location, at.rotation

@@ -105,7 +105,7 @@ def run_served(job: ServedJob, live: Live) -> Done | Failed:
             raise
         finally:
             live.detach()
-    return last or Failed(_crash(process.returncode))
+    return last or Failed(_explain_crash(process.returncode))
 
 
 class _Worker(subprocess.Popen[bytes]):
@@ -141,7 +141,7 @@ def probe(address: Address) -> Found:
     return Found(state, message)
 
 
-def _crash(code: int) -> str:
+def _explain_crash(code: int) -> str:
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
         return f"the CARLA client crashed: its process was ended by signal {name}"

@@ -122,7 +122,7 @@ class _PageFollower:
     def on_step(self, step: Step) -> bool:
         """Show a step, then wait until the next may be made; false if the run is to stop."""
         self._count += 1
-        self._measure()
+        self._measure_pace()
         changed = {n: state for n, state in step.lights.items() if self._lights.get(n) != state}
         if changed:
             self._lights |= changed
@@ -131,11 +131,11 @@ class _PageFollower:
             self._send(Incidents([dict(event) for event in step.incidents]), b"")
 
         def idle(_has_time: bool) -> None:
-            self._tell(step)
+            self._send_frame(step)
 
         return self._steering.next_step(idle)
 
-    def _tell(self, step: Step) -> None:
+    def _send_frame(self, step: Step) -> None:
         """Send a frame if one is wanted, and the pace if it has changed."""
         if self._steering.pace != self._pace:
             self._pace = self._steering.pace
@@ -156,7 +156,7 @@ class _PageFollower:
         )
         self._send(FrameMessage(len(frame)), frame)
 
-    def _measure(self) -> None:
+    def _measure_pace(self) -> None:
         now, (then, count) = time.monotonic(), self._mark
         if now - then >= _WINDOW:
             self._factor = (self._count - count) * self._job.step_length / (now - then)

@@ -44,41 +44,44 @@ class BatchCommands:
             future = command.FutureActor
             if spawn.walks:
                 made = made.then(command.SetSimulatePhysics(future, False))
-                made = made.then(walker(future, self._transform(spawn.at), spawn.speed))
+                made = made.then(walker(future, self._carla_transform(spawn.at), spawn.speed))
             else:
                 if self.pushed is None:
                     made = made.then(command.SetSimulatePhysics(future, False))
                 else:
                     made = made.then(command.SetEnableGravity(future, False))
-                for one in self._put(future, spawn.at, spawn.velocity):
-                    made = made.then(one)
+                for put_command in self._put_commands(future, spawn.at, spawn.velocity):
+                    made = made.then(put_command)
                 made = made.then(command.SetVehicleLightState(future, flags(spawn.flags)))
             commands.append(made)
         for move in batch.move:
             if move.walks:
-                commands.append(walker(move.actor, self._transform(move.at), move.speed))
+                commands.append(walker(move.actor, self._carla_transform(move.at), move.speed))
             else:
-                commands += self._put(move.actor, move.at, move.velocity)
+                commands += self._put_commands(move.actor, move.at, move.velocity)
         commands += [
             command.SetVehicleLightState(shine.actor, flags(shine.flags)) for shine in batch.shine
         ]
         commands += [
-            command.ApplyTransform(actor, self._transform(at)) for actor, at in batch.views.items()
+            command.ApplyTransform(actor, self._carla_transform(at))
+            for actor, at in batch.views.items()
         ]
         return commands
 
-    def _put(self, actor: Any, at: ActorPlace, velocity: Velocity) -> list[Any]:
+    def _put_commands(self, actor: Any, at: ActorPlace, velocity: Velocity) -> list[Any]:
         """Commands after which a vehicle is at a place when the next tick has been made."""
         command = self._carla.command
         if self.pushed is None:
-            return [command.ApplyTransform(actor, self._transform(at))]
+            return [command.ApplyTransform(actor, self._carla_transform(at))]
         x, y, z = (a - v * self.pushed for a, v in zip(at[:3], velocity, strict=True))
         return [
-            command.ApplyTransform(actor, self._transform(ActorPlace(x, y, z, at.pitch, at.yaw))),
+            command.ApplyTransform(
+                actor, self._carla_transform(ActorPlace(x, y, z, at.pitch, at.yaw))
+            ),
             command.ApplyTargetVelocity(actor, self._carla.Vector3D(*velocity)),
         ]
 
-    def _transform(self, at: ActorPlace) -> Any:
+    def _carla_transform(self, at: ActorPlace) -> Any:
         x, y, z, pitch, yaw = at
         carla = self._carla
         return carla.Transform(carla.Location(x, y, z), carla.Rotation(pitch, yaw, 0.0))

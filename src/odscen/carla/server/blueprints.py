@@ -43,26 +43,26 @@ def choose_blueprints(
         If the library has nothing at all for a category.
     """
     known = sorted(library)
-    return tuple(_choose(actor, assets, known) for actor in actors)
+    return tuple(_choose_blueprint(actor, assets, known) for actor in actors)
 
 
-def _choose(actor: PlannedActor, assets: Assets, library: Sequence[str]) -> str:
+def _choose_blueprint(actor: PlannedActor, assets: Assets, library: Sequence[str]) -> str:
     if actor.model in library:
         return str(actor.model)
     category = Category(actor.category)
     fitting = [model for model in assets.of_category(category) if model.id in library]
     if not fitting:
-        return _any(category, library)
-    best = min(_difference(actor, model) for model in fitting)
-    alike = [model.id for model in fitting if _difference(actor, model) <= best + ALIKE]
+        return _choose_unknown_model(category, library)
+    best = min(_size_difference(actor, model) for model in fitting)
+    alike = [model.id for model in fitting if _size_difference(actor, model) <= best + ALIKE]
     return alike[zlib.crc32(actor.id.encode()) % len(alike)]
 
 
-def _difference(actor: PlannedActor, model: Blueprint) -> float:
+def _size_difference(actor: PlannedActor, model: Blueprint) -> float:
     return abs(actor.length - model.body.length) + abs(actor.width - model.body.width)
 
 
-def _any(category: Category, library: Sequence[str]) -> str:
+def _choose_unknown_model(category: Category, library: Sequence[str]) -> str:
     """Something of a library that has no model we know."""
     prefix = _PREFIX.get(category, "vehicle.")
     found = next((name for name in library if name.startswith(prefix)), None)

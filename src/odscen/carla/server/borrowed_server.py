@@ -77,7 +77,7 @@ class BorrowedServer:
         self._carla, self._client, warning = connect(address)
         self.release = release_of(self._client.get_client_version())
         self.warnings = [words for words in (warning, self.release.warning) if words]
-        with self._answering():
+        with self._expect_answer():
             self._world = self._client.get_world()
             self._library = self._world.get_blueprint_library()
             self._wording = BatchCommands(self._carla, self._library)
@@ -93,7 +93,7 @@ class BorrowedServer:
 
     # ------------------------------------------------------------------------------- borrowing
     def __enter__(self) -> Self:
-        with self._answering():
+        with self._expect_answer():
             self._settings = self._world.get_settings()
             self._settings.fixed_delta_seconds = self.release.fixed_delta(self._settings)
             self._weather = self._world.get_weather()
@@ -149,7 +149,7 @@ class BorrowedServer:
             self._own.clear()
             if self._world.get_settings().synchronous_mode and not self._follows:
                 with suppress(RuntimeError):
-                    self._advance()
+                    self._advance_tick()
 
     # ------------------------------------------------------------------------------- for others
     @property
@@ -179,7 +179,7 @@ class BorrowedServer:
 
     def actors(self, numbers: Sequence[int]) -> list[Any]:
         """Actors of the client's by their numbers; those that are gone are left out."""
-        with self._answering():
+        with self._expect_answer():
             return list(self._world.get_actors(list(numbers)))
 
     def inherit(self, actors: Sequence[int]) -> None:
@@ -197,21 +197,23 @@ class BorrowedServer:
         """Make actors in one call; the id of each, or why there is none. No tick is made."""
         if not commands:
             return []
-        with self._answering():
-            answers = [reply.error or int(reply.actor_id) for reply in self._apply(commands)]
+        with self._expect_answer():
+            answers = [
+                reply.error or int(reply.actor_id) for reply in self._apply_commands(commands)
+            ]
         self._own |= {answer for answer in answers if isinstance(answer, int)}
         return answers
 
     def send(self, commands: Sequence[Any]) -> None:
         """Give commands in one call; no tick is made."""
         if commands:
-            with self._answering():
-                self._apply(commands)
+            with self._expect_answer():
+                self._apply_commands(commands)
 
     def destroy(self, actors: Sequence[int]) -> None:
         """Destroy actors of ours in one call; those that are gone already do not matter."""
-        with self._answering():
-            self._destroy(actors)
+        with self._expect_answer():
+            self._destroy_actors(actors)
 
     # ------------------------------------------------------------------------------- time
     def clock(self) -> tuple[float, float]:
@@ -226,7 +228,7 @@ class BorrowedServer:
 
     def first_clock(self) -> tuple[float, float]:
         """As :meth:`clock`, behind a call that is answered: a recording then has when this was."""
-        with self._answering():
+        with self._expect_answer():
             self._world.get_settings()
         return self.clock()
 
@@ -241,7 +243,7 @@ class BorrowedServer:
         """
         self._wording.pushed = delta if sensed_speed else None
         self._frame = None
-        with self._answering():
+        with self._expect_answer():
             settings = self._world.get_settings()
             settings.synchronous_mode = True
             settings.fixed_delta_seconds = delta
@@ -257,14 +259,14 @@ class BorrowedServer:
             For each spawn the actor's id, or why there is none.
         """
         commands = self._wording.commands(batch)
-        with self._answering():
+        with self._expect_answer():
             self._lights.switch(batch.signals)
             self._parts.move_doors(self._world, batch.doors)
             self._parts.turn(self._world, batch.wheels)
             self._parts.forget(batch.destroy)
             # These get no answer, and a call that is answered keeps them from landing after the
             # tick (issue 8263 of carla-simulator/carla).
-            responses = self._apply(commands) if commands or batch.signals else []
+            responses = self._apply_commands(commands) if commands or batch.signals else []
             self._own -= set(batch.destroy)
             first = len(batch.destroy)
             answers = [
@@ -285,7 +287,7 @@ class BorrowedServer:
         if refused:
             higher = Batch(spawn=tuple(replace(spawns[n], lift=FREE_AIR) for n in refused))
             for n, response in zip(
-                refused, self._apply(self._wording.commands(higher)), strict=True
+                refused, self._apply_commands(self._wording.commands(higher)), strict=True
             ):
                 answers[n] = response.error or int(response.actor_id)
 
@@ -305,11 +307,11 @@ class BorrowedServer:
             return
         start = time.perf_counter()
         try:
-            frame = self._advance()
+            frame = self._advance_tick()
         except RuntimeError:
             if not self.address.listens():
                 raise
-            frame = self._advance()
+            frame = self._advance_tick()
             self.interruptions += 1
             self._frame = None
         self.waited += time.perf_counter() - start
@@ -320,7 +322,7 @@ class BorrowedServer:
                 f"frame {last} to {frame}; only one client may tick"
             )
 
-    def _advance(self) -> int:
+    def _advance_tick(self) -> int:
         with self.around_tick():
             return int(self._world.tick(self.address.timeout))
 
@@ -344,7 +346,7 @@ class BorrowedServer:
                 )
         self.waited += time.perf_counter() - start
 
-    def _apply(self, commands: Sequence[Any]) -> list[Any]:
+    def _apply_commands(self, commands: Sequence[Any]) -> list[Any]:
         self._unsure = True
         start = time.perf_counter()
         responses = list(self._client.apply_batch_sync(list(commands), False))
@@ -352,9 +354,9 @@ class BorrowedServer:
         self._unsure = False
         return responses
 
-    def _destroy(self, actors: Sequence[int]) -> None:
+    def _destroy_actors(self, actors: Sequence[int]) -> None:
         if actors:
-            self._apply([self._carla.command.DestroyActor(actor) for actor in actors])
+            self._apply_commands([self._carla.command.DestroyActor(actor) for actor in actors])
             self._own -= set(actors)
 
     def spawn_command(
@@ -370,5 +372,5 @@ class BorrowedServer:
         return self._wording.spawn(name, role_name, at, pitch=pitch, yaw=yaw)
 
     # ------------------------------------------------------------------------------- errors
-    def _answering(self) -> AbstractContextManager[None]:
+    def _expect_answer(self) -> AbstractContextManager[None]:
         return answering(self.address)

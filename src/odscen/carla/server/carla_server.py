@@ -37,35 +37,35 @@ class Server(BorrowedServer):
     @property
     def map_name(self) -> str:
         """Name of the map that is loaded, without its folder."""
-        with self._answering():
+        with self._expect_answer():
             return str(self._world.get_map().name).rpartition("/")[2]
 
     def opendrive(self) -> str:
         """OpenDRIVE text of the map that is loaded."""
-        with self._answering():
+        with self._expect_answer():
             return str(self._world.get_map().to_opendrive())
 
     def available_maps(self) -> list[str]:
         """Names of the maps that the server can load, without their folders, sorted."""
-        with self._answering():
+        with self._expect_answer():
             names = self._client.get_available_maps()
         return sorted({str(name).rpartition("/")[2] for name in names})
 
     def load_map(self, name: str) -> None:
         """Load one of the server's maps; everything on the present one is gone."""
-        with self._long():
+        with self._allow_long_call():
             self._world = self._client.load_world(name, False)
         self._look_again()
 
     def load_opendrive(self, xodr: str) -> None:
         """Let the server make a bare road surface of an OpenDRIVE text and load it."""
         parameters = self.release.generation(self._carla)
-        with self._long():
+        with self._allow_long_call():
             self._world = self._client.generate_opendrive_world(xodr, parameters, False)
         self._look_again()
 
     def _look_again(self) -> None:
-        with self._answering():
+        with self._expect_answer():
             self._library = self._world.get_blueprint_library()
             self._wording = BatchCommands(self._carla, self._library)
             self._before = {actor.id for actor in self._world.get_actors()}
@@ -73,34 +73,34 @@ class Server(BorrowedServer):
 
     def spawn_places(self) -> list[ActorPlace]:
         """Places that the map recommends for vehicles; they float a little above the road."""
-        with self._answering():
-            return [_place(at) for at in self._world.get_map().get_spawn_points()]
+        with self._expect_answer():
+            return [_actor_place(at) for at in self._world.get_map().get_spawn_points()]
 
     def lane_place(self, at: ActorPlace, *, sidewalk: bool = False) -> ActorPlace | None:
         """Nearest place on the centre line of a driving lane or a sidewalk, as the file has it."""
         kinds = self._carla.LaneType
-        with self._answering():
+        with self._expect_answer():
             found = self._world.get_map().get_waypoint(
                 self._carla.Location(*at[:3]),
                 project_to_road=True,
                 lane_type=kinds.Sidewalk if sidewalk else kinds.Driving,
             )
-        return None if found is None else _place(found.transform)
+        return None if found is None else _actor_place(found.transform)
 
     # ------------------------------------------------------------------------------- the world
     def spectator_place(self) -> ActorPlace:
         """Where the server's window looks from."""
-        with self._answering():
-            return _place(self._world.get_spectator().get_transform())
+        with self._expect_answer():
+            return _actor_place(self._world.get_spectator().get_transform())
 
     def active_distance(self) -> float:
         """Metres from a hero beyond which actors of a large map are dormant."""
-        with self._answering():
+        with self._expect_answer():
             return float(self._world.get_settings().actor_active_distance)
 
     def set_weather(self, parameters: Mapping[str, float]) -> None:
         """Set weather and the sun; parameters that are not named keep the server's values."""
-        with self._answering():
+        with self._expect_answer():
             weather = self._world.get_weather()
             for name, value in parameters.items():
                 if hasattr(weather, name):
@@ -110,12 +110,12 @@ class Server(BorrowedServer):
     # ------------------------------------------------------------------------------- the library
     def library(self) -> list[str]:
         """Ids of all blueprints, sorted."""
-        with self._answering():
+        with self._expect_answer():
             return sorted(blueprint.id for blueprint in self._library)
 
     def describe(self, beginnings: tuple[str, ...]) -> dict[str, dict[str, str]]:
         """What blueprints whose ids begin so say of their kind, by id."""
-        with self._answering():
+        with self._expect_answer():
             return {
                 blueprint.id: {
                     name: str(getattr(blueprint.get_attribute(name), read)())
@@ -134,7 +134,7 @@ class Server(BorrowedServer):
         CarlaError
             If the server has none.
         """
-        with self._answering():
+        with self._expect_answer():
             if not self._library.filter(name):
                 raise CarlaError(f"the CARLA server at {self.address} has no blueprint {name}")
             return self._library.find(name)
@@ -147,29 +147,29 @@ class Server(BorrowedServer):
             for number, name in enumerate(wanted)
         ]
         shapes: dict[str, Shape] = {}
-        with self._answering():
+        with self._expect_answer():
             made = {
                 name: answer.actor_id
-                for name, answer in zip(wanted, self._apply(commands), strict=True)
+                for name, answer in zip(wanted, self._apply_commands(commands), strict=True)
                 if not answer.error
             }
             self._own |= set(made.values())
             self.tick()
             for name, number in made.items():
                 shapes[name] = self.shape(number)
-            self._destroy(sorted(made.values()))
+            self._destroy_actors(sorted(made.values()))
         return shapes
 
     def with_doors(self, names: Sequence[str]) -> frozenset[str]:
         """Those of some blueprints whose doors can be opened, as they say themselves."""
         wanted, name = set(names), "has_dynamic_doors"
-        with self._answering():
+        with self._expect_answer():
             known = [one for one in self._library if one.id in wanted and one.has_attribute(name)]
             return frozenset(one.id for one in known if one.get_attribute(name).as_bool())
 
     def shape(self, actor: int) -> Shape:
         """Bounding box of an actor."""
-        with self._answering():
+        with self._expect_answer():
             box = self._world.get_actor(actor).bounding_box
         return Shape(
             (box.extent.x, box.extent.y, box.extent.z),
@@ -181,7 +181,7 @@ class Server(BorrowedServer):
 
         ``None`` if there is none, or if a body is in between. Metres, CARLA's frame.
         """
-        with self._answering():
+        with self._expect_answer():
             found = self._world.ground_projection(self._carla.Location(x, y, z), reach)
         if found is None or not self.release.is_ground(found.label):
             return None
@@ -190,7 +190,7 @@ class Server(BorrowedServer):
     # ------------------------------------------------------------------------------- the ego
     def find_role(self, *role_names: str) -> int | None:
         """Vehicle that has the first role that any has; of several, the one with the least id."""
-        with self._answering():
+        with self._expect_answer():
             vehicles = self._world.get_actors().filter("vehicle.*")
             found = sorted((v.attributes.get("role_name"), v.id) for v in vehicles)
         return next((number for name in role_names for role, number in found if role == name), None)
@@ -203,9 +203,9 @@ class Server(BorrowedServer):
         CarlaError
             If the server refuses it.
         """
-        with self._answering():
+        with self._expect_answer():
             command = self.spawn_command(blueprint, role_name, at[:3], pitch=at.pitch, yaw=at.yaw)
-            answer = self._apply([command])[0]
+            answer = self._apply_commands([command])[0]
             if answer.error:
                 raise CarlaError(
                     f"the CARLA server at {self.address} refused the {role_name}: {answer.error}"
@@ -225,7 +225,7 @@ class Server(BorrowedServer):
         found = self._world.get_snapshot().find(actor)
         if found is None:
             raise CarlaError(f"actor {actor} is gone from the CARLA server at {self.address}")
-        return _place(found.get_transform())
+        return _actor_place(found.get_transform())
 
     def speed(self, actor: int, at: ActorPlace) -> float:
         """m/s ahead of an actor that is at a place, 0 if it goes backwards."""
@@ -236,12 +236,12 @@ class Server(BorrowedServer):
     # ------------------------------------------------------------------------------- lights
     def watch_lights(self) -> dict[str, int]:
         """Look at the traffic lights, which the server switches; actor by OpenDRIVE signal id."""
-        with self._answering():
+        with self._expect_answer():
             return self._lights.watch(self._world)
 
     def take_lights(self) -> dict[str, int]:
         """Freeze the traffic lights under our control; actor by OpenDRIVE signal id."""
-        with self._answering():
+        with self._expect_answer():
             return self._lights.take(self._world)
 
     def light_states(self) -> dict[int, str]:
@@ -249,15 +249,15 @@ class Server(BorrowedServer):
         return self._lights.shown()
 
     @contextmanager
-    def _long(self) -> Iterator[None]:
+    def _allow_long_call(self) -> Iterator[None]:
         self._client.set_timeout(max(LOAD_TIMEOUT, self.address.timeout))
         try:
-            with self._answering():
+            with self._expect_answer():
                 yield
         finally:
             self._client.set_timeout(self.address.timeout)
 
 
-def _place(at: Any) -> ActorPlace:
+def _actor_place(at: Any) -> ActorPlace:
     where, turn = at.location, at.rotation
     return ActorPlace(where.x, where.y, where.z, turn.pitch, turn.yaw)

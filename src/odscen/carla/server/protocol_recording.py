@@ -51,7 +51,7 @@ def recorded_protocol(address: Address, file: Path) -> Iterator[Address]:
     )
     try:
         options = {"host": address.host, "port": address.port, "file": str(file.absolute())}
-        port = _started(process, options, file)
+        port = _read_started_port(process, options, file)
         yield Address("127.0.0.1", port, address.timeout, origin=address)
     finally:
         try:
@@ -61,7 +61,9 @@ def recorded_protocol(address: Address, file: Path) -> Iterator[Address]:
             process.communicate()
 
 
-def _started(process: subprocess.Popen[str], options: dict[str, object], file: Path) -> int:
+def _read_started_port(
+    process: subprocess.Popen[str], options: dict[str, object], file: Path
+) -> int:
     if process.stdin is None or process.stdout is None:  # both were asked for
         raise WorkspaceError(f"{file}: nothing can be recorded")
     process.stdin.write(json.dumps(options) + "\n")

@@ -95,7 +95,7 @@ def parse_transcript(lines: Iterable[str], *, file: str) -> list[ProtocolFrame]:
         if not line.endswith("\n"):
             break
         try:
-            frames.append(_frame(json.loads(line)))
+            frames.append(_parse_frame(json.loads(line)))
         except (ValueError, KeyError, TypeError, binascii.Error) as error:
             raise InputError(
                 f"is no frame of a transcript: {error}", file=file, element=f"line {number}"
@@ -122,7 +122,7 @@ def _check_header(line: str, *, file: str) -> None:
         )
 
 
-def _frame(row: dict[str, Any]) -> ProtocolFrame:
+def _parse_frame(row: dict[str, Any]) -> ProtocolFrame:
     return ProtocolFrame(
         float(row["at"]),
         int(row["connection"]),

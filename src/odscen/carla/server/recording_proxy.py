@@ -102,7 +102,7 @@ class RecordingProxy:
             to_server.write(data)
             for frame, (_, number, name, *_rest) in frames.feed(data):
                 names[number] = name.decode()
-                self._note(connection, FrameKind.CALL, names[number], number, frame)
+                self._note_frame(connection, FrameKind.CALL, names[number], number, frame)
             await to_server.drain()
 
     async def _pass_answers(
@@ -116,7 +116,7 @@ class RecordingProxy:
         while data := await there.read(_CHUNK):
             for frame, (_, number, *_rest) in frames.feed(data):
                 name = names.pop(number, "")
-                self._note(connection, FrameKind.ANSWER, name, number, frame)
+                self._note_frame(connection, FrameKind.ANSWER, name, number, frame)
                 writer.write(self._through_here(frame) if name in _TOKENS else frame)
             await writer.drain()
 
@@ -126,7 +126,7 @@ class RecordingProxy:
         if not frame[:at].endswith(_TOKEN_MARK):
             return frame
         stream, port, protocol, kind, address = _TOKEN.unpack_from(frame, at)
-        self._streams[stream] = (_host(kind, address) or self._origin[0], port)
+        self._streams[stream] = (_host_in_address(kind, address) or self._origin[0], port)
         token = _TOKEN.pack(stream, self._stream_port, protocol, _NO_ADDRESS, bytes(16))
         return frame[:at] + token
 
@@ -155,11 +155,13 @@ class RecordingProxy:
             if stream == _OBSERVER and message != self._last_state:  # not twice for two listeners
                 self._last_state = message
                 (number,) = _FRAME.unpack_from(message)
-                self._note(0, FrameKind.STATE, "", number, message)
+                self._note_frame(0, FrameKind.STATE, "", number, message)
             writer.write(head + message)
             await writer.drain()
 
-    def _note(self, connection: int, kind: FrameKind, name: str, number: int, data: bytes) -> None:
+    def _note_frame(
+        self, connection: int, kind: FrameKind, name: str, number: int, data: bytes
+    ) -> None:
         at = time.monotonic() - self._start
         self._out.write(frame_line(ProtocolFrame(at, connection, kind, name, number, data)))
 
@@ -184,7 +186,7 @@ class _Frames:
             yield frame, value
 
 
-def _host(kind: int, address: bytes) -> str | None:
+def _host_in_address(kind: int, address: bytes) -> str | None:
     if kind == _IPV4:
         found = ipaddress.ip_address(address[:4])
     elif kind == _IPV6:
@@ -201,7 +203,7 @@ def _send_at_once(*writers: asyncio.StreamWriter) -> None:
 
 async def _first_ended(*directions: Coroutine[Any, Any, object]) -> None:
     """Pass both directions on until one has ended."""
-    tasks = [asyncio.create_task(one) for one in directions]
+    tasks = [asyncio.create_task(direction) for direction in directions]
     done, rest = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     for task in rest:
         task.cancel()
@@ -215,26 +217,26 @@ async def main() -> None:
     options = json.loads(sys.stdin.readline())
     file = Path(options["file"])
     try:
-        out = _open(file)
+        out = _open_transcript(file)
     except OSError as error:
-        _say({"error": error.strerror or str(error)})
+        _print_message({"error": error.strerror or str(error)})
         return
     with out:
         proxy = RecordingProxy((options["host"], options["port"]), out)
-        _say({"port": await proxy.start()})
+        _print_message({"port": await proxy.start()})
         loop = asyncio.get_running_loop()
         await loop.run_in_executor(None, sys.stdin.read)
         out.flush()
     os._exit(0)  # open connections are cut
 
 
-def _open(file: Path) -> TextIO:
+def _open_transcript(file: Path) -> TextIO:
     if file.suffix == ".gz":
         return gzip.open(file, "wt", encoding="ascii")
     return file.open("w", encoding="ascii")
 
 
-def _say(message: dict[str, object]) -> None:
+def _print_message(message: dict[str, object]) -> None:
     sys.stdout.write(json.dumps(message) + "\n")
     sys.stdout.flush()
 

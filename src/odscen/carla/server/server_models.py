@@ -47,12 +47,12 @@ class ServerModels(AssetSource):
         shapes = self._server.shapes(tuple(described))
         known = self._known.blueprints
         return [
-            _model(name, described[name], known.get(name), shapes[name].extent)
+            _describe_model(name, described[name], known.get(name), shapes[name].extent)
             for name in sorted(shapes)
         ]
 
 
-def _model(
+def _describe_model(
     name: str, said: dict[str, str], known: Blueprint | None, extent: tuple[float, float, float]
 ) -> Blueprint:
     length, width, height = (round(2 * half, 4) for half in extent)

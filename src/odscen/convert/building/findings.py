@@ -48,8 +48,10 @@ def one_way_ends(
             if not along or not against or link is None or link.element_type != "junction":
                 continue
             at_end = name == "successor"
-            arriving = _outermost(found.edges, along if at_end else against, at_end=at_end)
-            leaving = _outermost(found.edges, against if at_end else along, at_end=at_end)
+            arriving = _find_outermost_edge(
+                found.edges, along if at_end else against, at_end=at_end
+            )
+            leaving = _find_outermost_edge(found.edges, against if at_end else along, at_end=at_end)
             goes, comes = arriving in left, leaving in entered
             if goes != comes:
                 reason = (
@@ -59,7 +61,7 @@ def one_way_ends(
                 yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(road.id)} > {name}", reason)
 
 
-def _outermost(edges: Sequence[EdgePlan], numbers: Sequence[int], *, at_end: bool) -> int:
+def _find_outermost_edge(edges: Sequence[EdgePlan], numbers: Sequence[int], *, at_end: bool) -> int:
     """Edge nearest to the end of the road, or to its start."""
     middles = {number: edges[number].start + edges[number].end for number in numbers}
     return max(numbers, key=lambda number: middles[number] if at_end else -middles[number])
@@ -103,14 +105,17 @@ def findings(
     """Say what became of each element."""
     nowhere = list(_leading_nowhere(odr, table))
     entries = [
-        *_lanes(odr, table, lanes),
-        *_varying(table, lanes),
+        *_find_lane_entries(odr, table, lanes),
+        *_find_varying_widths(table, lanes),
         *_access(odr),
-        *(ReportEntry(ElementOutcome.LOST, _place(*lost.lane), lost.reason) for lost in found.lost),
+        *(
+            ReportEntry(ElementOutcome.LOST, _describe_place(*lost.lane), lost.reason)
+            for lost in found.lost
+        ),
         *nowhere,
         *one_way_ends(odr, table, found),
-        *_crosswalks(odr, crosswalks),
-        *_signals(odr, table, net, control),
+        *_find_crosswalk_entries(odr, crosswalks),
+        *_find_signal_entries(odr, table, net, control),
     ]
     lengths = lane_lengths(odr, table, lanes)
     figures = {
@@ -132,7 +137,7 @@ def findings(
     return Findings((*kept, *entries), figures)
 
 
-def _place(road: str, section: int, lane: int) -> str:
+def _describe_place(road: str, section: int, lane: int) -> str:
     return f"road {shown_id(road)} > laneSection {section} > lane {lane}"
 
 
@@ -143,10 +148,10 @@ def _leading_nowhere(odr: OpenDrive, table: RoadTable) -> Iterator[ReportEntry]:
         if table.lane_width(np.array([table.lane_index[lane]]), s)[0] >= LEAST_WIDTH:
             what = "leads to no lane" if leads else "is reached from no lane"
             reason = f"connecting lane {what}, and not exactly one meets it there"
-            yield ReportEntry(ElementOutcome.LOST, _place(*lane), reason)
+            yield ReportEntry(ElementOutcome.LOST, _describe_place(*lane), reason)
 
 
-def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
+def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
     covered = covered_metres(lanes)
     for row, key in enumerate(table.lane_keys):
         kind = table.lane_type[row]
@@ -157,10 +162,10 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
                 where = "" if odr.roads[key.road].junction is None else " of a connecting road"
                 why = _why_uncovered(odr, table, row)
                 reason = f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: {why}"
-                yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
+                yield ReportEntry(ElementOutcome.LOST, _describe_place(*key), reason)
             if odr.roads[key.road].sections[key.section].lanes[key.lane].direction == "both":
                 reason = "open both ways; SUMO has it in one direction only, that of its side"
-                yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
+                yield ReportEntry(ElementOutcome.LOST, _describe_place(*key), reason)
         elif kind not in ("none", ""):
             reason = f"lanes of type {kind} are open to no road user and left out"
             if kind == BOTH_WAYS:
@@ -192,7 +197,7 @@ def _access(odr: OpenDrive) -> Iterator[ReportEntry]:
         for number, section in enumerate(road.sections):
             for lane in section.lanes.values():
                 for record in lane.access:
-                    yield _access_entry(_place(road.id, number, lane.id), lane, record)
+                    yield _access_entry(_describe_place(road.id, number, lane.id), lane, record)
 
 
 def _access_entry(element: str, lane: Lane, record: LaneAccess) -> ReportEntry:
@@ -213,7 +218,7 @@ def _access_entry(element: str, lane: Lane, record: LaneAccess) -> ReportEntry:
     return ReportEntry(ElementOutcome.KEPT, element, f"access from s={record.s:g}: {classes}")
 
 
-def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
+def _find_varying_widths(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
     """SUMO lanes have one width; report lanes that differ from it."""
     sumo = lanes.lane_list
     for interval in lanes.intervals:
@@ -232,11 +237,13 @@ def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
         low, high = float(true.min()), float(true.max())
         if high - width > VARYING or width - low > VARYING:
             reason = f"its width varies from {low:.2f} to {high:.2f} m, SUMO's is {width:.2f} m"
-            yield ReportEntry(ElementOutcome.GUESSED, _place(*key), reason)
+            yield ReportEntry(ElementOutcome.GUESSED, _describe_place(*key), reason)
 
 
-def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[ReportEntry]:
-    kept = {(one.crosswalk.road, one.crosswalk.object_id) for one in placed}
+def _find_crosswalk_entries(
+    odr: OpenDrive, placed: Sequence[PlacedCrosswalk]
+) -> Iterator[ReportEntry]:
+    kept = {(crosswalk.crosswalk.road, crosswalk.crosswalk.object_id) for crosswalk in placed}
     for road in odr.roads.values():
         for item in road.objects:
             if not is_crosswalk(item):
@@ -250,7 +257,7 @@ def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[R
                 yield ReportEntry(ElementOutcome.LOST, element, "crosswalk without any size")
 
 
-def _signals(
+def _find_signal_entries(
     odr: OpenDrive, table: RoadTable, net: Net, control: SignalControl
 ) -> Iterator[ReportEntry]:
     unplaced, guessed = dict(control.unplaced), dict(control.guessed)
@@ -285,7 +292,10 @@ def _signals(
 def _bare_controllers(odr: OpenDrive, net: Net) -> Iterator[ReportEntry]:
     """Junctions that stay without lights because their controllers name no signal of the file."""
     lit = {
-        name for one in net.junctions if one.type == "traffic_light" for name in one.xodr.split()
+        name
+        for junction in net.junctions
+        if junction.type == "traffic_light"
+        for name in junction.xodr.split()
     }
     for junction in odr.junctions.values():
         bare = [key for key in junction.controllers if not odr.controllers[key].controls]

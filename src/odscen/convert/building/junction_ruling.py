@@ -104,7 +104,7 @@ def major_edges(movements: Sequence[Movement], cars: Sequence[bool]) -> frozense
     cars
         Whether each movement is open to cars.
     """
-    approaches = _approaches(movements, cars)
+    approaches = _group_approaches(movements, cars)
     pairs = [
         (one, other)
         for one, other in combinations(approaches, 2)
@@ -112,9 +112,14 @@ def major_edges(movements: Sequence[Movement], cars: Sequence[bool]) -> frozense
     ]
     if not pairs or all(_same_road(one, other) for one, other in combinations(approaches, 2)):
         return frozenset()
-    best = max(pairs, key=_standing)
+    best = max(pairs, key=_rank_of_pair)
     return frozenset(
-        {one.edge for one in approaches for main in best if _beside(one, main)}
+        {
+            approach.edge
+            for approach in approaches
+            for main in best
+            if _heads_alongside(approach, main)
+        }
         | {
             movement.source[0]
             for movement in movements
@@ -130,16 +135,18 @@ def stands_out(movements: Sequence[Movement], cars: Sequence[bool]) -> bool:
     It does in junctions so large that equal right for all would lock them, and where one road is
     faster than the others.
     """
-    approaches = _approaches(movements, cars)
+    approaches = _group_approaches(movements, cars)
     major = major_edges(movements, cars)
-    slowest = min((one.speed for one in approaches if one.edge in major), default=0.0)
-    others = [one.speed for one in approaches if one.edge not in major]
-    return any(one.lanes >= LARGE_LANES for one in approaches) or (
+    slowest = min(
+        (approach.speed for approach in approaches if approach.edge in major), default=0.0
+    )
+    others = [approach.speed for approach in approaches if approach.edge not in major]
+    return any(approach.lanes >= LARGE_LANES for approach in approaches) or (
         bool(others) and slowest - max(others) > FASTER
     )
 
 
-def _approaches(movements: Sequence[Movement], cars: Sequence[bool]) -> list[_Approach]:
+def _group_approaches(movements: Sequence[Movement], cars: Sequence[bool]) -> list[_Approach]:
     lanes: dict[str, set[int]] = {}
     first: dict[str, Movement] = {}
     for movement, car in zip(movements, cars, strict=True):
@@ -153,17 +160,17 @@ def _approaches(movements: Sequence[Movement], cars: Sequence[bool]) -> list[_Ap
     ]
 
 
-def _standing(pair: tuple[_Approach, _Approach]) -> tuple[float, int, float]:
+def _rank_of_pair(pair: tuple[_Approach, _Approach]) -> tuple[float, int, float]:
     one, other = pair
     straightness = round(abs(wrapped(other.heading - one.heading)), 2)
     return one.speed + other.speed, one.lanes + other.lanes, straightness
 
 
 def _same_road(one: _Approach, other: _Approach) -> bool:
-    return _beside(one, other) or abs(wrapped(other.heading - one.heading)) > OPPOSING
+    return _heads_alongside(one, other) or abs(wrapped(other.heading - one.heading)) > OPPOSING
 
 
-def _beside(one: _Approach, other: _Approach) -> bool:
+def _heads_alongside(one: _Approach, other: _Approach) -> bool:
     return abs(wrapped(other.heading - one.heading)) < BESIDE
 
 
@@ -225,7 +232,7 @@ def signposts(ruling: Ruling, rows: Mapping[int, int]) -> list[tuple[str, float 
             posts.append(("Z", None))
             continue
         sight = sight_before(movement, right, ruling.movements, room=n in ruling.yielding)
-        posts.append((_state(ruling, movement, right, lit=n in rows), sight))
+        posts.append((_right_of_way_letter(ruling, movement, right, lit=n in rows), sight))
     return posts
 
 
@@ -244,7 +251,7 @@ def junction_kind(ruling: Ruling) -> str:
     return "right_before_left" if ruling.equal else "priority"
 
 
-def _state(ruling: Ruling, movement: Movement, right: Request, *, lit: bool) -> str:
+def _right_of_way_letter(ruling: Ruling, movement: Movement, right: Request, *, lit: bool) -> str:
     """SUMO's letter for the right of way of a movement."""
     if lit:
         # Persons are waited for whatever the letter; it says whether vehicles are.

@@ -87,7 +87,7 @@ def bent_aside(movement: Movement) -> float:
     places = np.arange(0.0, along[-1], _STEP)
     xy = np.column_stack([np.interp(places, along, path[:, k]) for k in (0, 1)])
     body = round(BUS_LENGTH / _STEP)
-    deepest = max(_sagitta(xy[n : n + body + 1]) for n in range(len(xy) - body))
+    deepest = max(_arc_height(xy[n : n + body + 1]) for n in range(len(xy) - body))
     return deepest if deepest >= LEAST_BENT else 0.0
 
 
@@ -99,7 +99,7 @@ def _with_ends(path: FloatArray) -> FloatArray:
     return np.vstack([before, path, behind])
 
 
-def _sagitta(arc: FloatArray) -> float:
+def _arc_height(arc: FloatArray) -> float:
     """Metres to which an arc ``(K, 2)`` leaves its chord."""
     chord = arc[-1] - arc[0]
     offset = arc - arc[0]
@@ -160,12 +160,12 @@ def waiting_places(
             continue
         line = lines[number]
         places = [
-            lines[n].buffer(_clear(movement, movements[n]))
+            lines[n].buffer(_clearance_between(movement, movements[n]))
             if n < len(movements)
             else areas[n - len(movements)]
             for n in sorted(before)
         ]
-        ways = [_reached(line, place) for place in places]
+        ways = [_metres_to_place(line, place) for place in places]
         if lit:
             crossings = [n >= len(movements) for n in sorted(before)]
             ways = [
@@ -179,7 +179,7 @@ def waiting_places(
     return found
 
 
-def _clear(one: Movement, other: Movement) -> float:
+def _clearance_between(one: Movement, other: Movement) -> float:
     """Metres between paths at which even a lorry that waits is not in the way of a bus."""
     apart = max(MOST_WIDTH, min(WIDEST, 0.9 * min(one.width, other.width)))
     return apart + bent_aside(other)
@@ -189,7 +189,7 @@ def _comes_towards(one: Movement, other: Movement) -> bool:
     return abs(wrapped(other.heading_in - one.heading_in)) > OPPOSING
 
 
-def _reached(line: shapely.LineString, place: shapely.Geometry) -> float:
+def _metres_to_place(line: shapely.LineString, place: shapely.Geometry) -> float:
     """Metres along a line to where it first is in a place."""
     shared = line.intersection(place)
     if shared.is_empty:
@@ -315,11 +315,13 @@ def build_junction(
     """
     signalled = any(passage.lights for passage in passages)
     if signalled:
-        passages = _obeying(passages)
+        passages = _obey_approach_signals(passages)
     cars = ["passenger" in passage.allowed for passage in passages]
     walkways = [crossing.walkway for crossing in crossings]
     ruling = ruled(
-        _signed(passages) if signalled else [passage.movement for passage in passages],
+        _mark_unsignalled_yield(passages)
+        if signalled
+        else [passage.movement for passage in passages],
         walkways,
         cars,
         high_low=around.high_low,
@@ -337,9 +339,9 @@ def build_junction(
     )
     light, rows = None, dict[int, int]()
     if signalled:
-        light, rows = _light(name, passages, ruling, crossings, around, places.keys())
+        light, rows = _build_light(name, passages, ruling, crossings, around, places.keys())
     inside = _Inside(name, passages, signposts(ruling, rows), rows, places)
-    walked, walk_links = _crossings(name, passages, crossings, conflicts, rows, len(passages))
+    walked, walk_links = _build_crossings(name, passages, crossings, conflicts, rows, len(passages))
     starts = [lane_id(crossing.start) for crossing in crossings]
     last = [inside.beyond[n][0] if n in places else lane for n, lane in enumerate(inside.lanes)]
     junction = NetJunction(
@@ -347,7 +349,7 @@ def build_junction(
         junction_kind(ruling) if passages or crossings else "dead_end",
         around.place,
         around.outline,
-        tuple(dict.fromkeys((*_sources(passages), *around.incoming, *starts))),
+        tuple(dict.fromkeys((*_source_lanes(passages), *around.incoming, *starts))),
         (*(lane.id for lane in last), *(edge.lanes[0].id for edge in walked)),
         tuple(replace(right, waits_inside=n in places) for n, right in enumerate(rights)),
         around.xodr,
@@ -365,7 +367,7 @@ def build_junction(
     )
 
 
-def _signed(passages: Sequence[Passage]) -> list[Movement]:
+def _mark_unsignalled_yield(passages: Sequence[Passage]) -> list[Movement]:
     """Movements where there are lights: those that none controls give way."""
     return [
         p.movement if p.lights else replace(p.movement, sign=max(p.movement.sign, Sign.YIELD))
@@ -373,11 +375,11 @@ def _signed(passages: Sequence[Passage]) -> list[Movement]:
     ]
 
 
-def _sources(passages: Sequence[Passage]) -> list[SumoLaneId]:
+def _source_lanes(passages: Sequence[Passage]) -> list[SumoLaneId]:
     return [lane_id(*passage.movement.source) for passage in passages]
 
 
-def _obeying(passages: Sequence[Passage]) -> list[Passage]:
+def _obey_approach_signals(passages: Sequence[Passage]) -> list[Passage]:
     """Let passages without a signal obey those of the lane, or else edge, that they come from."""
     result: list[Passage] = []
     for passage in passages:
@@ -416,14 +418,14 @@ class _Inside:
                 before, after = divided_shape(passage.movement.shape, places[number])
                 rest = internal_edge_id(name, free)
                 free += 1
-                second = _shaped(_inner_lane(rest, passage), after)
-                parts = [(edge, _shaped(first, before)), (rest, second)]
+                second = _with_shape(_inner_lane(rest, passage), after)
+                parts = [(edge, _with_shape(first, before)), (rest, second)]
                 self.beyond[number] = second, places[number]
             self.lanes.append(parts[0][1])
             light = (name, rows[number]) if number in rows else ("", -1)
-            self._connect(passage, state, light, parts)
+            self._connect_passage(passage, state, light, parts)
 
-    def _connect(
+    def _connect_passage(
         self,
         passage: Passage,
         right: tuple[str, float | None],
@@ -460,11 +462,11 @@ def _inner_lane(edge: SumoEdgeId, passage: Passage) -> NetLane:
     )
 
 
-def _shaped(lane: NetLane, shape: FloatArray) -> NetLane:
+def _with_shape(lane: NetLane, shape: FloatArray) -> NetLane:
     return replace(lane, shape=shape, length=round(max(drawn_length(shape), LEAST_LENGTH), 4))
 
 
-def _crossings(
+def _build_crossings(
     name: str,
     passages: Sequence[Passage],
     crossings: Sequence[PlacedCrossing],
@@ -484,7 +486,7 @@ def _crossings(
     return edges, links
 
 
-def _light(
+def _build_light(
     name: str,
     passages: Sequence[Passage],
     ruling: Ruling,

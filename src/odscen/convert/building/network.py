@@ -167,7 +167,7 @@ def find_roundabouts(
     following: dict[int, dict[int, float]] = {}
     for connection, line in zip(connections, connection_lines, strict=True):
         if one_way[connection.source] and one_way[connection.target]:
-            turn = _turned(line)
+            turn = _turned_angle(line)
             known = following.setdefault(connection.source, {})
             target = connection.target
             if target not in known or abs(turn) < abs(known[target]):
@@ -178,14 +178,14 @@ def find_roundabouts(
     for start in sorted(following):
         if start in taken:
             continue
-        roundabout = _around(start, following, lane_lines, wanted)
+        roundabout = _walk_around_edges(start, following, lane_lines, wanted)
         if roundabout and not taken & set(roundabout):
             roundabouts.append(roundabout)
             taken |= set(roundabout)
     return tuple(roundabouts)
 
 
-def _around(
+def _walk_around_edges(
     start: int,
     following: dict[int, dict[int, float]],
     lines: Sequence[Sequence[Line]],
@@ -194,7 +194,7 @@ def _around(
     """The edges round from an edge back to it, inwards at every choice, or nothing."""
     side = math.copysign(1.0, wanted)
     roundabout = [start]
-    turned, length = _turned(lines[start][0]), lines[start][0].length
+    turned, length = _turned_angle(lines[start][0]), lines[start][0].length
     while len(roundabout) <= MOST_EDGES and length <= LONGEST:
         choices = following.get(roundabout[-1], {})
         if not choices:
@@ -207,12 +207,12 @@ def _around(
         if edge in roundabout:
             return ()
         roundabout.append(edge)
-        turned += _turned(lines[edge][0])
+        turned += _turned_angle(lines[edge][0])
         length += lines[edge][0].length
     return ()
 
 
-def _turned(line: Line) -> float:
+def _turned_angle(line: Line) -> float:
     """Change of heading along a line, summed over its vertices, radians."""
     steps = line.shape[1:, :2] - line.shape[:-1, :2]
     headings = [math.atan2(y, x) for x, y in steps.tolist()]
@@ -323,7 +323,7 @@ class _NetworkBuilder:
             start += len(edge.lanes)
         self._connection_lines = lines[start:]
         self._ids = self._edge_ids()
-        self._net_edges = [self._edge(number) for number in range(len(self._edges))]
+        self._net_edges = [self._build_edge(number) for number in range(len(self._edges))]
         self._by_node: dict[str, list[int]] = {}
         for number, connection in enumerate(self._connections):
             self._by_node.setdefault(nodes.ends[connection.source], []).append(number)
@@ -370,7 +370,7 @@ class _NetworkBuilder:
 
     def net(self) -> Net:
         """Assemble everything."""
-        built = [self._junction(name) for name in self._names()]
+        built = [self._build_junction(name) for name in self._node_names()]
         walks = self._walks
         shapes = [lane.shape for edge in self._net_edges for lane in edge.lanes]
         shapes += [walk.line.shape for walk in walks.lanes]
@@ -384,29 +384,29 @@ class _NetworkBuilder:
             links=(*(link for part in built for link in part.links), *walks.links),
             junctions=(*(part.junction for part in built), *self._walk_junctions()),
             lights=tuple(part.light for part in built if part.light),
-            roundabouts=self._roundabouts(),
+            roundabouts=self._find_roundabouts(),
             flat=not points[:, 2].any(),
-            inner_junctions=tuple(one for part in built for one in part.waiting),
+            inner_junctions=tuple(junction for part in built for junction in part.waiting),
         )
 
-    def _names(self) -> list[str]:
+    def _node_names(self) -> list[str]:
         nodes = self._nodes
         return list(dict.fromkeys((*nodes.starts, *nodes.ends, *nodes.crosswalks)))
 
     # Junctions
 
-    def _junction(self, name: str) -> BuiltJunction:
+    def _build_junction(self, name: str) -> BuiltJunction:
         numbers = sorted(self._by_node.get(name, ()), key=lambda n: self._connections[n][:4])
         crossings = self._walks.crossings.get(name, ())
-        passages = [self._passage(number) for number in numbers]
-        built = build_junction(name, passages, crossings, self._around(name))
+        passages = [self._build_passage(number) for number in numbers]
+        built = build_junction(name, passages, crossings, self._find_surroundings(name))
         for position, (number, lane) in enumerate(zip(numbers, built.lanes, strict=True)):
             self._via[number] = lane
             if position in built.beyond:
                 self._beyond[number] = built.beyond[position]
         return built
 
-    def _around(self, name: str) -> Surroundings:
+    def _find_surroundings(self, name: str) -> Surroundings:
         starts, ends = self._starting.get(name, []), self._ending.get(name, [])
         lanes = [
             (lane.shape, lane.width, is_end)
@@ -436,7 +436,7 @@ class _NetworkBuilder:
             " ".join(junctions),
         )
 
-    def _passage(self, number: int) -> Passage:
+    def _build_passage(self, number: int) -> Passage:
         connection, line = self._connections[number], self._connection_lines[number]
         source = self._net_edges[connection.source].lanes[connection.source_lane]
         target = self._net_edges[connection.target].lanes[connection.target_lane]
@@ -461,14 +461,16 @@ class _NetworkBuilder:
         return Passage(
             movement,
             line.length,
-            self._speed(connection, line, movement.turn, around=min(source.speed, target.speed)),
+            self._internal_speed(
+                connection, line, movement.turn, around=min(source.speed, target.speed)
+            ),
             shared_classes(self._odr, self._table, self._edges, connection),
             source.type,
-            self._origins(connection.alignment),
+            self._origin_lanes(connection.alignment),
             self.control.lights[number],
         )
 
-    def _speed(
+    def _internal_speed(
         self, connection: PlannedConnection, line: Line, turn: float, *, around: float
     ) -> float:
         """Speed of an internal lane: what the map says, or else the slower road; less in curves."""
@@ -484,11 +486,11 @@ class _NetworkBuilder:
         speed = min(own) if own else around
         sharp = abs(turn) - EASED
         if sharp > 0.0:
-            radius = self._turning(connection, line) / sharp + line.widths[1] / 4.0
+            radius = self._turning_length(connection, line) / sharp + line.widths[1] / 4.0
             speed = min(speed, math.sqrt(SIDEWAYS * radius))
         return round(max(speed, LEAST_TURN_SPEED), 2)
 
-    def _turning(self, connection: PlannedConnection, line: Line) -> float:
+    def _turning_length(self, connection: PlannedConnection, line: Line) -> float:
         """Metres of a turn: those on connecting roads, without what crosswalks took from others."""
         roads = [self._table.road_ids[self._table.lane_road[s.row]] for s in connection.alignment]
         inside = [
@@ -508,7 +510,7 @@ class _NetworkBuilder:
         taken = plain_ids(wanted)
         return [SumoEdgeId(taken[name]) for name in wanted]
 
-    def _edge(self, number: int) -> NetEdge:
+    def _build_edge(self, number: int) -> NetEdge:
         plan, lines = self._edges[number], self._lane_lines[number]
         length = max(float(np.mean([line.length for line in lines])), LEAST_LENGTH)
         edge = self._ids[number]
@@ -524,7 +526,7 @@ class _NetworkBuilder:
                 lane.type,
                 lane.change_left,
                 lane.change_right,
-                self._origins(lane.alignment),
+                self._origin_lanes(lane.alignment),
             )
             for index, (lane, line) in enumerate(zip(plan.lanes, lines, strict=True))
         )
@@ -532,11 +534,11 @@ class _NetworkBuilder:
         start, end = self._nodes.starts[number], self._nodes.ends[number]
         return NetEdge(edge, NORMAL, lanes, start, end, road.name)
 
-    def _origins(self, alignment: LaneAlignment) -> tuple[str, ...]:
+    def _origin_lanes(self, alignment: LaneAlignment) -> tuple[str, ...]:
         keys = [self._table.lane_keys[stretch.row] for stretch in alignment]
         return tuple(dict.fromkeys(f"{key.road}_{key.lane}" for key in keys))
 
-    def _roundabouts(self) -> tuple[tuple[tuple[str, ...], tuple[SumoEdgeId, ...]], ...]:
+    def _find_roundabouts(self) -> tuple[tuple[tuple[str, ...], tuple[SumoEdgeId, ...]], ...]:
         return tuple(
             (
                 tuple(dict.fromkeys(self._nodes.ends[edge] for edge in roundabout)),

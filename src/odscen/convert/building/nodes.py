@@ -61,17 +61,17 @@ def find_nodes(
     sides: Sequence[SideLink] = (),
 ) -> Nodes:
     """Join the ends of edges: those of one OpenDRIVE junction, and those that connections join."""
-    groups = _joined(odr, gaps)
+    groups = _join_road_ends(odr, gaps)
     for side in sides:
         main = odr.roads[side.main.road]
         junction = odr.roads[side.other.road].junction
         for gap in gaps[main.id]:
             if gap.start <= side.s <= gap.end:
-                join_groups(groups, ("junction", junction), _port(main, gap.start))
+                join_groups(groups, ("junction", junction), _port_at(main, gap.start))
     walked = [_join_crosswalk(odr, groups, gaps, n, c) for n, c in enumerate(crosswalks)]
     roads = [odr.roads[table.road_ids[edge.road]] for edge in found.edges]
-    heads = [_port(road, edge.end) for road, edge in zip(roads, found.edges, strict=True)]
-    tails = [_port(road, edge.start) for road, edge in zip(roads, found.edges, strict=True)]
+    heads = [_port_at(road, edge.end) for road, edge in zip(roads, found.edges, strict=True)]
+    tails = [_port_at(road, edge.start) for road, edge in zip(roads, found.edges, strict=True)]
     for connection in found.connections:
         join_groups(groups, heads[connection.source], tails[connection.target])
         for stretch in connection.alignment:
@@ -80,11 +80,11 @@ def find_nodes(
                 join_groups(groups, ("junction", junction_of), heads[connection.source])
     first = first_members(groups)
     ports = [first.get(port, port) for port in (*tails, *heads, *walked)]
-    names = plain_ids(_name(port) for port in dict.fromkeys(ports))
-    own_names = [names[_name(port)] for port in ports]
+    names = plain_ids(_name_node(port) for port in dict.fromkeys(ports))
+    own_names = [names[_name_node(port)] for port in ports]
     xodr: dict[str, list[JunctionId]] = {}
     for junction in odr.junctions:
-        root = _name(first[("junction", junction)])
+        root = _name_node(first[("junction", junction)])
         if root in names:
             xodr.setdefault(names[root], []).append(junction)
     count = len(found.edges)
@@ -96,7 +96,9 @@ def find_nodes(
     )
 
 
-def _joined(odr: OpenDrive, gaps: Mapping[RoadId, Sequence[RoadGap]]) -> DisjointSet[NodeKey]:
+def _join_road_ends(
+    odr: OpenDrive, gaps: Mapping[RoadId, Sequence[RoadGap]]
+) -> DisjointSet[NodeKey]:
     """Ends of roads joined as the roads' links say, and over crosswalks."""
     groups: DisjointSet[NodeKey] = DisjointSet()
     for junction in odr.junctions:
@@ -105,7 +107,7 @@ def _joined(odr: OpenDrive, gaps: Mapping[RoadId, Sequence[RoadGap]]) -> Disjoin
         for end, link in (("start", road.predecessor), ("end", road.successor)):
             _join_link(odr, groups, road, end, link)
         for gap in gaps.get(road.id, ()):
-            join_groups(groups, _port(road, gap.start), _port(road, gap.end))
+            join_groups(groups, _port_at(road, gap.start), _port_at(road, gap.end))
     return groups
 
 
@@ -123,11 +125,11 @@ def _join_crosswalk(
     for road_id, s in placed.roads:
         for gap in gaps[road_id]:
             if gap.start <= s <= gap.end:
-                join_groups(groups, _port(odr.roads[road_id], gap.start), own)
+                join_groups(groups, _port_at(odr.roads[road_id], gap.start), own)
     return own
 
 
-def _name(port: NodeKey) -> str:
+def _name_node(port: NodeKey) -> str:
     """What a node is called: after its junction, or after the end of a road."""
     kind, *rest = port
     if kind == "junction":
@@ -158,7 +160,7 @@ def _join_link(
         join_groups(groups, here, ("road", other.id, link.contact_point))
 
 
-def _port(road: Road, s: float) -> NodeKey:
+def _port_at(road: Road, s: float) -> NodeKey:
     if s <= LEAST_EDGE:
         return ("road", road.id, "start")
     if s >= road.length - LEAST_EDGE:

@@ -285,8 +285,10 @@ class _TableBuilder:
         }
 
     def build(self) -> LaneTable:
-        normal = self._normal()
-        finished = (_finished(found) for found in [*normal, *self._internal(normal)])
+        normal = self._map_normal_lanes()
+        finished = (
+            _finish_interval(found) for found in [*normal, *self._map_internal_lanes(normal)]
+        )
         intervals = tuple(found for found in finished if found is not None)
         net = self._net
         lanes = {
@@ -321,10 +323,10 @@ class _TableBuilder:
             lefthand=net.lefthand,
             counts=net.counts(),
             elevation=any(bool(lane.shape[:, 2].any()) for lane in self._lanes),
-            lights=self._lights(intervals),
+            lights=self._find_lights(intervals),
         )
 
-    def _normal(self) -> list[MappingInterval]:
+    def _map_normal_lanes(self) -> list[MappingInterval]:
         """Intervals of lanes outside junctions, kind by kind."""
         kinds = np.array(
             [
@@ -353,10 +355,10 @@ class _TableBuilder:
             made = intervals_of(
                 places, matched, chosen, self._roads, sumo_rows=rows, lengths=lengths
             )
-            found += [one._replace(lane=int(eligible[one.lane])) for one in made]
+            found += [interval._replace(lane=int(eligible[interval.lane])) for interval in made]
         return found
 
-    def _internal(self, normal: Sequence[MappingInterval]) -> list[MappingInterval]:
+    def _map_internal_lanes(self, normal: Sequence[MappingInterval]) -> list[MappingInterval]:
         """Intervals of lanes inside junctions, with measured deviations."""
         firsts: dict[int, MappingInterval] = {}
         lasts: dict[int, MappingInterval] = {}
@@ -365,12 +367,12 @@ class _TableBuilder:
             lasts[interval.sumo] = interval
         found: dict[tuple[int, int, float, float], MappingInterval] = {}
         for chain in chains_of(self._net, self._stubs):
-            for interval in self._chain(chain, firsts, lasts):
+            for interval in self._map_chain(chain, firsts, lasts):
                 key = interval.lane, interval.sumo, float(interval.s[0]), float(interval.s[-1])
                 found.setdefault(key, interval)
-        return self._measured(list(found.values()))
+        return self._measure_intervals(list(found.values()))
 
-    def _chain(
+    def _map_chain(
         self,
         chain: InnerChain,
         firsts: Mapping[int, MappingInterval],
@@ -393,7 +395,7 @@ class _TableBuilder:
         ]
         return chain_intervals(path, via, self._samples, step=STEP)
 
-    def _measured(self, intervals: list[MappingInterval]) -> list[MappingInterval]:
+    def _measure_intervals(self, intervals: list[MappingInterval]) -> list[MappingInterval]:
         """Fill in the distances between the lane centres."""
         if not intervals:
             return []
@@ -417,7 +419,7 @@ class _TableBuilder:
             for interval, part in zip(intervals, parts, strict=True)
         ]
 
-    def _lights(self, intervals: Sequence[MappingInterval]) -> tuple[SumoLight, ...]:
+    def _find_lights(self, intervals: Sequence[MappingInterval]) -> tuple[SumoLight, ...]:
         """Traffic lights with the OpenDRIVE junctions that they are in.
 
         A junction belongs to the light with most of its lanes, so that each has one light.
@@ -450,7 +452,7 @@ class _TableBuilder:
         )
 
 
-def _finished(interval: MappingInterval) -> MappingInterval | None:
+def _finish_interval(interval: MappingInterval) -> MappingInterval | None:
     """Round and thin out the knots of an interval."""
     kept = monotone(
         interval._replace(

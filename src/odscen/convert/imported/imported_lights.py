@@ -69,16 +69,18 @@ def imported_letters(net: ImportedNet) -> dict[str, LightLetters]:
             met.setdefault(light, {}).setdefault(pair, []).append(conflict)
     return {
         light.id: LightLetters(
-            _filled(light, links.get(light.id, {})),
+            _fill_links(light, links.get(light.id, {})),
             tuple(
-                one for _, same in sorted(met.get(light.id, {}).items()) for one in _merged(same)
+                merge_conflict
+                for _, same in sorted(met.get(light.id, {}).items())
+                for merge_conflict in _merge_conflicts(same)
             ),
         )
         for light in net.lights
     }
 
 
-def _filled(light: ImportedLight, links: Mapping[int, LightLink]) -> tuple[LightLink, ...]:
+def _fill_links(light: ImportedLight, links: Mapping[int, LightLink]) -> tuple[LightLink, ...]:
     """Links of all letters of a light."""
     count = len(light.signals)
     if links and max(links) >= count:
@@ -89,7 +91,7 @@ def _filled(light: ImportedLight, links: Mapping[int, LightLink]) -> tuple[Light
     return tuple(links.get(n, _NO_LINK) for n in range(count))
 
 
-def _merged(same: Sequence[LinkConflict]) -> Iterable[LinkConflict]:
+def _merge_conflicts(same: Sequence[LinkConflict]) -> Iterable[LinkConflict]:
     """What holds for two letters, from all that their links say of each other.
 
     Where links of either give way to some of the other, there is one conflict for each way.
@@ -127,15 +129,15 @@ class _Ways:
     def movement(self, link: ImportedLink) -> Movement:
         """Way of vehicles over a connection; the straight line where it has no lane inside."""
         before, after = self.net.lanes[link.source], self.net.lanes[link.target]
-        inside = [lane.shape for lane in self._inside(link)]
-        shape = _thinned(np.concatenate(inside or [before.shape[-1:], after.shape[:1]]))
+        inside = [lane.shape for lane in self._internal_lanes_of(link)]
+        shape = _thin_shape(np.concatenate(inside or [before.shape[-1:], after.shape[:1]]))
         return Movement(
             source=(before.edge, before.index),
             target=(after.edge, after.index),
             shape=shape,
             width=min(before.width, after.width),
-            heading_in=_heading(before.shape, at_end=True),
-            heading_out=_heading(after.shape, at_end=False),
+            heading_in=_heading_of(before.shape, at_end=True),
+            heading_out=_heading_of(after.shape, at_end=False),
             speed=before.speed,
             sign=Sign.NONE,
             in_roundabout=False,
@@ -150,7 +152,7 @@ class _Ways:
         )
         return bicycles and not cars
 
-    def _inside(self, link: ImportedLink) -> Iterable[ImportedLane]:
+    def _internal_lanes_of(self, link: ImportedLink) -> Iterable[ImportedLane]:
         """Internal lanes of a connection, one after the other."""
         seen: set[SumoLaneId] = set()
         lane = link.via
@@ -158,7 +160,9 @@ class _Ways:
             seen.add(lane)
             yield self.net.lanes[lane]
             onwards = self._links_from.get(lane, ())
-            lane = next((one.via for one in onwards if one.target == link.target), SumoLaneId(""))
+            lane = next(
+                (onward.via for onward in onwards if onward.target == link.target), SumoLaneId("")
+            )
 
 
 class _Junction:
@@ -179,12 +183,12 @@ class _Junction:
         row = {n: place for place, n in enumerate(order)}
         self._links = [links[n] for n in order]
         self._count = walking.count(False)
-        self._rights = [_renumbered(requests[n], row) for n in order]
+        self._rights = [_renumber_request(requests[n], row) for n in order]
         self._movements = [ways.movement(link) for link in self._links[: self._count]]
         crossings = [net.lanes[link.target] for link in self._links[self._count :]]
         self._walkways = [Walkway(lane.shape[[0, -1]], lane.width) for lane in crossings]
         self._met = (
-            _met(self._rights, self._count)
+            _conflicts_of_requests(self._rights, self._count)
             if rights.requests
             else find_conflicts(self._movements, self._walkways)
         )
@@ -192,11 +196,11 @@ class _Junction:
     def letters(self) -> Iterable[tuple[str, int, LightLink]]:
         """Lights, places in their states, and what the letter there is for."""
         for n, link in enumerate(self._links):
-            made = self._made(n) if link.light else _NO_LINK
+            made = self._make_link(n) if link.light else _NO_LINK
             for letter in link.letters:
                 yield link.light, letter, made
 
-    def _made(self, n: int) -> LightLink:
+    def _make_link(self, n: int) -> LightLink:
         link = self._links[n]
         if n < self._count:
             return moving_link(self._movements[n])._replace(source=link.source, target=link.target)
@@ -217,7 +221,7 @@ class _Junction:
                     place = {found.one: i, found.other: j}
                     made = found._replace(one=i, other=j, yields=place.get(found.yields, -1))
                     if i != j:
-                        yield one.light, made if i < j else _turned(made)
+                        yield one.light, made if i < j else _turn_conflict(made)
 
     def _light_links(self) -> LightLinks:
         ways, count = self._ways, self._count
@@ -233,7 +237,7 @@ class _Junction:
         )
 
 
-def _met(rights: Sequence[Request], count: int) -> Conflicts:
+def _conflicts_of_requests(rights: Sequence[Request], count: int) -> Conflicts:
     """What meets by the requests of a junction, whose first ``count`` links are for vehicles."""
     foes = [set(right.foes) for right in rights]
     for n, right in enumerate(rights):
@@ -244,14 +248,14 @@ def _met(rights: Sequence[Request], count: int) -> Conflicts:
     return Conflicts(tuple(pairs), frozenset(), tuple(crossed))
 
 
-def _renumbered(request: Request, row: Mapping[int, int]) -> Request:
+def _renumber_request(request: Request, row: Mapping[int, int]) -> Request:
     yields, foes = (
         frozenset(row[n] for n in some if n in row) for some in (request.yields_to, request.foes)
     )
     return Request(yields, foes)
 
 
-def _turned(conflict: LinkConflict) -> LinkConflict:
+def _turn_conflict(conflict: LinkConflict) -> LinkConflict:
     """The same, seen from the other of the two."""
     return conflict._replace(
         one=conflict.other,
@@ -261,15 +265,15 @@ def _turned(conflict: LinkConflict) -> LinkConflict:
     )
 
 
-def _thinned(shape: FloatArray) -> FloatArray:
+def _thin_shape(shape: FloatArray) -> FloatArray:
     """A line without points that lie on the one before; two points at least."""
     steps = np.hypot(*np.diff(shape[:, :2], axis=0).T)
     kept = shape[np.concatenate([[True], steps > _POINT])]
     return kept if len(kept) > 1 else shape[[0, -1]]
 
 
-def _heading(shape: FloatArray, *, at_end: bool) -> float:
+def _heading_of(shape: FloatArray, *, at_end: bool) -> float:
     """Direction of a lane at its end or start, radians."""
-    line = _thinned(shape)
+    line = _thin_shape(shape)
     step = (line[-1] - line[-2]) if at_end else (line[1] - line[0])
     return math.atan2(step[1], step[0])

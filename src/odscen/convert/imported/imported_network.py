@@ -46,10 +46,10 @@ def import_findings(
     lengths = lane_lengths(odr, table, lanes)
     entries = (
         *kept_lanes(lengths),
-        *_lanes(odr, table, lanes),
-        *_connections(fidelity),
-        *_crossings(lanes, fidelity),
-        *_lights(lanes, fidelity),
+        *_find_lane_entries(odr, table, lanes),
+        *_find_connection_entries(fidelity),
+        *_find_crossing_entries(lanes, fidelity),
+        *_find_light_entries(lanes, fidelity),
     )
     figures = {
         **lengths,
@@ -76,11 +76,11 @@ def unread_signs(odr: OpenDrive) -> Iterator[ReportEntry]:
                 yield ReportEntry(ElementOutcome.LOST, element, reason)
 
 
-def _place(road: str, section: int, lane: int) -> str:
+def _describe_place(road: str, section: int, lane: int) -> str:
     return f"road {road} > laneSection {section} > lane {lane}"
 
 
-def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
+def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
     """Lanes without a SUMO lane, and lanes that it lies beside."""
     covered = covered_metres(lanes)
     worst: dict[object, float] = {}
@@ -98,26 +98,26 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
         gap = length - covered.get(key, 0.0)
         if gap > (AREA if walk and gap < length else WORTH_TELLING):
             reason = f"{gap:.2f} of {length:.2f} m have no SUMO lane"
-            yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
+            yield ReportEntry(ElementOutcome.LOST, _describe_place(*key), reason)
         elif worst.get(key, 0.0) > NEAR:
             reason = f"SUMO's lane lies up to {worst[key]:.2f} m beside the lane's centre"
-            yield ReportEntry(ElementOutcome.GUESSED, _place(*key), reason)
+            yield ReportEntry(ElementOutcome.GUESSED, _describe_place(*key), reason)
 
 
-def _connections(fidelity: Fidelity) -> Iterator[ReportEntry]:
+def _find_connection_entries(fidelity: Fidelity) -> Iterator[ReportEntry]:
     kept = fidelity.relations - len(fidelity.missing)
     if kept:
         reason = f"{kept} of {fidelity.relations} relations between lanes of roads"
         yield ReportEntry(ElementOutcome.KEPT, "map", reason)
-    for one in fidelity.missing:
-        reason = f"no connection to lane {one.target} in SUMO"
-        yield ReportEntry(ElementOutcome.LOST, f"lane {one.source}", reason)
-    for one in fidelity.invented:
-        reason = f"SUMO connects it to lane {one.target} ({one.sumo}), the map does not"
-        yield ReportEntry(ElementOutcome.GUESSED, f"lane {one.source}", reason)
+    for relation in fidelity.missing:
+        reason = f"no connection to lane {relation.target} in SUMO"
+        yield ReportEntry(ElementOutcome.LOST, f"lane {relation.source}", reason)
+    for relation in fidelity.invented:
+        reason = f"SUMO connects it to lane {relation.target} ({relation.sumo}), the map does not"
+        yield ReportEntry(ElementOutcome.GUESSED, f"lane {relation.source}", reason)
 
 
-def _crossings(lanes: LaneTable, fidelity: Fidelity) -> Iterator[ReportEntry]:
+def _find_crossing_entries(lanes: LaneTable, fidelity: Fidelity) -> Iterator[ReportEntry]:
     for lost in fidelity.lost_crosswalks:
         element = f"road {lost.road} > object {lost.object_id}"
         reason = f"crosswalk: crossings of the network lie on {100 * lost.share:.0f} % of it"
@@ -132,7 +132,7 @@ def _crossings(lanes: LaneTable, fidelity: Fidelity) -> Iterator[ReportEntry]:
         yield ReportEntry(ElementOutcome.GUESSED, "map", reason)
 
 
-def _lights(lanes: LaneTable, fidelity: Fidelity) -> Iterator[ReportEntry]:
+def _find_light_entries(lanes: LaneTable, fidelity: Fidelity) -> Iterator[ReportEntry]:
     signals = fidelity.signals
     for junction in signals.lost:
         reason = "its traffic lights are not in the network"

@@ -30,13 +30,13 @@ MOST_SAMPLES = 300_000
 """Maps with more than 300 km of lanes are sampled less densely, and so are absurd ones."""
 
 
-def _counts(lengths: FloatArray, step: float) -> IntArray:
+def _count_samples(lengths: FloatArray, step: float) -> IntArray:
     """Count samples per line, both ends included."""
     step = max(step, float(lengths.sum()) / MOST_SAMPLES)
     return np.maximum(1, np.ceil(lengths / step - 1e-9)).astype(np.int64) + 1
 
 
-def _fractions(counts: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+def _sample_fractions(counts: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
     """First sample of each line (one more at the end), line of each sample, share from 0 to 1."""
     first = np.concatenate(([0], np.cumsum(counts))).astype(np.int64)
     owner = np.repeat(np.arange(len(counts)), counts)
@@ -86,7 +86,7 @@ class LaneSamples:
         roadside = np.zeros(len(rows), dtype=np.bool_) if roadside is None else roadside
         start = np.where(table.lane_forward[rows], table.lane_s0[rows], table.lane_s1[rows])
         end = np.where(table.lane_forward[rows], table.lane_s1[rows], table.lane_s0[rows])
-        first, owner, share = _fractions(_counts(np.abs(end - start), step))
+        first, owner, share = _sample_fractions(_count_samples(np.abs(end - start), step))
         s = start[owner] + share * (end - start)[owner]
         xyz, hdg = middle_points(table, rows[owner], s, roadside=roadside[owner])
         gaps = np.zeros(len(s))
@@ -100,7 +100,7 @@ class LaneSamples:
     def chosen(self, lanes: IntArray) -> LaneSamples:
         """Keep only lanes ``lanes`` (positions in ``rows``)."""
         counts = np.diff(self.first)[lanes]
-        first, owner, _ = _fractions(counts)
+        first, owner, _ = _sample_fractions(counts)
         samples = self.first[lanes][owner] + np.arange(first[-1]) - first[owner]
         return LaneSamples(
             self.rows[lanes],
@@ -171,7 +171,7 @@ class ShapeSamples(NamedTuple):
 def sample_shapes(shapes: Sequence[FloatArray], *, step: float = STEP) -> ShapeSamples:
     """Sample polylines of shape ``(K, 3)`` about every ``step`` metres, ends included."""
     line = SampledLines.of(shapes)
-    first, owner, share = _fractions(_counts(line.length, step))
+    first, owner, share = _sample_fractions(_count_samples(line.length, step))
     arc = share * line.length[owner]
     xyz, hdg = line.at(owner, arc)
     return ShapeSamples(first, owner, arc, xyz, hdg, line.length)
@@ -264,14 +264,14 @@ def match(
     owner = lanes.owner[base]
     rows = lanes.rows[owner]
     rate = _s_per_metre(lanes)[base]
-    s = lanes.s[base] + _along(places.xyz, lanes.xyz[base], lanes.hdg[base]) * rate
+    s = lanes.s[base] + _distance_along(places.xyz, lanes.xyz[base], lanes.hdg[base]) * rate
     low, high = table.lane_s0[rows], table.lane_s1[rows]
     deviation = np.zeros(count)
     for _ in range(2):
         s = np.clip(s, low, high)
         xyz, hdg = middle_points(table, rows, s, roadside=lanes.roadside[owner])
         hdg = hdg + np.where(table.lane_forward[rows], 0.0, np.pi)
-        ahead = _along(places.xyz, xyz, hdg)
+        ahead = _distance_along(places.xyz, xyz, hdg)
         delta = places.xyz - xyz
         deviation = np.hypot(delta[:, 0], delta[:, 1])
         s = s + ahead * rate
@@ -299,12 +299,12 @@ class _NearestLane:
     def nearest(self, xyz: FloatArray, hdg: FloatArray) -> IntArray:
         """Index of the best sample for each place, -1 for none."""
         found = [
-            self._some(xyz[start : start + _AT_ONCE], hdg[start : start + _AT_ONCE])
+            self._nearest_of_some(xyz[start : start + _AT_ONCE], hdg[start : start + _AT_ONCE])
             for start in range(0, len(xyz), _AT_ONCE)
         ]
         return np.concatenate(found)
 
-    def _some(self, xyz: FloatArray, hdg: FloatArray) -> IntArray:
+    def _nearest_of_some(self, xyz: FloatArray, hdg: FloatArray) -> IntArray:
         lanes = self._lanes
         neighbours = min(NEIGHBOURS, len(lanes.owner))
         _, index = self._tree.query(
@@ -316,7 +316,7 @@ class _NearestLane:
         delta = xyz[:, None, :] - lanes.xyz[index]
         cos, sin = np.cos(lanes.hdg[index]), np.sin(lanes.hdg[index])
         across = np.abs(delta[..., 1] * cos - delta[..., 0] * sin)
-        beyond = self._beyond(delta[..., 0] * cos + delta[..., 1] * sin, index)
+        beyond = self._metres_beyond_ends(delta[..., 0] * cos + delta[..., 1] * sin, index)
         agree = np.cos(hdg[:, None] - lanes.hdg[index])
         if self._either_way:
             agree = np.abs(agree)
@@ -326,7 +326,7 @@ class _NearestLane:
         rows = np.arange(len(best))
         return np.where(np.isfinite(cost[rows, best]), index[rows, best], -1)
 
-    def _beyond(self, along: FloatArray, index: IntArray) -> FloatArray:
+    def _metres_beyond_ends(self, along: FloatArray, index: IntArray) -> FloatArray:
         """Metres that places, ``along`` metres ahead of samples, lie past the ends of the lane."""
         outside = (self._last[index] & (along > 0.0)) | (self._first[index] & (along < 0.0))
         # Elsewhere a sample half a step further on is nearer; a little more allows for curves.
@@ -335,7 +335,7 @@ class _NearestLane:
         return np.maximum(past, 0.0)
 
 
-def _along(places: FloatArray, origin: FloatArray, hdg: FloatArray) -> FloatArray:
+def _distance_along(places: FloatArray, origin: FloatArray, hdg: FloatArray) -> FloatArray:
     delta = places - origin
     along: FloatArray = delta[:, 0] * np.cos(hdg) + delta[:, 1] * np.sin(hdg)
     return along
@@ -375,15 +375,15 @@ def intervals_of(
     for shape, row in enumerate(sumo_rows):
         part = slice(int(places.first[shape]), int(places.first[shape + 1]))
         pos = np.minimum(places.arc[part] * scale[shape], lengths[shape])
-        runs = _runs(found.lane[part])
+        runs = _find_lane_runs(found.lane[part])
         own = [
             _LaneRun(lane, pos[a:b], found.s[part][a:b], found.deviation[part][a:b])
             for lane, a, b in runs
         ]
-        own = _without_tips(_meeting(own, lanes, table), lanes)
+        own = _without_tips(_extend_runs_to_ends(own, lanes, table), lanes)
         for run in own:
             interval = MappingInterval(run.lane, int(row), run.pos, run.s, run.deviation)
-            kept = monotone(interval, growing=_growing(run, lanes, table))
+            kept = monotone(interval, growing=_s_grows_along(run, lanes, table))
             if kept is not None:
                 intervals.append(kept)
     return intervals
@@ -396,7 +396,7 @@ class _LaneRun(NamedTuple):
     deviation: FloatArray
 
 
-def _runs(lane: IntArray) -> list[tuple[int, int, int]]:
+def _find_lane_runs(lane: IntArray) -> list[tuple[int, int, int]]:
     """Stretches of equal, found lanes as (lane, first, end), short strays removed."""
     cuts = np.flatnonzero(np.diff(lane)) + 1
     bounds = [0, *cuts.tolist(), len(lane)]
@@ -416,7 +416,9 @@ def _runs(lane: IntArray) -> list[tuple[int, int, int]]:
     return kept
 
 
-def _meeting(runs: list[_LaneRun], lanes: LaneSamples, table: RoadTable) -> list[_LaneRun]:
+def _extend_runs_to_ends(
+    runs: list[_LaneRun], lanes: LaneSamples, table: RoadTable
+) -> list[_LaneRun]:
     """Extend consecutive runs to the ends of their lanes, where the next one begins.
 
     Between the last sample on one lane and the first on the next lie the end of the one and the
@@ -425,8 +427,8 @@ def _meeting(runs: list[_LaneRun], lanes: LaneSamples, table: RoadTable) -> list
     made = list(runs)
     for i in range(len(made) - 1):
         one, two = made[i], made[i + 1]
-        _, exit_s = _ends(one, lanes, table)
-        entry_s, _ = _ends(two, lanes, table)
+        _, exit_s = _run_ends(one, lanes, table)
+        entry_s, _ = _run_ends(two, lanes, table)
         rest, start = abs(exit_s - one.s[-1]), abs(entry_s - two.s[0])
         step = two.pos[0] - one.pos[-1]
         if rest + start > 3.0 * step + 0.5 or step <= 0:
@@ -464,15 +466,15 @@ def _without_tips(runs: list[_LaneRun], lanes: LaneSamples) -> list[_LaneRun]:
     return kept
 
 
-def _growing(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> bool:
+def _s_grows_along(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> bool:
     """Whether s grows along a run; a run of one sample follows the traffic."""
     if len(run.s) > 1 and run.s[-1] != run.s[0]:
         return bool(run.s[-1] > run.s[0])
     return bool(table.lane_forward[lanes.rows[run.lane]])
 
 
-def _ends(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> tuple[float, float]:
+def _run_ends(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> tuple[float, float]:
     """Values of s at which a run would enter and leave its lane."""
     row = int(lanes.rows[run.lane])
     low, high = float(table.lane_s0[row]), float(table.lane_s1[row])
-    return (low, high) if _growing(run, lanes, table) else (high, low)
+    return (low, high) if _s_grows_along(run, lanes, table) else (high, low)

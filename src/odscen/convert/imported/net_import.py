@@ -182,7 +182,7 @@ def read_network(content: bytes) -> ImportedNet:
     if root.find("location") is None:
         raise InputError("the SUMO network cannot be read: <location> is missing")
     try:
-        return _imported(_with_sumolib(root), lefthand=root.get("lefthand") == "true")
+        return _import_net(_with_sumolib(root), lefthand=root.get("lefthand") == "true")
     except (LookupError, ValueError, TypeError, AttributeError) as error:
         raise InputError(
             f"the SUMO network cannot be read: {type(error).__name__}: {error}"
@@ -205,14 +205,14 @@ def _with_sumolib(root: etree._Element) -> Any:
     return reader.getNet()
 
 
-def _imported(net: Any, *, lefthand: bool) -> ImportedNet:
+def _import_net(net: Any, *, lefthand: bool) -> ImportedNet:
     offset = tuple(float(value) for value in net.getLocationOffset())
     x0, y0, x1, y1 = (float(value) for value in net._location["convBoundary"].split(","))
     edges: dict[SumoEdgeId, ImportedEdge] = {}
     lanes: dict[SumoLaneId, ImportedLane] = {}
     permissions: dict[frozenset[str], frozenset[str] | None] = {}
     for edge in net.getEdges(withInternal=True):
-        own = [_lane(edge, lane, offset, permissions) for lane in edge.getLanes()]
+        own = [_import_lane(edge, lane, offset, permissions) for lane in edge.getLanes()]
         lanes |= {lane.id: lane for lane in own}
         function = edge.getFunction() or NORMAL
         ends = ("", "")
@@ -223,7 +223,7 @@ def _imported(net: Any, *, lefthand: bool) -> ImportedNet:
         edges[name] = ImportedEdge(name, function, *ends, tuple(lane.id for lane in own), crossed)
     if not any(edge.function == NORMAL for edge in edges.values()):
         raise ValueError("it has no edges")
-    links = _links(net, lanes)
+    links = _import_links(net, lanes)
     return ImportedNet(
         offset=(offset[0], offset[1]),
         boundary=(x0, y0, x1, y1),
@@ -232,12 +232,14 @@ def _imported(net: Any, *, lefthand: bool) -> ImportedNet:
         lanes=lanes,
         links=links,
         junctions=len(net.getNodes()),
-        lights=tuple(_light(light) for light in net.getTrafficLights() if light.getPrograms()),
-        lit=_lit(net, {link.source for link in links if link.light}),
+        lights=tuple(
+            _import_light(light) for light in net.getTrafficLights() if light.getPrograms()
+        ),
+        lit=_import_rights(net, {link.source for link in links if link.light}),
     )
 
 
-def _lane(
+def _import_lane(
     edge: Any,
     lane: Any,
     offset: Sequence[float],
@@ -254,7 +256,7 @@ def _lane(
         )
     classes = frozenset(lane.getPermissions())
     if classes not in permissions:
-        permissions[classes] = _permitted(classes)
+        permissions[classes] = _permitted_classes(classes)
     return ImportedLane(
         SumoLaneId(lane.getID()),
         SumoEdgeId(edge.getID()),
@@ -267,7 +269,7 @@ def _lane(
     )
 
 
-def _permitted(classes: frozenset[str]) -> frozenset[str] | None:
+def _permitted_classes(classes: frozenset[str]) -> frozenset[str] | None:
     """Vehicle classes of a lane without those that SUMO no longer has; ``None`` for all."""
     from sumolib.net.lane import SUMO_VEHICLE_CLASSES, SUMO_VEHICLE_CLASSES_DEPRECATED
 
@@ -276,7 +278,7 @@ def _permitted(classes: frozenset[str]) -> frozenset[str] | None:
     return classes - frozenset(SUMO_VEHICLE_CLASSES_DEPRECATED)
 
 
-def _links(net: Any, lanes: dict[SumoLaneId, ImportedLane]) -> tuple[ImportedLink, ...]:
+def _import_links(net: Any, lanes: dict[SumoLaneId, ImportedLane]) -> tuple[ImportedLink, ...]:
     """All connections, by lane in the order of the file."""
     found = []
     for edge in net.getEdges(withInternal=True):
@@ -294,7 +296,7 @@ def _links(net: Any, lanes: dict[SumoLaneId, ImportedLane]) -> tuple[ImportedLin
     return tuple(found)
 
 
-def _lit(net: Any, controlled: Container[SumoLaneId]) -> tuple[ImportedRights, ...]:
+def _import_rights(net: Any, controlled: Container[SumoLaneId]) -> tuple[ImportedRights, ...]:
     """Right of way of the junctions that lanes with lights lead to."""
     found = []
     for node in net.getNodes():
@@ -303,17 +305,19 @@ def _lit(net: Any, controlled: Container[SumoLaneId]) -> tuple[ImportedRights, .
             rows = sorted(node._prohibits)
             if rows != list(range(len(rows))):
                 raise ValueError(f"junction {node.getID()} has requests {rows}")
-            requests = (Request(_bits(node._prohibits[n]), _bits(node._foes[n])) for n in rows)
+            requests = (
+                Request(_parse_bits(node._prohibits[n]), _parse_bits(node._foes[n])) for n in rows
+            )
             found.append(ImportedRights(str(node.getID()), incoming, tuple(requests)))
     return tuple(found)
 
 
-def _bits(text: str) -> frozenset[int]:
+def _parse_bits(text: str) -> frozenset[int]:
     """Places of the ones in a row of right of way, counted from its end."""
     return frozenset(n for n, bit in enumerate(reversed(text)) if bit == "1")
 
 
-def _light(light: Any) -> ImportedLight:
+def _import_light(light: Any) -> ImportedLight:
     program = list(light.getPrograms().values())[-1]
     phases = program.getPhases()
     params = program.getParams()
@@ -329,7 +333,7 @@ def _light(light: Any) -> ImportedLight:
                 float(phase.duration),
                 phase.state,
                 name,
-                *_bounds(float(phase.minDur), float(phase.maxDur), float(phase.duration)),
+                *_phase_bounds(float(phase.minDur), float(phase.maxDur), float(phase.duration)),
             )
             for phase, name in zip(phases, names, strict=True)
         ),
@@ -338,7 +342,7 @@ def _light(light: Any) -> ImportedLight:
     )
 
 
-def _bounds(least: float, most: float, duration: float) -> tuple[float, float]:
+def _phase_bounds(least: float, most: float, duration: float) -> tuple[float, float]:
     """Bounds of a phase that vehicles may prolong; 0 and 0 where the file has none."""
     if least < 0.0 and most < 0.0:
         return 0.0, 0.0

@@ -113,14 +113,16 @@ def with_lane_limits(xodr: bytes) -> tuple[bytes, tuple[ReportEntry, ...]]:
 def _limit_lanes(road: etree._Element, entries: list[ReportEntry]) -> bool:
     """Give the lanes of a road its limits; whether it has any."""
     types = [
-        (_number(kind, "s"), next(kind.iterchildren("{*}speed"), None))
+        (_read_number(kind, "s"), next(kind.iterchildren("{*}speed"), None))
         for kind in road.iterchildren("{*}type")
     ]
-    limits = [(s, limit) for s, limit in types if limit is not None and _number(limit, "max") > 0]
+    limits = [
+        (s, limit) for s, limit in types if limit is not None and _read_number(limit, "max") > 0
+    ]
     if not limits:
         return False
     sections = list(road.iter("{*}laneSection"))
-    starts = [_number(section, "s") for section in sections]
+    starts = [_read_number(section, "s") for section in sections]
     for section, start in zip(sections, starts, strict=True):
         here = [limit for s, limit in limits if s <= start + _SAME_S] or [limits[0][1]]
         for lane in section.iter("{*}lane"):
@@ -134,7 +136,7 @@ def _limit_lanes(road: etree._Element, entries: list[ReportEntry]) -> bool:
     return True
 
 
-def _number(element: etree._Element, name: str) -> float:
+def _read_number(element: etree._Element, name: str) -> float:
     try:
         return float(element.get(name, ""))
     except ValueError:

@@ -45,16 +45,16 @@ class NetworkChange(NamedTuple):
 def network_changes(before: NetworkState, after: NetworkState) -> tuple[NetworkChange, ...]:
     """List what one network has and the other has not; lanes and junctions are those of the map."""
     return (
-        *_lanes(before.table, after.table),
-        *_strangers(before.table, after.table),
-        *_connections(before.fidelity, after.fidelity),
-        *_lights(before.table, after.table),
+        *_compare_lanes(before.table, after.table),
+        *_find_strangers(before.table, after.table),
+        *_compare_connections(before.fidelity, after.fidelity),
+        *_compare_lights(before.table, after.table),
     )
 
 
-def _lanes(before: LaneTable, after: LaneTable) -> Iterator[NetworkChange]:
+def _compare_lanes(before: LaneTable, after: LaneTable) -> Iterator[NetworkChange]:
     was, now = covered_metres(before), covered_metres(after)
-    aside_before, aside = _aside(before), _aside(after)
+    aside_before, aside = _mean_distances(before), _mean_distances(after)
     for key in sorted(was.keys() | now.keys(), key=lambda key: (len(key), key)):
         element = f"road {key.road} > laneSection {key.section} > lane {key.lane}"
         element += " > walk beside it" if len(key) > len(("road", "section", "lane")) else ""
@@ -69,7 +69,7 @@ def _lanes(before: LaneTable, after: LaneTable) -> Iterator[NetworkChange]:
             yield NetworkChange("lane aside", element, detail)
 
 
-def _aside(lanes: LaneTable) -> dict[object, float]:
+def _mean_distances(lanes: LaneTable) -> dict[object, float]:
     """Mean distance of the SUMO lanes from each lane, metres."""
     areas: dict[object, float] = defaultdict(float)
     lengths: dict[object, float] = defaultdict(float)
@@ -80,17 +80,17 @@ def _aside(lanes: LaneTable) -> dict[object, float]:
     return {key: area / lengths[key] for key, area in areas.items()}
 
 
-def _strangers(before: LaneTable, after: LaneTable) -> Iterator[NetworkChange]:
+def _find_strangers(before: LaneTable, after: LaneTable) -> Iterator[NetworkChange]:
     """SUMO lanes for vehicles that lie on no lane of the map of their own, and did not before."""
-    known = _unplaced(before)
-    for lane in _unplaced(after):
+    known = _find_unplaced_lanes(before)
+    for lane in _find_unplaced_lanes(after):
         if lane not in known:
             length = after.lanes[lane].length
             detail = f"{length:.1f} m that lie on no lane of the map, or on another SUMO lane"
             yield NetworkChange("SUMO lane new", f"SUMO lane {lane}", detail)
 
 
-def _unplaced(lanes: LaneTable) -> dict[SumoLaneId, None]:
+def _find_unplaced_lanes(lanes: LaneTable) -> dict[SumoLaneId, None]:
     answering = (lanes.intervals[span.interval] for span in lanes.spans)
     placed = {lanes.lane_list[interval.sumo].id for interval in answering}
     return {
@@ -102,48 +102,50 @@ def _unplaced(lanes: LaneTable) -> dict[SumoLaneId, None]:
     }
 
 
-def _connections(before: Fidelity, after: Fidelity) -> Iterator[NetworkChange]:
+def _compare_connections(before: Fidelity, after: Fidelity) -> Iterator[NetworkChange]:
     for what, was, now in (
         ("connection gone", before.missing, after.missing),
         ("connection back", after.missing, before.missing),
         ("connection new", before.invented, after.invented),
     ):
-        known = {_ends(one) for one in was}
+        known = {_connection_ends(one) for one in was}
         for one in now:
-            if _ends(one) not in known:
+            if _connection_ends(one) not in known:
                 element = f"lane {one.source} to lane {one.target}"
                 yield NetworkChange(what, element, f"at {one.x:.1f}, {one.y:.1f}")
 
 
-def _ends(one: LaneRelation) -> tuple[str, str]:
-    return one.source, one.target
+def _connection_ends(lane_relation: LaneRelation) -> tuple[str, str]:
+    return lane_relation.source, lane_relation.target
 
 
-def _lights(before: LaneTable, after: LaneTable) -> Iterator[NetworkChange]:
-    was = {_named(light): light for light in before.lights}
-    now = {_named(light): light for light in after.lights}
+def _compare_lights(before: LaneTable, after: LaneTable) -> Iterator[NetworkChange]:
+    was = {_name_light(light): light for light in before.lights}
+    now = {_name_light(light): light for light in after.lights}
     for name in sorted(was.keys() | now.keys()):
         element = f"traffic light of {name}"
         if name not in now:
             yield NetworkChange("light gone", element, "its connections have no light any more")
         elif name not in was:
-            yield NetworkChange("light new", element, f"stages {_stages(now[name])}")
-        elif _program(was[name]) != _program(now[name]):
-            detail = f"stages {_stages(was[name])} before, {_stages(now[name])} now"
-            if _stages(was[name]) == _stages(now[name]):
-                detail = f"stages {_stages(now[name])} as before, with green for other connections"
+            yield NetworkChange("light new", element, f"stages {_describe_stages(now[name])}")
+        elif _program_of(was[name]) != _program_of(now[name]):
+            detail = (
+                f"stages {_describe_stages(was[name])} before, {_describe_stages(now[name])} now"
+            )
+            if _describe_stages(was[name]) == _describe_stages(now[name]):
+                detail = f"stages {_describe_stages(now[name])} as before, with green for other connections"
             yield NetworkChange("program changed", element, detail)
 
 
-def _program(light: SumoLight) -> tuple[object, ...]:
+def _program_of(light: SumoLight) -> tuple[object, ...]:
     return light.offset, *((phase.duration, phase.state) for phase in light.phases)
 
 
-def _named(light: SumoLight) -> str:
+def _name_light(light: SumoLight) -> str:
     return "junction " + ", ".join(light.junctions) if light.junctions else light.id
 
 
-def _stages(light: SumoLight) -> str:
+def _describe_stages(light: SumoLight) -> str:
     green = ", ".join(f"{phase.duration:g}" for phase in light.phases if phase.is_stage)
     cycle = sum(phase.duration for phase in light.phases)
     return f"{green or 'none'} s of {cycle:g} s (offset {light.offset:g} s)"

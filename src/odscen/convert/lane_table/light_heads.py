@@ -47,7 +47,9 @@ class Heads:
     def states(self, lights: Mapping[str, str]) -> dict[str, str]:
         """State of each signal, from the letters of each SUMO light."""
         return {
-            signal: _shown([lights[light][link] for light, link in links if light in lights])
+            signal: _state_of_letters(
+                [lights[light][link] for light, link in links if light in lights]
+            )
             for signal, links in self._links.items()
         }
 
@@ -58,13 +60,15 @@ class Heads:
         is known are left out; single links of which none is have :data:`UNKNOWN`.
         """
         found = {
-            light: "".join(_letter([states[one] for one in own if one in states]) for own in links)
+            light: "".join(
+                _letter_of_states([states[name] for name in own if name in states]) for own in links
+            )
             for light, links in self._signals.items()
         }
         return {light: letters for light, letters in found.items() if letters.strip(UNKNOWN)}
 
 
-def _letter(states: Sequence[str]) -> str:
+def _letter_of_states(states: Sequence[str]) -> str:
     shown = next((state for state in _FIRST if state in states), None)
     return UNKNOWN if shown is None else _LETTERS[shown]
 
@@ -74,6 +78,6 @@ def letter_state(letter: str) -> str:
     return _STATES.get(letter, "Red")
 
 
-def _shown(letters: Sequence[str]) -> str:
+def _state_of_letters(letters: Sequence[str]) -> str:
     states = {letter_state(letter) for letter in letters}
     return next((state for state in _FIRST if state in states), "Red")

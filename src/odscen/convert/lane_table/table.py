@@ -123,19 +123,19 @@ def answering(intervals: Sequence[MappingInterval], *, least: float = 0.01) -> l
     the one with the smallest mean deviation answers, of equals the first. Remainders shorter than
     ``least`` metres are left out.
     """
-    order = sorted(range(len(intervals)), key=lambda i: (_badness(intervals[i]), i))
+    order = sorted(range(len(intervals)), key=lambda i: (_mean_deviation(intervals[i]), i))
     spans: dict[int, list[Span]] = {}
     for i in order:
         low, high = intervals[i].span
         lane = intervals[i].lane
         taken = spans.setdefault(lane, [])
-        free = _without(low, high, taken)
+        free = _free_spans(low, high, taken)
         taken += [Span(lane, a, b, i) for a, b in free if b - a >= least]
         taken.sort()
     return sorted(span for taken in spans.values() for span in taken)
 
 
-def _without(low: float, high: float, taken: Sequence[Span]) -> list[tuple[float, float]]:
+def _free_spans(low: float, high: float, taken: Sequence[Span]) -> list[tuple[float, float]]:
     """What sorted, disjoint spans leave free from ``low`` to ``high``."""
     free: list[tuple[float, float]] = []
     for span in taken:
@@ -149,7 +149,7 @@ def _without(low: float, high: float, taken: Sequence[Span]) -> list[tuple[float
     return free
 
 
-def _badness(interval: MappingInterval) -> float:
+def _mean_deviation(interval: MappingInterval) -> float:
     return round(float(np.mean(interval.deviation)), 3)
 
 

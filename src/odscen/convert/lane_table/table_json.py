@@ -86,9 +86,9 @@ def _to_data(table: LaneTable) -> dict[str, Any]:
             "lane": [interval.lane for interval in table.intervals],
             "sumo": [interval.sumo for interval in table.intervals],
             "knots": [len(interval.pos) for interval in table.intervals],
-            "pos": _column([interval.pos for interval in table.intervals]),
-            "s": _column([interval.s for interval in table.intervals]),
-            "deviation": _column([interval.deviation for interval in table.intervals]),
+            "pos": _rounded_column([interval.pos for interval in table.intervals]),
+            "s": _rounded_column([interval.s for interval in table.intervals]),
+            "deviation": _rounded_column([interval.deviation for interval in table.intervals]),
         },
         "lights": [
             {
@@ -114,7 +114,7 @@ def _from_data(data: dict[str, Any]) -> LaneTable:
         raise ValueError(f"version {data['version']!r}, not {VERSION}")
     edge_ids = [SumoEdgeId(edge) for edge in data["edges"]["id"]]
     lane_ids = [SumoLaneId(lane) for lane in data["lanes"]["id"]]
-    lanes = _lanes(data["lanes"], lane_ids, edge_ids, data["classes"])
+    lanes = _read_lanes(data["lanes"], lane_ids, edge_ids, data["classes"])
     return LaneTable(
         lane_keys=tuple(
             Roadside(RoadId(road), section, lane)
@@ -123,7 +123,7 @@ def _from_data(data: dict[str, Any]) -> LaneTable:
             for road, section, lane, *beside in data["lane_keys"]
         ),
         lanes=lanes,
-        edges=_edges(data["edges"], edge_ids, lanes),
+        edges=_read_edges(data["edges"], edge_ids, lanes),
         links=tuple(
             SumoLink(
                 lane_ids[one], lane_ids[other], lane_ids[via] if via >= 0 else SumoLaneId(""), tl
@@ -131,7 +131,7 @@ def _from_data(data: dict[str, Any]) -> LaneTable:
             for one, other, via, tl in data["links"]
         ),
         walk_links=tuple((edge_ids[one], edge_ids[other]) for one, other in data["walk_links"]),
-        intervals=_intervals(data["pieces"]),
+        intervals=_read_intervals(data["pieces"]),
         net_offset=tuple(data["net_offset"]),
         boundary=tuple(data["boundary"]),
         lefthand=data["lefthand"],
@@ -173,7 +173,7 @@ class _Classes:
         return self._rows[classes]
 
 
-def _lanes(
+def _read_lanes(
     data: dict[str, Any],
     lane_ids: list[SumoLaneId],
     edge_ids: list[SumoEdgeId],
@@ -190,7 +190,7 @@ def _lanes(
     }
 
 
-def _edges(
+def _read_edges(
     data: dict[str, Any], edge_ids: list[SumoEdgeId], lanes: dict[SumoLaneId, SumoLane]
 ) -> dict[SumoEdgeId, SumoEdge]:
     own: dict[SumoEdgeId, list[SumoLaneId]] = {edge: [] for edge in edge_ids}
@@ -204,7 +204,7 @@ def _edges(
     }
 
 
-def _intervals(data: dict[str, Any]) -> tuple[MappingInterval, ...]:
+def _read_intervals(data: dict[str, Any]) -> tuple[MappingInterval, ...]:
     if not data["lane"]:
         return ()
     ends = np.cumsum(np.array(data["knots"], dtype=np.int64))
@@ -223,5 +223,5 @@ def rounded(values: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np
     return np.round(values, _DIGITS) + 0.0
 
 
-def _column(parts: list[np.ndarray[Any, np.dtype[np.float64]]]) -> list[float]:
+def _rounded_column(parts: list[np.ndarray[Any, np.dtype[np.float64]]]) -> list[float]:
     return rounded(np.concatenate(parts)).tolist() if parts else []

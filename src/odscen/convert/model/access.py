@@ -104,8 +104,12 @@ def vehicle_classes(lane: Lane, s: float) -> frozenset[str]:
     if not lane.access or not base:
         return base
     records = [one for one in access_at(lane, s) if has_class(one) and one.restriction != "none"]
-    granted = [_BY_RESTRICTION[one.restriction.lower()] for one in records if one.rule == "allow"]
-    denied = [_BY_RESTRICTION[one.restriction.lower()] for one in records if one.rule == "deny"]
+    granted = [
+        _BY_RESTRICTION[record.restriction.lower()] for record in records if record.rule == "allow"
+    ]
+    denied = [
+        _BY_RESTRICTION[record.restriction.lower()] for record in records if record.rule == "deny"
+    ]
     classes = base
     if granted:
         named = frozenset[str]().union(*granted) - PEDESTRIAN

@@ -122,24 +122,24 @@ class _ConnectionFinder:
         """All connections from the end of a lane, the shortest to each other lane."""
         last = self._edges[edge].lanes[lane].alignment[-1]
         best: dict[tuple[int, int], LaneAlignment] = {}
-        paths = self._onwards(last.row, last.end, ())
+        paths = self._follow_lane(last.row, last.end, ())
         for target, alignment in islice(paths, MOST_CONNECTIONS):
             known = best.get(target)
-            if known is None or _extent(alignment) < _extent(known):
+            if known is None or _alignment_length(alignment) < _alignment_length(known):
                 best[target] = alignment
             if known is not None:
-                self._note(last.row, target)
+                self._note_lost(last.row, target)
         return [
             PlannedConnection(edge, lane, *target, alignment) for target, alignment in best.items()
         ]
 
-    def _note(self, row: int, target: tuple[int, int]) -> None:
+    def _note_lost(self, row: int, target: tuple[int, int]) -> None:
         there = self._edges[target[0]].lanes[target[1]].alignment[0].row
         other = self._table.lane_keys[there]
         reason = f"of several connections to lane {other} only the shortest is in the network"
         self.lost.append(LostConnection(self._table.lane_keys[row], reason))
 
-    def _onwards(
+    def _follow_lane(
         self, row: int, s: float, alignment: LaneAlignment
     ) -> Iterator[tuple[tuple[int, int], LaneAlignment]]:
         """Follow a lane from s; yields each edge lane reached and the path to it."""
@@ -155,16 +155,19 @@ class _ConnectionFinder:
             until = visit.entry if visit is not None else end
             todo += self._turning_off(row, s, until, alignment)
             if visit is not None and visit.first:
-                yield (visit.edge, visit.lane), _extended(alignment, Stretch(row, s, visit.entry))
+                yield (
+                    (visit.edge, visit.lane),
+                    _extend_alignment(alignment, Stretch(row, s, visit.entry)),
+                )
                 continue
             if visit is not None or len(alignment) > MOST_LANES:
                 continue
-            alignment = _extended(alignment, Stretch(row, s, end))
+            alignment = _extend_alignment(alignment, Stretch(row, s, end))
             todo += [(main, place, alignment) for place, main in self._entries.get(row, ())]
             following = [
                 self._table.lane_index[key]
                 for key in self._successors[self._table.lane_keys[row]]
-                if self._open(key)
+                if self._is_open(key)
             ]
             for other in reversed(following):
                 if any(stretch.row == other for stretch in alignment):
@@ -179,20 +182,20 @@ class _ConnectionFinder:
         """Lanes that begin beside a lane between two places, with the path to them."""
         low, high = sorted((s, until))
         for place, other in self._exits.get(row, ()):
-            if low - 1e-6 <= place <= high + 1e-6 and self._open(self._table.lane_keys[other]):
+            if low - 1e-6 <= place <= high + 1e-6 and self._is_open(self._table.lane_keys[other]):
                 forward = bool(self._table.lane_forward[other])
                 start = self._table.lane_s0[other] if forward else self._table.lane_s1[other]
-                yield other, float(start), _extended(alignment, Stretch(row, s, place))
+                yield other, float(start), _extend_alignment(alignment, Stretch(row, s, place))
 
-    def _open(self, key: LaneKey) -> bool:
+    def _is_open(self, key: LaneKey) -> bool:
         return bool(allowed(self._table.lane_type[self._table.lane_index[key]]))
 
 
-def _extended(alignment: LaneAlignment, stretch: Stretch) -> LaneAlignment:
+def _extend_alignment(alignment: LaneAlignment, stretch: Stretch) -> LaneAlignment:
     return (*alignment, stretch) if stretch.extent > 1e-6 else alignment
 
 
-def _extent(alignment: LaneAlignment) -> float:
+def _alignment_length(alignment: LaneAlignment) -> float:
     return sum(stretch.extent for stretch in alignment)
 
 
@@ -200,7 +203,7 @@ def _with_room(
     edges: Sequence[EdgePlan], connections: Sequence[PlannedConnection]
 ) -> tuple[tuple[EdgePlan, ...], tuple[PlannedConnection, ...]]:
     """Give connections of no length the last decimetre of the edge before, for internal lanes."""
-    short = {c.source for c in connections if _extent(c.alignment) < LEAST_EDGE}
+    short = {c.source for c in connections if _alignment_length(c.alignment) < LEAST_EDGE}
     plans = list(edges)
     rests: dict[tuple[int, int], Stretch] = {}
     for number in sorted(short):
@@ -216,7 +219,7 @@ def _with_room(
             )
         plans[number] = replace(plan, lanes=tuple(lanes))
     longer = [
-        c._replace(alignment=_joined(rests[c.source, c.source_lane], c.alignment))
+        c._replace(alignment=_join_alignments(rests[c.source, c.source_lane], c.alignment))
         if c.source in short
         else c
         for c in connections
@@ -224,7 +227,7 @@ def _with_room(
     return tuple(plans), tuple(longer)
 
 
-def _joined(first: Stretch, alignment: LaneAlignment) -> LaneAlignment:
+def _join_alignments(first: Stretch, alignment: LaneAlignment) -> LaneAlignment:
     if alignment and alignment[0].row == first.row:
         return (Stretch(first.row, first.start, alignment[0].end), *alignment[1:])
     return (first, *alignment)

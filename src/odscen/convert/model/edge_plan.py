@@ -71,12 +71,12 @@ def merge_gaps(
     """Gaps of each road: sorted, disjoint, widened to junctions that are near."""
     roads = dict.fromkeys(road for part in parts for road in part)
     return {
-        road: _merged(odr.roads[road], sorted(g for part in parts for g in part.get(road, ())))
+        road: _merge_gaps(odr.roads[road], sorted(g for part in parts for g in part.get(road, ())))
         for road in roads
     }
 
 
-def _merged(road: Road, gaps: list[RoadGap]) -> tuple[RoadGap, ...]:
+def _merge_gaps(road: Road, gaps: list[RoadGap]) -> tuple[RoadGap, ...]:
     """Gaps of a road, widened to junctions that are near, and joined if they are close."""
     found: list[RoadGap] = []
     for gap in gaps:
@@ -214,20 +214,20 @@ class _Planner:
     def road(self, road: Road, gaps: Sequence[RoadGap]) -> list[EdgePlan]:
         row = self._table.road_index[road.id]
         groups: list[list[_RoadPart]] = []
-        for part in self._parts(road, row, gaps):
-            if groups and self._continues(groups[-1][-1], part):
+        for part in self._divide_road(road, row, gaps):
+            if groups and self._continues_in(groups[-1][-1], part):
                 groups[-1].append(part)
             else:
                 groups.append([part])
         plans: list[EdgePlan] = []
         for number, group in enumerate(groups):
             for forward in (True, False):
-                plan = self._edge(row, number, group, forward=forward)
+                plan = self._plan_edge(row, number, group, forward=forward)
                 if plan is not None:
                     plans.append(plan)
         return plans
 
-    def _parts(self, road: Road, row: int, gaps: Sequence[RoadGap]) -> list[_RoadPart]:
+    def _divide_road(self, road: Road, row: int, gaps: Sequence[RoadGap]) -> list[_RoadPart]:
         borders = {0.0, road.length, *(section.s for section in road.sections)}
         borders |= {bound for gap in gaps for bound in gap}
         others = {kind.s for kind in road.types} | self._narrow_ends(road)
@@ -246,10 +246,10 @@ class _Planner:
             middle = 0.5 * (start + end)
             if end - start < LEAST_EDGE or any(gap.start < middle < gap.end for gap in gaps):
                 continue
-            parts.append(self._part(road, row, start, end))
+            parts.append(self._make_part(road, row, start, end))
         return parts
 
-    def _part(self, road: Road, row: int, start: float, end: float) -> _RoadPart:
+    def _make_part(self, road: Road, row: int, start: float, end: float) -> _RoadPart:
         table, middle = self._table, 0.5 * (start + end)
         kinds = [kind.type for kind in road.types if kind.s <= middle + 1e-6]
         road_type = kinds[-1] if kinds else ""
@@ -258,7 +258,7 @@ class _Planner:
             for r in table.lanes_at(row, middle)
             if self._classes(int(r), middle)
             and float(table.lane_s1[r] - table.lane_s0[r]) >= LEAST_EDGE
-            and self._widest(int(r), start, end) >= LEAST_WIDTH
+            and self._widest_in_part(int(r), start, end) >= LEAST_WIDTH
         ]
         if not rows:
             return _RoadPart(start, end, (), ())
@@ -309,12 +309,12 @@ class _Planner:
             narrow = (width < NO_WIDTH).reshape(len(lanes), count)
             lane, place = np.nonzero(narrow[:, 1:] != narrow[:, :-1])
             found |= {
-                self._change(lanes[i], float(s[j]), float(s[j + 1]))
+                self._find_width_change(lanes[i], float(s[j]), float(s[j + 1]))
                 for i, j in zip(lane.tolist(), place.tolist(), strict=True)
             }
         return found
 
-    def _change(self, row: int, low: float, high: float) -> float:
+    def _find_width_change(self, row: int, low: float, high: float) -> float:
         """Where between two places a lane's width passes :data:`NO_WIDTH`, to a millimetre."""
         ends = self._table.lane_width(np.array([row, row]), np.array([low, high])) < NO_WIDTH
         while high - low > 1e-3:
@@ -323,11 +323,11 @@ class _Planner:
             low, high = (middle, high) if narrow == ends[0] else (low, middle)
         return high if ends[0] else low
 
-    def _widest(self, row: int, start: float, end: float) -> float:
+    def _widest_in_part(self, row: int, start: float, end: float) -> float:
         s = np.linspace(start, end, 5)
         return float(self._table.lane_width(np.full(5, row), s).max())
 
-    def _continues(self, one: _RoadPart, other: _RoadPart) -> bool:
+    def _continues_in(self, one: _RoadPart, other: _RoadPart) -> bool:
         if other.start - one.end > 1e-6:
             return False
         # A few metres of another mark are no reason for an edge of their own.
@@ -335,7 +335,7 @@ class _Planner:
         return all(
             len(before) == len(after)
             and all(
-                self._same(*pair, marks=not short, forward=forward)
+                self._same_edge(*pair, marks=not short, forward=forward)
                 for pair in zip(before, after, strict=True)
             )
             for before, after, forward in (
@@ -344,7 +344,7 @@ class _Planner:
             )
         )
 
-    def _same(self, one: _LaneState, other: _LaneState, *, marks: bool, forward: bool) -> bool:
+    def _same_edge(self, one: _LaneState, other: _LaneState, *, marks: bool, forward: bool) -> bool:
         if (one.allowed, one.speed, one.type) != (other.allowed, other.speed, other.type):
             return False
         if marks and one[3:5] != other[3:5]:
@@ -355,7 +355,7 @@ class _Planner:
         keys = self._table.lane_keys
         return tuple(self._successors[keys[source.row]]) == (keys[target.row],)
 
-    def _edge(
+    def _plan_edge(
         self, road: int, number: int, group: list[_RoadPart], *, forward: bool
     ) -> EdgePlan | None:
         parts = group if forward else group[::-1]

@@ -148,7 +148,7 @@ def evaluate(alignments: Sequence[LaneAlignment], table: RoadTable) -> list[Line
     points = np.column_stack((x, y, found.z))
     of_alignment = np.concatenate(([0], np.cumsum([len(alignment) for alignment in alignments])))
     bounds = first[of_alignment]
-    shapes = thinned([_distinct(points[a:b]) for a, b in pairwise(bounds)])
+    shapes = thinned([_drop_repeated_vertices(points[a:b]) for a, b in pairwise(bounds)])
     lines: list[Line] = []
     for number, shape in enumerate(shapes):
         a, b = bounds[number], bounds[number + 1]
@@ -196,7 +196,7 @@ def drawn_length(shape: FloatArray) -> float:
     return float(np.sqrt((np.diff(shape, axis=0) ** 2).sum(axis=1)).sum())
 
 
-def _distinct(shape: FloatArray) -> FloatArray:
+def _drop_repeated_vertices(shape: FloatArray) -> FloatArray:
     """Drop vertices on top of the one before; first and last stay."""
     steps = np.hypot(*np.diff(shape[:, :2], axis=0).T)
     keep = np.concatenate(([True], steps > _LEAST))
@@ -218,7 +218,7 @@ def thinned(shapes: Sequence[FloatArray]) -> list[FloatArray]:
         span = np.cumsum(keep) - 1
         start = points[kept[span]]
         chord = points[kept[np.minimum(span + 1, len(kept) - 1)]] - start
-        error = _beside(points - start, chord)
+        error = _distance_from_chord(points - start, chord)
         error[keep] = 0.0
         worst = np.maximum.reduceat(error, kept)
         new = (error > CHORD_ERROR) & (error >= worst[span])
@@ -228,7 +228,7 @@ def thinned(shapes: Sequence[FloatArray]) -> list[FloatArray]:
     return [points[a:b][keep[a:b]] for a, b in pairwise(bounds)]
 
 
-def _beside(delta: FloatArray, chord: FloatArray) -> FloatArray:
+def _distance_from_chord(delta: FloatArray, chord: FloatArray) -> FloatArray:
     """Distance of points ``delta`` from the stretch from the origin to ``chord``."""
     square = np.maximum(np.einsum("ij,ij->i", chord, chord), 1e-12)
     share = np.clip(np.einsum("ij,ij->i", delta, chord) / square, 0.0, 1.0)

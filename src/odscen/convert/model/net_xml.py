@@ -47,33 +47,33 @@ class _Written:
         inner = [edge for edge in net.edges if edge.function != NORMAL]
         outer = [edge for edge in net.edges if edge.function == NORMAL]
         for edge in (*inner, *outer):
-            lines += self._edge(edge)
+            lines += self._edge_lines(edge)
         for light in net.lights:
-            lines += _light(light)
+            lines += _light_lines(light)
         for junction in net.junctions:
-            lines += self._junction(junction)
+            lines += self._junction_lines(junction)
         for junction in net.inner_junctions:
-            lines += self._junction(junction)
+            lines += self._junction_lines(junction)
         paths = net.link_paths()
         inside = {edge.id for edge in inner}
         for link in net.links:
             own = None if link.source in inside or link.via is None else paths[link.via]
-            lines.append(self._link(link, own))
+            lines.append(self._link_lines(link, own))
         for nodes, edges in net.roundabouts:
             lines.append(f'    <roundabout nodes="{" ".join(nodes)}" edges="{" ".join(edges)}"/>')
         lines += ["</net>", ""]
         return "\n".join(lines).encode()
 
-    def _edge(self, edge: NetEdge) -> Iterator[str]:
+    def _edge_lines(self, edge: NetEdge) -> Iterator[str]:
         ends = f' from="{edge.start}" to="{edge.end}"' if edge.function == NORMAL else ""
         kind = f' function="{edge.function}"' if edge.function != NORMAL else ""
         rank = f' priority="{edge.priority}"' if edge.function == NORMAL else ""
-        name = f' name="{_quoted(edge.name)}"' if edge.name else ""
+        name = f' name="{_quote_attribute(edge.name)}"' if edge.name else ""
         crossed = f' crossingEdges="{" ".join(edge.crosses)}"' if edge.crosses else ""
         shape, custom = "", ' customShape="1"'
         if edge.function == NORMAL:
             inmost, side = edge.lanes[-1], -0.5 if self._net.lefthand else 0.5
-            shape = f' shape="{self._shape(border(inmost.shape, side * inmost.width))}"'
+            shape = f' shape="{self._format_shape(border(inmost.shape, side * inmost.width))}"'
         elif edge.function == INTERNAL:
             custom = ""
         yield f'    <edge id="{edge.id}"{ends}{kind}{rank}{name}{crossed}{shape}>'
@@ -85,24 +85,24 @@ class _Written:
                 f'        <lane id="{lane.id}" index="{lane.index}"'
                 f' allow="{" ".join(sorted(lane.allowed))}"{change} speed="{lane.speed:.2f}"'
                 f' length="{lane.length:.{DIGITS}f}" width="{lane.width:.2f}"{kind}{custom}'
-                f' shape="{self._shape(lane.shape)}"'
+                f' shape="{self._format_shape(lane.shape)}"'
             )
             if lane.xodr:
                 yield text + ">"
-                yield f'            <param key="origId" value="{_quoted(" ".join(lane.xodr))}"/>'
+                yield f'            <param key="origId" value="{_quote_attribute(" ".join(lane.xodr))}"/>'
                 yield "        </lane>"
             else:
                 yield text + "/>"
         yield "    </edge>"
 
-    def _junction(self, junction: NetJunction) -> Iterator[str]:
+    def _junction_lines(self, junction: NetJunction) -> Iterator[str]:
         x, y = junction.place[0] + self._net.offset[0], junction.place[1] + self._net.offset[1]
         z = "" if self._net.flat else f' z="{junction.place[2]:.{DIGITS}f}"'
         custom = "" if junction.type == INTERNAL else ' customShape="1"'
         text = (
             f'    <junction id="{junction.id}" type="{junction.type}"{custom} x="{x:.{DIGITS}f}"'
             f' y="{y:.{DIGITS}f}"{z} incLanes="{" ".join(junction.incoming)}"'
-            f' intLanes="{" ".join(junction.inner)}" shape="{self._shape(junction.outline)}"'
+            f' intLanes="{" ".join(junction.inner)}" shape="{self._format_shape(junction.outline)}"'
         )
         if not junction.requests and not junction.xodr:
             yield text + "/>"
@@ -111,20 +111,20 @@ class _Written:
         count = len(junction.requests)
         for index, request in enumerate(junction.requests):
             yield (
-                f'        <request index="{index}" response="{_bits(request.yields_to, count)}"'
-                f' foes="{_bits(request.foes, count)}" cont="{int(request.waits_inside)}"/>'
+                f'        <request index="{index}" response="{_format_bits(request.yields_to, count)}"'
+                f' foes="{_format_bits(request.foes, count)}" cont="{int(request.waits_inside)}"/>'
             )
         if junction.xodr:
-            yield f'        <param key="opendrive" value="{_quoted(junction.xodr)}"/>'
+            yield f'        <param key="opendrive" value="{_quote_attribute(junction.xodr)}"/>'
         yield "    </junction>"
 
-    def _link(self, link: NetLink, path: LinkPath | None) -> str:
+    def _link_lines(self, link: NetLink, path: LinkPath | None) -> str:
         via = f' via="{link.via}"' if link.via else ""
         light = f' tl="{link.light}" linkIndex="{link.light_index}"' if link.light else ""
         kept = ""
         if path is not None:
             waits = "" if path.waits_at is None else f' contPos="{path.waits_at:.{DIGITS}f}"'
-            kept = f'{waits} speed="{path.speed:.2f}" shape="{self._shape(path.shape)}"'
+            kept = f'{waits} speed="{path.speed:.2f}" shape="{self._format_shape(path.shape)}"'
         sight = "" if link.visibility is None else f' visibility="{link.visibility:g}"'
         return (
             f'    <connection from="{link.source}" to="{link.target}" fromLane="{link.source_lane}"'
@@ -132,14 +132,14 @@ class _Written:
             f' state="{link.state}"{kept}/>'
         )
 
-    def _shape(self, shape: FloatArray) -> str:
+    def _format_shape(self, shape: FloatArray) -> str:
         points = shape + np.array([*self._net.offset, 0.0])
         if self._net.flat:
             return " ".join([f"{x:.4f},{y:.4f}" for x, y, _ in points.tolist()])
         return " ".join([f"{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()])
 
 
-def _light(light: TrafficLight) -> Iterator[str]:
+def _light_lines(light: TrafficLight) -> Iterator[str]:
     """Lines of one ``<tlLogic>``."""
     yield (
         f'    <tlLogic id="{light.id}" type="{light.type}" programID="{light.program}"'
@@ -149,16 +149,16 @@ def _light(light: TrafficLight) -> Iterator[str]:
         bounds = ""
         if light.type == "actuated" and phase.most > phase.least:
             bounds = f' minDur="{phase.least:g}" maxDur="{phase.most:g}"'
-        name = f' name="{_quoted(phase.name)}"' if phase.name else ""
+        name = f' name="{_quote_attribute(phase.name)}"' if phase.name else ""
         yield f'        <phase duration="{phase.duration:g}" state="{phase.state}"{bounds}{name}/>'
     for index, signals in enumerate(light.signals):
         if signals:
-            value = _quoted(" ".join(signals))
+            value = _quote_attribute(" ".join(signals))
             yield f'        <param key="linkSignalID:{index}" value="{value}"/>'
     yield "    </tlLogic>"
 
 
-def _bits(indices: Iterable[int], count: int) -> str:
+def _format_bits(indices: Iterable[int], count: int) -> str:
     """Indices as SUMO writes them: the last letter is link 0."""
     letters = ["0"] * count
     for index in indices:
@@ -166,7 +166,7 @@ def _bits(indices: Iterable[int], count: int) -> str:
     return "".join(letters)
 
 
-def _quoted(text: str) -> str:
+def _quote_attribute(text: str) -> str:
     """Text of an attribute on one line."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return escape(plain, {'"': "&quot;"})

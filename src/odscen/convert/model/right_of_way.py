@@ -143,16 +143,16 @@ def find_conflicts(movements: Sequence[Movement], walkways: Sequence[Walkway]) -
         for i, j in sorted(zip(*near.tolist(), strict=True)):
             if i >= j:
                 continue
-            kind = _meeting(movements[i], movements[j], lines[i], lines[j])
+            kind = _meeting_kind(movements[i], movements[j], lines[i], lines[j])
             if kind:
                 pairs.append((i, j))
                 if kind == "merge":
                     merging.add((i, j))
-    crossed = tuple(_crossed(walkway, movements, lines) for walkway in walkways)
+    crossed = tuple(_crossed_movements(walkway, movements, lines) for walkway in walkways)
     return Conflicts(tuple(pairs), frozenset(merging), crossed)
 
 
-def _meeting(
+def _meeting_kind(
     one: Movement, other: Movement, line: shapely.LineString, line2: shapely.LineString
 ) -> str:
     if one.source == other.source:
@@ -162,7 +162,7 @@ def _meeting(
     if one.source[0] == other.source[0] or one.target[0] == other.target[0]:
         return "cross" if _truly_cross(line, line2) else ""
     reach = min(MOST_WIDTH, WIDTH_SHARE * (one.width + other.width))
-    if line.distance(line2) >= reach or not _level(one.shape, other.shape):
+    if line.distance(line2) >= reach or not _on_one_level(one.shape, other.shape):
         return ""
     return "cross"
 
@@ -177,20 +177,20 @@ def _truly_cross(one: shapely.LineString, other: shapely.LineString) -> bool:
     return not rest.is_empty
 
 
-def _level(one: FloatArray, other: FloatArray) -> bool:
+def _on_one_level(one: FloatArray, other: FloatArray) -> bool:
     low = max(float(one[:, 2].min()), float(other[:, 2].min()))
     high = min(float(one[:, 2].max()), float(other[:, 2].max()))
     return low - high < LEVEL
 
 
-def _crossed(
+def _crossed_movements(
     walkway: Walkway, movements: Sequence[Movement], lines: Sequence[shapely.LineString]
 ) -> tuple[int, ...]:
     area = shapely.LineString(walkway.axis[:, :2]).buffer(walkway.width / 2.0, cap_style="flat")
     return tuple(
         index
         for index, (movement, line) in enumerate(zip(movements, lines, strict=True))
-        if area.distance(line) < WALKER_REACH and _level(walkway.axis, movement.shape)
+        if area.distance(line) < WALKER_REACH and _on_one_level(walkway.axis, movement.shape)
     )
 
 
@@ -225,7 +225,9 @@ def requests(
             yields[j].add(i)
         elif (i, j) in room or (
             (j, i) not in room
-            and _waits(movements[i], movements[j], rules, (i, j) in conflicts.merging, only_merges)
+            and _gives_way(
+                movements[i], movements[j], rules, (i, j) in conflicts.merging, only_merges
+            )
         ):
             yields[i].add(j)
         else:
@@ -301,13 +303,15 @@ def _are_equal(one: Movement, other: Movement, rules: Rules) -> bool:
         one.in_roundabout == other.in_roundabout
         and one.sign == other.sign
         and one.source[0] != other.source[0]
-        and _stated(one, other, rules) is None
+        and _stated_priority(one, other, rules) is None
         and abs(one.speed - other.speed) <= _FASTER
         and abs(wrapped(one.heading_in - other.heading_in)) < _BESIDE
     )
 
 
-def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merges: bool) -> bool:
+def _gives_way(
+    one: Movement, other: Movement, rules: Rules, merge: bool, only_merges: bool
+) -> bool:
     """Whether ``one`` gives way to ``other``; exactly one of the two does."""
     if one.in_roundabout != other.in_roundabout:
         return other.in_roundabout
@@ -319,7 +323,7 @@ def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merge
         turning = _turns_across(one, other, side)
         if turning is not None:
             return turning
-    stated = _stated(one, other, rules)
+    stated = _stated_priority(one, other, rules)
     if stated is not None:
         return stated
     if merge and (only_merges or abs(wrapped(one.heading_in - other.heading_in)) < math.pi / 4):
@@ -330,7 +334,7 @@ def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merge
     return _waits_by_place(one, other, rules, side)
 
 
-def _stated(one: Movement, other: Movement, rules: Rules) -> bool | None:
+def _stated_priority(one: Movement, other: Movement, rules: Rules) -> bool | None:
     """What ``<priority>`` says on who gives way, if anything that does not contradict itself."""
     pairs = [(mine, theirs) for mine in one.roads for theirs in other.roads]
     waits = any((theirs, mine) in rules.high_low for mine, theirs in pairs)

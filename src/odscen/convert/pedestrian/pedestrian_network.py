@@ -205,9 +205,9 @@ class _WalkNetBuilder:
         self._own: list[NetJunction] = []
 
     def build(self) -> WalkNet:
-        self._lay(self._topology.chains)
-        crossings = self._crossings()
-        areas, links, pairs = self._areas(crossings)
+        self._lay_chains(self._topology.chains)
+        crossings = self._place_crossings()
+        areas, links, pairs = self._build_areas(crossings)
         return WalkNet(
             tuple(self._lanes),
             tuple(areas),
@@ -217,7 +217,7 @@ class _WalkNetBuilder:
             tuple(self._own),
         )
 
-    def _lay(self, chains: Sequence[Chain]) -> None:
+    def _lay_chains(self, chains: Sequence[Chain]) -> None:
         """Make an edge of each chain, of three parts if both ends are at one junction."""
         alignments: list[LaneAlignment] = []
         ends: list[tuple[NodeKey, NodeKey]] = []
@@ -234,7 +234,7 @@ class _WalkNetBuilder:
             alignment = tuple(s for s in alignment if s.extent > 1e-3)
             if sum(s.extent for s in alignment) < LEAST_LENGTH:
                 continue
-            one, other = self._node(first), self._node(last)
+            one, other = self._walking_area_at(first), self._walking_area_at(last)
             if one is other or (one.junction and one.junction == other.junction):
                 # Of two parts both would join the same junctions, and SUMO could not tell
                 # whether a walk from one to the other goes over the middle or round the ends.
@@ -247,7 +247,7 @@ class _WalkNetBuilder:
         meetings = Counter(key for pair in ends for key in pair)
 
         def meets(key: NodeKey) -> bool:
-            return meetings[key] + self._node(key).crossings > 1
+            return meetings[key] + self._walking_area_at(key).crossings > 1
 
         cut_back = [
             trimmed(alignment, start=meets(pair[0]), end=meets(pair[1]))
@@ -255,12 +255,14 @@ class _WalkNetBuilder:
         ]
         lines = evaluate(cut_back, self._table)
         for line, alignment, pair in zip(lines, cut_back, ends, strict=True):
-            self._edge(line, alignment, pair)
+            self._add_edge(line, alignment, pair)
 
-    def _node(self, key: NodeKey) -> _WalkingArea:
+    def _walking_area_at(self, key: NodeKey) -> _WalkingArea:
         return self._nodes.setdefault(key, _WalkingArea())
 
-    def _edge(self, line: Line, alignment: LaneAlignment, ends: tuple[NodeKey, NodeKey]) -> None:
+    def _add_edge(
+        self, line: Line, alignment: LaneAlignment, ends: tuple[NodeKey, NodeKey]
+    ) -> None:
         roadside = alignment[0].at == 1.0
         name = f"w{self._number}"
         self._number += 1
@@ -268,7 +270,7 @@ class _WalkNetBuilder:
         width = ROADSIDE_WIDTH if roadside else max(line.widths[1], 0.5)
         junctions: list[str] = []
         for key, which in ((ends[0], 0), (ends[1], -1)):
-            node = self._node(key)
+            node = self._walking_area_at(key)
             if not node.junction:
                 node.junction = f"walk{len(self._own)}"
                 ends_at = line_across(line.shape, which, width)
@@ -287,16 +289,16 @@ class _WalkNetBuilder:
             PEDESTRIAN,
             line.shape,
             type="roadside" if roadside else "sidewalk",
-            xodr=tuple(dict.fromkeys(self._name(stretch.row) for stretch in alignment)),
+            xodr=tuple(dict.fromkeys(self._name_walk(stretch.row) for stretch in alignment)),
         )
         net_edge = NetEdge(edge, NORMAL, (walk,), junctions[0], junctions[1], priority=0)
         self._lanes.append(WalkLane(net_edge, line, alignment))
 
-    def _name(self, row: int) -> str:
+    def _name_walk(self, row: int) -> str:
         key = self._table.lane_keys[row]
         return f"{key.road}_{key.lane}"
 
-    def _crossings(self) -> dict[str, list[PlacedCrossing]]:
+    def _place_crossings(self) -> dict[str, list[PlacedCrossing]]:
         """Crossings by junction; walking areas get their names here, in the order of need."""
         counts: Counter[str] = Counter()
 
@@ -343,7 +345,7 @@ class _WalkNetBuilder:
                 area(key)
         return found
 
-    def _areas(
+    def _build_areas(
         self, crossings: dict[str, list[PlacedCrossing]]
     ) -> tuple[list[NetEdge], list[NetLink], set[tuple[SumoEdgeId, SumoEdgeId]]]:
         areas: list[NetEdge] = []

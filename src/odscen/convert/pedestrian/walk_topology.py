@@ -148,12 +148,12 @@ class _Divider:
         self._ends: dict[tuple[int, int], NodeKey] = {}
 
     def divide(self) -> WalkTopology:
-        arcs = self._arcs(self._clusters())
-        chains = self._chains(arcs)
+        arcs = self._divide_walks(self._cluster_ends())
+        chains = self._join_chains(arcs)
         self._free_ends()
         return WalkTopology(chains, self._at, self._crossings, self._ends)
 
-    def _clusters(self) -> dict[NodeKey, NodeKey]:
+    def _cluster_ends(self) -> dict[NodeKey, NodeKey]:
         """Ends ``(walk, 0 or 1)`` of walks, each with the first of those the graph joins it to."""
         graph = self._graph
         groups: DisjointSet[NodeKey] = DisjointSet()
@@ -200,7 +200,7 @@ class _Divider:
                 found.setdefault(int(graph.lane[node]), []).append(end)
         return {walk: sorted(ends) for walk, ends in found.items()}
 
-    def _arcs(self, clusters: Mapping[NodeKey, NodeKey]) -> list[Arc]:
+    def _divide_walks(self, clusters: Mapping[NodeKey, NodeKey]) -> list[Arc]:
         """Divide the walks at the ends of crosswalks."""
         ends = self._crosswalk_ends()
         arcs: list[Arc] = []
@@ -212,31 +212,31 @@ class _Divider:
                 junction = self._junctions[end.crosswalk]
                 near = end.s - before[0]
                 if near < TOGETHER and self._at.get(before[1]) == junction:
-                    self._attach(end, before[1], junction)
+                    self._attach_crosswalk(end, before[1], junction)
                     continue
-                if near < APART and self._takes(before[1], junction):
-                    self._attach(end, before[1], junction)
+                if near < APART and self._takes_junction(before[1], junction):
+                    self._attach_crosswalk(end, before[1], junction)
                     continue
-                if high - end.s < APART and self._takes(last, junction):
-                    self._attach(end, last, junction)
+                if high - end.s < APART and self._takes_junction(last, junction):
+                    self._attach_crosswalk(end, last, junction)
                     continue
                 place = max(end.s, before[0] + min(APART, 0.3 * (high - before[0])))
                 key = ("crosswalk", end.crosswalk, end.which)
-                self._attach(end, key, junction)
+                self._attach_crosswalk(end, key, junction)
                 arcs.append(Arc(walk, before[0], place, before[1], key))
                 before = (place, key)
             arcs.append(Arc(walk, before[0], high, before[1], last))
         return arcs
 
-    def _takes(self, key: NodeKey, junction: str) -> bool:
+    def _takes_junction(self, key: NodeKey, junction: str) -> bool:
         return self._at.get(key, "") in ("", junction)
 
-    def _attach(self, end: _CrosswalkEnd, key: NodeKey, junction: str) -> None:
+    def _attach_crosswalk(self, end: _CrosswalkEnd, key: NodeKey, junction: str) -> None:
         self._at[key] = junction
         self._crossings[key] += 1
         self._ends[end.crosswalk, end.which] = key
 
-    def _chains(self, arcs: Sequence[Arc]) -> list[Chain]:
+    def _join_chains(self, arcs: Sequence[Arc]) -> list[Chain]:
         """Join arcs that simply follow each other; the flag says gone along from start to end."""
         degree = Counter(key for arc in arcs for key in (arc.first, arc.last))
         meeting: dict[object, list[int]] = {}
@@ -285,4 +285,4 @@ class _Divider:
                     ("crosswalk", number, which),
                 )
                 known.append((key, place))
-                self._attach(_CrosswalkEnd(0.0, number, which), key, junction)
+                self._attach_crosswalk(_CrosswalkEnd(0.0, number, which), key, junction)

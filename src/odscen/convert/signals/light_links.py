@@ -45,7 +45,7 @@ def light_links(
     return tuple(
         moving_link(movements[n])
         if n < count
-        else _walking(crossings[n - count], [movements[k] for k in crossed[n - count]])
+        else _walking_light_link(crossings[n - count], [movements[k] for k in crossed[n - count]])
         for n in rows
     )
 
@@ -74,7 +74,7 @@ def moving_link(movement: Movement) -> LightLink:
         lane_id(*movement.target),
         direction(movement.turn),
         movement.speed,
-        path=_points(movement.shape),
+        path=_sample_points(movement.shape),
     )
 
 
@@ -90,16 +90,16 @@ def walking_link(
     crossed
         Edges that it leads over.
     """
-    return LightLink(*ends, CROSSED, crossed=tuple(crossed), path=_points(walkway.axis))
+    return LightLink(*ends, CROSSED, crossed=tuple(crossed), path=_sample_points(walkway.axis))
 
 
-def _points(shape: FloatArray) -> tuple[tuple[float, float], ...]:
+def _sample_points(shape: FloatArray) -> tuple[tuple[float, float], ...]:
     """At most :data:`POINTS` points of a line, in centimetres."""
     rows = np.unique(np.linspace(0, len(shape) - 1, POINTS).round().astype(int))
     return tuple((round(float(x), 2), round(float(y), 2)) for x, y in shape[rows, :2])
 
 
-def _walking(crossing: PlacedCrossing, movements: Sequence[Movement]) -> LightLink:
+def _walking_light_link(crossing: PlacedCrossing, movements: Sequence[Movement]) -> LightLink:
     edges = dict.fromkeys(nearer_edge(movement, crossing) for movement in movements)
     ends = lane_id(crossing.start), lane_id(crossing.link.target)
     return walking_link(ends, crossing.walkway, tuple(edges))

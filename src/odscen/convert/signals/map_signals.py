@@ -136,67 +136,77 @@ def settle_signals(
     """
     settled = [SettledSignal(place, tuple(reach.controls(place))) for place in places]
     backwards = _facing_away(places, reach, homes)
-    astray = _astray(settled, homes)
+    astray = _find_astray_signals(settled, homes)
     settled = [
-        _reversed(one, reach, homes.get(one.place.signal))
-        if one.place.signal in astray or one.place in backwards
-        else one
-        for one in settled
+        _reverse_if_away(signal, reach, homes.get(signal.place.signal))
+        if signal.place.signal in astray or signal.place in backwards
+        else signal
+        for signal in settled
     ]
-    astray = _astray(settled, homes)
+    astray = _find_astray_signals(settled, homes)
     settled = [
-        _replaced(one, reach.before(one.place, homes[one.place.signal]), FAR_SIDE)
-        if one.place.signal in astray and one.place.kind == "traffic_light"
-        else one
-        for one in settled
+        _replace_movements(signal, reach.before(signal.place, homes[signal.place.signal]), FAR_SIDE)
+        if signal.place.signal in astray and signal.place.kind == "traffic_light"
+        else signal
+        for signal in settled
     ]
-    lit = {n for one in settled if one.place.kind == "traffic_light" for n in one.numbers}
-    dark = {signal for signal in _astray(settled, homes) if not homes[signal] & lit}
+    lit = {n for signal in settled if signal.place.kind == "traffic_light" for n in signal.numbers}
+    dark = {signal for signal in _find_astray_signals(settled, homes) if not homes[signal] & lit}
     return [
-        _replaced(one, sorted(homes[one.place.signal]), WHOLE_JUNCTION)
-        if one.place.signal in dark and one.place.kind == "traffic_light"
-        else one
-        for one in settled
+        _replace_movements(signal, sorted(homes[signal.place.signal]), WHOLE_JUNCTION)
+        if signal.place.signal in dark and signal.place.kind == "traffic_light"
+        else signal
+        for signal in settled
     ]
 
 
-def _astray(
+def _find_astray_signals(
     settled: Iterable[SettledSignal], homes: Mapping[str, frozenset[int]]
 ) -> frozenset[str]:
     """Signals that control nothing of the junctions whose controllers name them."""
     found: dict[str, bool] = {}
-    for one in settled:
-        home = homes.get(one.place.signal)
+    for settled_signal in settled:
+        home = homes.get(settled_signal.place.signal)
         if home:
-            at_home = not home.isdisjoint(one.numbers)
-            found[one.place.signal] = found.get(one.place.signal, False) or at_home
+            at_home = not home.isdisjoint(settled_signal.numbers)
+            found[settled_signal.place.signal] = (
+                found.get(settled_signal.place.signal, False) or at_home
+            )
     return frozenset(signal for signal, at_home in found.items() if not at_home)
 
 
-def _flipped(place: Acting) -> Acting | None:
+def _flip_acting(place: Acting) -> Acting | None:
     """A place facing the other way; none where a validity decides, or it faces both ways."""
     if place.validities or place.orientation not in _FLIPPED:
         return None
     return place._replace(orientation=_FLIPPED[place.orientation])
 
 
-def _reversed(one: SettledSignal, reach: SignalReach, home: frozenset[int] | None) -> SettledSignal:
-    flipped = _flipped(one.place)
+def _reverse_if_away(
+    settled_signal: SettledSignal, reach: SignalReach, home: frozenset[int] | None
+) -> SettledSignal:
+    flipped = _flip_acting(settled_signal.place)
     if flipped is None:
-        return one
+        return settled_signal
     numbers = reach.controls(flipped)
     if home is None:
-        return _replaced(one, numbers, AWAY_THROUGHOUT)
-    return one if home.isdisjoint(numbers) else _replaced(one, numbers, AWAY_FROM_HOME)
+        return _replace_movements(settled_signal, numbers, AWAY_THROUGHOUT)
+    return (
+        settled_signal
+        if home.isdisjoint(numbers)
+        else _replace_movements(settled_signal, numbers, AWAY_FROM_HOME)
+    )
 
 
-def _replaced(one: SettledSignal, numbers: Sequence[int], guess: str) -> SettledSignal:
-    return SettledSignal(one.place, tuple(numbers), guess) if numbers else one
+def _replace_movements(
+    settled_signal: SettledSignal, numbers: Sequence[int], guess: str
+) -> SettledSignal:
+    return SettledSignal(settled_signal.place, tuple(numbers), guess) if numbers else settled_signal
 
 
-def _looks(place: Acting, reach: SignalReach) -> int:
+def _facing_of(place: Acting, reach: SignalReach) -> int:
     """1 if a signal faces the junction at which it stands, -1 if it faces away, 0 if unclear."""
-    if _flipped(place) is None:
+    if _flip_acting(place) is None:
         return 0
     growing = place.orientation == "+"
     ahead = reach.distance(place, growing=growing)
@@ -214,7 +224,7 @@ def _facing_away(
 
     All but those that do face the junction at which they stand.
     """
-    looks = {place: _looks(place, reach) for place in places if place.signal not in homes}
+    looks = {place: _facing_of(place, reach) for place in places if place.signal not in homes}
     away = sum(look < 0 for look in looks.values())
     towards = sum(look > 0 for look in looks.values())
     if not away or away < REVERSED_SHARE * (away + towards):
@@ -295,13 +305,13 @@ def signal_control(
                 lights[number][place.signal] = None
             else:
                 signs[number] = max(signs[number], SIGN_KINDS[place.kind])
-    placed = {one.place.element for one in settled if one.numbers}
+    placed = {signal.place.element for signal in settled if signal.numbers}
     unplaced = [
         (where, "it controls no movement: no lane within its validity leads to a junction near it")
-        for where in dict.fromkeys(one.place.element for one in settled)
+        for where in dict.fromkeys(signal.place.element for signal in settled)
         if where not in placed
     ]
-    guessed = {one.place.element: one.guess for one in settled if one.guess}
+    guessed = {signal.place.element: signal.guess for signal in settled if signal.guess}
     return SignalControl(
         tuple(tuple(own) for own in lights), tuple(signs), tuple(unplaced), tuple(guessed.items())
     )
@@ -327,7 +337,7 @@ class _Reach:
         self._leaving: dict[int, list[int]] = {}
         for number, connection in enumerate(connections):
             self._leaving.setdefault(connection.source, []).append(number)
-            for road in _roads(connection.alignment, table):
+            for road in _roads_of(connection.alignment, table):
                 self._over.setdefault(road, []).append(number)
         self._by_road: dict[tuple[int, bool], list[int]] = {}
         for index, edge in enumerate(edges):
@@ -335,7 +345,7 @@ class _Reach:
 
     def junctions(self, number: int) -> frozenset[str]:
         """Junctions that a connection leads through."""
-        passed = _roads(self._connections[number].alignment, self._table)
+        passed = _roads_of(self._connections[number].alignment, self._table)
         return frozenset(str(self._odr.roads[road].junction) for road in passed) - {"None"}
 
     def controls(self, place: Acting) -> list[int]:
@@ -344,7 +354,7 @@ class _Reach:
             return _on_connecting(place, self._table, self._connections, self._over)
         found: list[int] = []
         for growing in (True, False):
-            edge, _ = self._ahead(place, growing=growing)
+            edge, _ = self._edge_ahead(place, growing=growing)
             if edge is None or not place.faces(growing=growing):
                 continue
             for number in self._leaving.get(edge, ()):
@@ -357,9 +367,9 @@ class _Reach:
         """Metres to the next junction, whichever way the signal faces."""
         if self._odr.roads[place.road].junction is not None:
             return math.inf
-        return abs(self._ahead(place, growing=growing)[1])
+        return abs(self._edge_ahead(place, growing=growing)[1])
 
-    def _ahead(self, place: Acting, *, growing: bool) -> tuple[int | None, float]:
+    def _edge_ahead(self, place: Acting, *, growing: bool) -> tuple[int | None, float]:
         """Edge at the end of which the next junction comes, and metres to there."""
         sign = 1.0 if growing else -1.0
         gaps = [
@@ -378,11 +388,11 @@ class _Reach:
             for number in home
             if self._edges[target := self._connections[number].target].road == road
             and abs(self._edges[target].start - place.s) <= REACH
-            and abs(self._turn(self._connections[number])) < STRAIGHT
+            and abs(self._turn_angle(self._connections[number])) < STRAIGHT
         }
         return sorted(n for n in home if self._connections[n].source in straight)
 
-    def _turn(self, connection: PlannedConnection) -> float:
+    def _turn_angle(self, connection: PlannedConnection) -> float:
         """Change of heading, radians."""
         last = self._edges[connection.source].lanes[connection.source_lane].alignment[-1]
         first = self._edges[connection.target].lanes[connection.target_lane].alignment[0]
@@ -393,7 +403,7 @@ class _Reach:
         return wrapped(float(headings[1] - headings[0]))
 
 
-def _roads(alignment: LaneAlignment, table: RoadTable) -> Iterator[RoadId]:
+def _roads_of(alignment: LaneAlignment, table: RoadTable) -> Iterator[RoadId]:
     for stretch in alignment:
         yield table.road_ids[table.lane_road[stretch.row]]
 

@@ -159,7 +159,7 @@ class _Sharing:
                 heads.setdefault(key, []).append(n)
         groups: list[SignalGroup] = []
         members: list[tuple[int, ...]] = []
-        for (_, _, turning), own in self._ordered(heads):
+        for (_, _, turning), own in self._order_heads(heads):
             speed = max(links.movements[n].speed for n in own)
             place = tuple(rows[n] for n in own)
             controller = links.controllers[own[0]]
@@ -171,7 +171,7 @@ class _Sharing:
             link = self._count + index
             groups.append(SignalGroup((rows[link],), "", walkers=True, speed=0.0))
             members.append((link,))
-        return tuple(groups), self._conflicts(members, rows)
+        return tuple(groups), self._conflicts_of_members(members, rows)
 
     def met(self, rows: dict[int, int]) -> tuple[LinkConflict, ...]:
         """Pairs of links that meet, by their positions at the light."""
@@ -186,13 +186,13 @@ class _Sharing:
                         rows[j],
                         rows[i] if gives_way else rows[j] if back else -1,
                         (i, j) not in self._never,
-                        self._clearing(i, j),
-                        self._clearing(j, i),
+                        self._clearing_seconds(i, j),
+                        self._clearing_seconds(j, i),
                     )
                 )
         return tuple(sorted(found))
 
-    def _ordered(
+    def _order_heads(
         self, heads: dict[tuple[str, tuple[str, ...], bool], list[int]]
     ) -> list[tuple[tuple[str, tuple[str, ...], bool], list[int]]]:
         """Each approach followed by what is opposite it: who comes first chooses company first."""
@@ -213,7 +213,9 @@ class _Sharing:
                 result.append(item)
         return result
 
-    def _conflicts(self, members: Sequence[Sequence[int]], rows: dict[int, int]) -> GroupConflicts:
+    def _conflicts_of_members(
+        self, members: Sequence[Sequence[int]], rows: dict[int, int]
+    ) -> GroupConflicts:
         group_of = {link: g for g, own in enumerate(members) for link in own}
         apart: set[tuple[int, int]] = set()
         clearing: dict[tuple[int, int], float] = {}
@@ -224,7 +226,9 @@ class _Sharing:
             if (i, j) in self._never and a != b:
                 apart.add((min(a, b), max(a, b)))
             for (one, link), (other, link2) in (((a, i), (b, j)), ((b, j), (a, i))):
-                seconds = max(self._clearing(link, link2), self._released(link, link2))
+                seconds = max(
+                    self._clearing_seconds(link, link2), self._release_seconds(link, link2)
+                )
                 clearing[one, other] = max(clearing.get((one, other), 0.0), seconds)
         yielding = frozenset(
             (rows[i], rows[j])
@@ -240,7 +244,7 @@ class _Sharing:
     def _apart_by(heading: float, other: float) -> float:
         return abs(wrapped(other - heading))
 
-    def _across(self, link: int) -> bool:
+    def _turns_across(self, link: int) -> bool:
         return self._links.side * self._links.movements[link].turn > TURN
 
     def _may_share(self, i: int, j: int) -> bool:
@@ -255,9 +259,13 @@ class _Sharing:
         if self._apart_by(one.heading_in, other.heading_in) < OPPOSING:
             return False
         turning = [n for n in (i, j) if abs(movements[n].turn) > TURN]
-        if {movements[n].source for n in (i, j) if self._across(n)} & self._protected:
+        if {movements[n].source for n in (i, j) if self._turns_across(n)} & self._protected:
             return False
-        if not self._lines[i].intersects(self._lines[j]) and self._across(i) and self._across(j):
+        if (
+            not self._lines[i].intersects(self._lines[j])
+            and self._turns_across(i)
+            and self._turns_across(j)
+        ):
             return self._sees_until_out(i, j) or self._sees_until_out(j, i)
         return bool(turning)
 
@@ -276,15 +284,15 @@ class _Sharing:
         lanes: dict[tuple[str, int], list[int]] = {}
         for n in cars:
             lanes.setdefault(movements[n].source, []).append(n)
-        turning = {lane for lane, own in lanes.items() if all(self._across(n) for n in own)}
+        turning = {lane for lane, own in lanes.items() if all(self._turns_across(n) for n in own)}
         return {
             lane
             for lane in turning
             if sum(other[0] == lane[0] for other in turning) >= TURNING_LANES
-            or self._oncoming(movements[lanes[lane][0]], cars)
+            or self._has_heavy_oncoming(movements[lanes[lane][0]], cars)
         }
 
-    def _oncoming(self, turn: Movement, cars: Sequence[int]) -> bool:
+    def _has_heavy_oncoming(self, turn: Movement, cars: Sequence[int]) -> bool:
         """Whether oncoming traffic is more than one can find gaps in."""
         found = [
             movement
@@ -298,7 +306,7 @@ class _Sharing:
 
     # Clearing
 
-    def _clearing(self, ending: int, beginning: int) -> float:
+    def _clearing_seconds(self, ending: int, beginning: int) -> float:
         """Whole seconds from yellow's end, or a crossing's red, until ``beginning`` may go."""
         if ending >= self._count:
             length = shapely.LineString(
@@ -309,18 +317,21 @@ class _Sharing:
         if beginning < self._count:
             other = self._lines[beginning]
             seconds = max(
-                self._left(ending, line.project(place)) - other.project(place) / ENTERING_SPEED
+                self._leaving_seconds(ending, line.project(place))
+                - other.project(place) / ENTERING_SPEED
                 for place in _meeting_places(line, other)
             )
         else:
             walk = self._links.walkways[beginning - self._count].axis[:, :2]
             path = line.buffer(MOST_WIDTH)
-            ways = [_passed(shapely.LineString(axis), path)[0] for axis in (walk, walk[::-1])]
-            last = _passed(line, self._areas[beginning - self._count])[1]
-            seconds = self._left(ending, last) - min(ways) / ENTERING_WALKER
+            ways = [
+                _passed_metres(shapely.LineString(axis), path)[0] for axis in (walk, walk[::-1])
+            ]
+            last = _passed_metres(line, self._areas[beginning - self._count])[1]
+            seconds = self._leaving_seconds(ending, last) - min(ways) / ENTERING_WALKER
         return min(max(float(math.ceil(seconds)), 1.0), MOST_RED)
 
-    def _released(self, ending: int, beginning: int) -> float:
+    def _release_seconds(self, ending: int, beginning: int) -> float:
         """Whole seconds from yellow's end until who waits inside has oncoming traffic behind it.
 
         In SUMO neither of two vehicles that enter their paths at one instant brakes for the other.
@@ -328,7 +339,7 @@ class _Sharing:
         if ending not in self._links.waiting or beginning >= self._count:
             return 0.0
         seconds = [
-            self._left(other, self._lines[other].project(place)) - LAST_IN
+            self._leaving_seconds(other, self._lines[other].project(place)) - LAST_IN
             for other in self._links.rights[ending].yields_to
             if other < self._count and self._goes_on(other) and self._may_share(ending, other)
             for place in _meeting_places(self._lines[other], self._lines[ending])
@@ -338,7 +349,7 @@ class _Sharing:
     def _goes_on(self, link: int) -> bool:
         return abs(self._links.movements[link].turn) < TURN
 
-    def _left(self, ending: int, way: float) -> float:
+    def _leaving_seconds(self, ending: int, way: float) -> float:
         """Seconds from the end of yellow until the last vehicle has left a place on its path."""
         if self._links.bicycles[ending]:
             return way / BICYCLE_SPEED - BICYCLE_HEAD_START
@@ -357,7 +368,7 @@ def _meeting_places(one: shapely.LineString, other: shapely.LineString) -> list[
     return [shapely.Point(xy) for xy in shapely.get_coordinates(shared)]
 
 
-def _passed(line: shapely.LineString, place: shapely.Geometry) -> tuple[float, float]:
+def _passed_metres(line: shapely.LineString, place: shapely.Geometry) -> tuple[float, float]:
     """Metres along a line to the first and the last of it in a place."""
     shared = line.intersection(place)
     if shared.is_empty:

@@ -132,23 +132,23 @@ def plan_stages(groups: Sequence[SignalGroup], conflicts: GroupConflicts) -> Sta
         controller = groups[number].controller
         mates = [n for n in vehicles if controller and groups[n].controller == controller]
         left = [n for n in (*mates, *vehicles) if not any(n in stage for stage in stages)]
-        stages.append(_filled({number}, left, apart))
-    stages = [_filled(stage, walkers, apart) for stage in stages]
+        stages.append(_fill_stage({number}, left, apart))
+    stages = [_fill_stage(stage, walkers, apart) for stage in stages]
     waiting = {n for n in walkers if not any(n in stage for stage in stages)}
     if waiting:
         stages.append(waiting)
-    full = [_filled(stage, (*vehicles, *walkers), apart) for stage in stages]
+    full = [_fill_stage(stage, (*vehicles, *walkers), apart) for stage in stages]
     return Stages(tuple(groups), tuple(frozenset(stage) for stage in full), conflicts)
 
 
-def _filled(
+def _fill_stage(
     stage: set[int], candidates: Sequence[int], apart: frozenset[tuple[int, int]]
 ) -> set[int]:
     """Add to a stage what may go with all in it, in the order given."""
     result = set(stage)
-    for one in candidates:
-        if all((min(one, other), max(one, other)) not in apart for other in result):
-            result.add(one)
+    for candidate in candidates:
+        if all((min(candidate, other), max(candidate, other)) not in apart for other in result):
+            result.add(candidate)
     return result
 
 
@@ -191,24 +191,24 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
     """
     order = stages.green if len(stages.green) > 1 else (*stages.green, frozenset[int]())
     turns = [(stage, order[(k + 1) % len(order)]) for k, stage in enumerate(order)]
-    changes = [_change(stages, stage, following) for stage, following in turns]
-    greens = _greens(stages.groups, order, changes)
+    changes = [_plan_change(stages, stage, following) for stage, following in turns]
+    greens = _green_seconds(stages.groups, order, changes)
     phases: list[Phase] = []
     for number, (stage, following) in enumerate(turns):
         green, change = greens[number], changes[number]
         vehicles = any(not stages.groups[g].walkers for g in stage)
         bounds = (min(LEAST_GREEN, green), PROLONGED * green) if vehicles else (0.0, 0.0)
-        shown = _state(stages, stage, links)
+        shown = _stage_state(stages, stage, links)
         phases.append(Phase(green, shown, f"{STAGE}{number + 1}", *bounds))
         if change.walk:
             ending = frozenset(g for g in stage - following if stages.groups[g].walkers)
-            still = _darkened(shown, stages.groups, ending)
+            still = _darken_state(shown, stages.groups, ending)
             phases.append(Phase(change.walk, still, "pedestrian clearance"))
-        phases += _ending(stages, stage, following, change, links)
+        phases += _ending_phases(stages, stage, following, change, links)
     return tuple(phases)
 
 
-def _ending(
+def _ending_phases(
     stages: Stages,
     stage: frozenset[int],
     following: frozenset[int],
@@ -217,23 +217,25 @@ def _ending(
 ) -> list[Phase]:
     """Phases from the end of the vehicles' green to where all of the next stage have begun."""
     groups, ending = stages.groups, stage - following
-    after = _state(stages, following, links)
-    staying = _careful(_darkened(_state(stages, stage, links), groups, ending), after)
+    after = _stage_state(stages, following, links)
+    staying = _careful_state(
+        _darken_state(_stage_state(stages, stage, links), groups, ending), after
+    )
     times = sorted({0.0, change.yellow, *change.starts.values()})
     phases = []
     for start, end in pairwise(times):
         begun = [g for g, seconds in change.starts.items() if seconds <= start]
-        state = _begun(staying, after, groups, begun)
+        state = _begin_state(staying, after, groups, begun)
         cars = any(not groups[g].walkers for g in begun)
         name = "vehicles first" if cars else "crossings first" if begun else "all red"
         if start < change.yellow:
             vehicles = frozenset(g for g in ending if not groups[g].walkers)
-            state, name = _darkened(state, groups, vehicles, "y"), "yellow"
+            state, name = _darken_state(state, groups, vehicles, "y"), "yellow"
         phases.append(Phase(end - start, state, name))
     return phases
 
 
-def _change(stages: Stages, stage: frozenset[int], following: frozenset[int]) -> _Change:
+def _plan_change(stages: Stages, stage: frozenset[int], following: frozenset[int]) -> _Change:
     groups, seconds = stages.groups, stages.conflicts.seconds
     ending, beginning = stage - following, following - stage
     cars = [g for g in ending if not groups[g].walkers]
@@ -254,11 +256,11 @@ def _change(stages: Stages, stage: frozenset[int], following: frozenset[int]) ->
     return _Change(max(walk, 0.0), yellow, starts, lost)
 
 
-def _greens(
+def _green_seconds(
     groups: Sequence[SignalGroup], order: Sequence[frozenset[int]], changes: Sequence[_Change]
 ) -> list[float]:
     """Seconds in which all of a stage are green."""
-    shares = [_share(groups, stage) for stage in order]
+    shares = [_flow_share(groups, stage) for stage in order]
     walks = sum(
         WALK_GREEN + change.walk for share, change in zip(shares, changes, strict=True) if not share
     )
@@ -278,7 +280,7 @@ def _greens(
     return greens
 
 
-def _share(groups: Sequence[SignalGroup], stage: frozenset[int]) -> float:
+def _flow_share(groups: Sequence[SignalGroup], stage: frozenset[int]) -> float:
     """Flow ratio of a stage against that of one for a whole approach; 0 without vehicles."""
     cars = [groups[g] for g in stage if not groups[g].walkers]
     if not cars:
@@ -286,7 +288,7 @@ def _share(groups: Sequence[SignalGroup], stage: frozenset[int]) -> float:
     return TURNING_SHARE if all(group.turning for group in cars) else 1.0
 
 
-def _state(stages: Stages, stage: frozenset[int], links: int) -> str:
+def _stage_state(stages: Stages, stage: frozenset[int], links: int) -> str:
     """Letters of a stage: who gives way to another that is green has ``g``."""
     green = {link for group in stage for link in stages.groups[group].links}
     waiting = {one for one, other in stages.conflicts.yielding if other in green}
@@ -295,7 +297,7 @@ def _state(stages: Stages, stage: frozenset[int], links: int) -> str:
     )
 
 
-def _darkened(
+def _darken_state(
     state: str, groups: Sequence[SignalGroup], ending: frozenset[int], letter: str = "r"
 ) -> str:
     """State with another letter for the links of some groups."""
@@ -303,14 +305,16 @@ def _darkened(
     return "".join(letter if n in links else one for n, one in enumerate(state))
 
 
-def _begun(state: str, after: str, groups: Sequence[SignalGroup], begun: Sequence[int]) -> str:
+def _begin_state(
+    state: str, after: str, groups: Sequence[SignalGroup], begun: Sequence[int]
+) -> str:
     """State in which some groups show already what they do in the next stage."""
     links = {link for group in begun for link in groups[group].links}
     pairs = zip(state, after, strict=True)
     return "".join(new if n in links else old for n, (old, new) in enumerate(pairs))
 
 
-def _careful(state: str, following: str) -> str:
+def _careful_state(state: str, following: str) -> str:
     """State between two stages: what gives way in the next one does so already."""
     pairs = zip(state, following, strict=True)
     return "".join("g" if one == "G" and other == "g" else one for one, other in pairs)

@@ -153,12 +153,12 @@ def sumo_ends(
     lines = Polylines.of([lane.shape for lane in lanes])
     reach = np.minimum(_END, lines.lengths)
     shares = np.array(_END_SHARES)
-    starts = _scores(lines, reach[:, None] * shares, outer, lane_of)
-    ends = _scores(lines, lines.lengths[:, None] - reach[:, None] * shares, outer, lane_of)
+    starts = _score_lanes(lines, reach[:, None] * shares, outer, lane_of)
+    ends = _score_lanes(lines, lines.lengths[:, None] - reach[:, None] * shares, outer, lane_of)
     along = lines.lengths[:, None] * np.array(_LANE_SHARES)
-    whole = _scores(lines, along, outer, [(road, 0) for road, _ in lane_of])
+    whole = _score_lanes(lines, along, outer, [(road, 0) for road, _ in lane_of])
     return {
-        lane.id: Ends(_best(starts[k], whole[k]), _best(ends[k], whole[k]))
+        lane.id: Ends(_best_lanes(starts[k], whole[k]), _best_lanes(ends[k], whole[k]))
         for k, lane in enumerate(lanes)
     }
 
@@ -180,7 +180,7 @@ def passed_over(
     return {(lane_of[a], lane_of[b]) for a, b in pairs}
 
 
-def _scores(
+def _score_lanes(
     lines: Polylines, along: FloatArray, outer: Finder, lane_of: Sequence[RoadLane]
 ) -> list[dict[RoadLane, float]]:
     """Mean distance of the places of each line from the lanes of the map near it."""
@@ -201,15 +201,17 @@ def _scores(
     return scores
 
 
-def _best(scores: dict[RoadLane, float], whole: dict[RoadLane, float]) -> tuple[RoadLane, ...]:
-    alike = _lowest(scores)
+def _best_lanes(
+    scores: dict[RoadLane, float], whole: dict[RoadLane, float]
+) -> tuple[RoadLane, ...]:
+    alike = _lowest_lanes(scores)
     if len({road for road, _ in alike}) > 1:
-        followed = _lowest({(road, 0): whole[road, 0] for road, _ in alike})
+        followed = _lowest_lanes({(road, 0): whole[road, 0] for road, _ in alike})
         alike = [lane for lane in alike if (lane[0], 0) in followed]
     return tuple(alike)
 
 
-def _lowest(scores: dict[RoadLane, float]) -> list[RoadLane]:
+def _lowest_lanes(scores: dict[RoadLane, float]) -> list[RoadLane]:
     limit = min(scores.values(), default=0.0) + _ALIKE
     return sorted((lane for lane in scores if scores[lane] <= limit), key=lambda ln: scores[ln])
 
@@ -243,11 +245,11 @@ def _unsafe_at(
                     continue
                 waits = one == "g" and b in junction.yields.get(a, ())
                 if not waits and not (other == "g" and a in junction.yields.get(b, ())):
-                    x, y = _middle(net, links[a], links[b])
+                    x, y = _middle_of_links(net, links[a], links[b])
                     yield UnsafePair(program.tl, phase, indices, "g" in (one, other), x, y)
 
 
-def _middle(net: NetFile, *links: NetFileLink) -> tuple[float, float]:
+def _middle_of_links(net: NetFile, *links: NetFileLink) -> tuple[float, float]:
     """Where two links meet, about: the middle between their lanes."""
     shapes = [net.lanes[link.via or link.target].shape for link in links]
     x, y = np.mean(
@@ -284,15 +286,15 @@ def verify(net_xml: bytes, odr: OpenDrive, table: RoadTable) -> Fidelity:
     drivable = _MapLanes(odr, table, DRIVABLE_TYPES)
     walkable = _MapLanes(odr, table, WALKABLE_TYPES)
     drives = net.driving("normal", "internal")
-    on_roads, far_on_roads = _deviation(net.driving("normal"), drivable)
-    inside, far_inside = _deviation(net.driving("internal"), drivable)
+    on_roads, far_on_roads = _measure_deviation(net.driving("normal"), drivable)
+    inside, far_inside = _measure_deviation(net.driving("internal"), drivable)
     covered = drivable.covered(drives, directed=True)
     walks = [
         ln for ln in net.lanes.values() if ln.function == "normal" and ln.walks and not ln.cars
     ]
     walked = walkable.covered(walks, directed=False)
-    relations, missing, invented = _relations(net, odr, drivable)
-    shown, lost = _crosswalks(net, odr, table)
+    relations, missing, invented = _compare_relations(net, odr, drivable)
+    shown, lost = _compare_crosswalks(net, odr, table)
     return Fidelity(
         normal=on_roads,
         internal=inside,
@@ -369,7 +371,7 @@ class _MapLanes:
         gaps = []
         for lane in np.flatnonzero(lacking > _MIN_GAP):
             where = np.flatnonzero(bare.owner == lane)
-            place = _xy(bare.xy[where[len(where) // 2]])
+            place = _point_xy(bare.xy[where[len(where) // 2]])
             key = self.table.lane_keys[self.rows[lane]]
             gaps.append(UncoveredStretch(str(key), *place, float(lacking[lane])))
         return tuple(gaps)
@@ -389,7 +391,9 @@ def _centre_lines(table: RoadTable, rows: IntArray) -> Polylines:
     return Polylines(np.stack([points.x, points.y, points.width], axis=1), first)
 
 
-def _deviation(lanes: list[NetFileLane], drivable: _MapLanes) -> tuple[Deviation, list[FarPlace]]:
+def _measure_deviation(
+    lanes: list[NetFileLane], drivable: _MapLanes
+) -> tuple[Deviation, list[FarPlace]]:
     """Distance of SUMO lanes from the map's, and the farthest place of each lane that is far."""
     places = Polylines.of([lane.shape for lane in lanes]).cut(_PLACE_STEP)
     distance, _ = drivable.finder.nearest(places, REACH)
@@ -401,7 +405,7 @@ def _deviation(lanes: list[NetFileLane], drivable: _MapLanes) -> tuple[Deviation
     owner, at = np.unique(places.owner[order], return_index=True)
     worst = order[at]
     found = [
-        FarPlace(lanes[lane].id, *_xy(places.xy[row]), float(distance[row]))
+        FarPlace(lanes[lane].id, *_point_xy(places.xy[row]), float(distance[row]))
         for lane, row in zip(owner.tolist(), worst.tolist(), strict=True)
         if distance[row] > MAX_P99
     ]
@@ -420,7 +424,7 @@ def _cars_on(walkable: _MapLanes, drivable: _MapLanes, lanes: list[NetFileLane])
     return tuple(cars[k].id for k in np.flatnonzero(length > 0.5 * total))
 
 
-def _relations(
+def _compare_relations(
     net: NetFile, odr: OpenDrive, drivable: _MapLanes
 ) -> tuple[int, tuple[LaneRelation, ...], tuple[LaneRelation, ...]]:
     """Count the map's relations; list the missing and the invented ones."""
@@ -449,27 +453,29 @@ def _relations(
         # Within one side of a road SUMO may well divide and join edges as it needs.
         if not found and (not pairs or all(is_between_roads(*pair) for pair in pairs)):
             names = f"{link.source} to {link.target}"
-            place = _xy(lanes[link.source].shape[-1])
-            invented.append(LaneRelation(_named(sources), _named(targets), *place, names))
+            place = _point_xy(lanes[link.source].shape[-1])
+            invented.append(LaneRelation(_name_lanes(sources), _name_lanes(targets), *place, names))
     line = {key: k for k, key in enumerate(keys)}
     last = drivable.lines.first[1:] - 1
     missing = [
-        LaneRelation(_named([a]), _named([b]), *_xy(drivable.lines.points[last[line[start]]]))
+        LaneRelation(
+            _name_lanes([a]), _name_lanes([b]), *_point_xy(drivable.lines.points[last[line[start]]])
+        )
         for (a, b), start in stated.items()
         if (a, b) not in held
     ]
     return len(stated), tuple(missing), tuple(invented)
 
 
-def _xy(point: FloatArray) -> tuple[float, float]:
+def _point_xy(point: FloatArray) -> tuple[float, float]:
     return float(point[0]), float(point[1])
 
 
-def _named(lanes: Sequence[RoadLane]) -> str:
+def _name_lanes(lanes: Sequence[RoadLane]) -> str:
     return f"{lanes[0][0]}.{lanes[0][1]}" if lanes else "?"
 
 
-def _crosswalks(
+def _compare_crosswalks(
     net: NetFile, odr: OpenDrive, table: RoadTable
 ) -> tuple[int, tuple[LostCrosswalk, ...]]:
     """Count the crosswalks; list those that no crossing lies on."""
@@ -486,6 +492,6 @@ def _crosswalks(
         over = [area.intersection(crossings[k]).area for k in tree.query(area).tolist()]
         share = max(over, default=0.0) / area.area
         if share <= CROSSWALK_SHARE:
-            place = _xy(crosswalk.polygon.mean(axis=0))
+            place = _point_xy(crosswalk.polygon.mean(axis=0))
             lost.append(LostCrosswalk(crosswalk.road, crosswalk.object_id, *place, share))
     return len(found), tuple(lost)

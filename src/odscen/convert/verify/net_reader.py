@@ -128,16 +128,17 @@ def read_net(content: bytes) -> NetFile:
     """
     root = read_xml(content, huge=True)
     known = read_connections(root)
-    with _reading():
+    with _refuse_unreadable():
         return NetFile(
             functions=known.functions,
             links=known.links,
             junctions=known.junctions,
             left_hand=root.get("lefthand") == "true",
-            lanes=_lanes(root),
+            lanes=_read_lanes(root),
             programs=tuple(
                 NetFileProgram(
-                    _text(logic, "id"), tuple(_text(p, "state") for p in logic.iterfind("phase"))
+                    _required_text(logic, "id"),
+                    tuple(_required_text(p, "state") for p in logic.iterfind("phase")),
                 )
                 for logic in root.iterfind("tlLogic")
             ),
@@ -152,21 +153,21 @@ def read_connections(root: etree._Element) -> NetConnections:
     InputError
         If it is not a complete SUMO network.
     """
-    with _reading():
+    with _refuse_unreadable():
         edges: dict[str, dict[str, str]] = {}
         functions: dict[str, str] = {}
         for edge in root.iterfind("edge"):
-            ids = edges.setdefault(_text(edge, "id"), {})
+            ids = edges.setdefault(_required_text(edge, "id"), {})
             for lane in edge.iterfind("lane"):
-                lane_id = ids[_text(lane, "index")] = _text(lane, "id")
+                lane_id = ids[_required_text(lane, "index")] = _required_text(lane, "id")
                 functions[lane_id] = edge.get("function", "normal")
         return NetConnections(
-            functions, tuple(_links(root, edges, functions)), tuple(_junctions(root))
+            functions, tuple(_read_links(root, edges, functions)), tuple(_read_junctions(root))
         )
 
 
 @contextmanager
-def _reading() -> Iterator[None]:
+def _refuse_unreadable() -> Iterator[None]:
     try:
         yield
     except (LookupError, ValueError) as error:
@@ -175,28 +176,28 @@ def _reading() -> Iterator[None]:
         ) from error
 
 
-def _lanes(root: etree._Element) -> dict[str, NetFileLane]:
+def _read_lanes(root: etree._Element) -> dict[str, NetFileLane]:
     location = root.find("location")
     if location is None:
         raise ValueError("<location> is missing")
-    offset = np.array([float(part) for part in _text(location, "netOffset").split(",")])
+    offset = np.array([float(part) for part in _required_text(location, "netOffset").split(",")])
     lanes: dict[str, NetFileLane] = {}
     for edge in root.iterfind("edge"):
         for lane in edge.iterfind("lane"):
-            lane_id = _text(lane, "id")
+            lane_id = _required_text(lane, "id")
             lanes[lane_id] = NetFileLane(
                 id=lane_id,
                 function=edge.get("function", "normal"),
                 width=float(lane.get("width", "3.2")),
-                shape=_shape(_text(lane, "shape"), offset),
-                drives=any(_allows(lane, vclass) for vclass in MOTOR_CLASSES),
-                cars=_allows(lane, "passenger"),
-                walks=_allows(lane, "pedestrian"),
+                shape=_parse_shape(_required_text(lane, "shape"), offset),
+                drives=any(_lane_allows(lane, vclass) for vclass in MOTOR_CLASSES),
+                cars=_lane_allows(lane, "passenger"),
+                walks=_lane_allows(lane, "pedestrian"),
             )
     return lanes
 
 
-def _shape(text: str, offset: FloatArray) -> FloatArray:
+def _parse_shape(text: str, offset: FloatArray) -> FloatArray:
     shape = np.array([[float(part) for part in xyz.split(",")[:2]] for xyz in text.split()])
     shape = shape - offset
     if shape.ndim != 2 or not np.isfinite(shape).all():
@@ -204,21 +205,21 @@ def _shape(text: str, offset: FloatArray) -> FloatArray:
     return shape
 
 
-def _text(element: etree._Element, name: str) -> str:
+def _required_text(element: etree._Element, name: str) -> str:
     value = element.get(name)
     if value is None:
         raise KeyError(f"attribute {name} of <{element.tag}> is missing")
     return value
 
 
-def _allows(lane: etree._Element, vclass: str) -> bool:
+def _lane_allows(lane: etree._Element, vclass: str) -> bool:
     allow, disallow = lane.get("allow"), lane.get("disallow")
     if allow is not None:
         return bool({"all", vclass} & set(allow.split()))
     return disallow is None or not {"all", vclass} & set(disallow.split())
 
 
-def _links(
+def _read_links(
     root: etree._Element, edges: dict[str, dict[str, str]], known: Container[str]
 ) -> Iterator[NetFileLink]:
     for link in root.iterfind("connection"):
@@ -226,25 +227,31 @@ def _links(
         if via and via not in known:
             raise ValueError(f"connection via {via}, which is no lane")
         yield NetFileLink(
-            edges[_text(link, "from")][_text(link, "fromLane")],
-            edges[_text(link, "to")][_text(link, "toLane")],
+            edges[_required_text(link, "from")][_required_text(link, "fromLane")],
+            edges[_required_text(link, "to")][_required_text(link, "toLane")],
             via,
             link.get("tl", ""),
             int(link.get("linkIndex", "-1")),
         )
 
 
-def _junctions(root: etree._Element) -> Iterator[NetFileJunction]:
+def _read_junctions(root: etree._Element) -> Iterator[NetFileJunction]:
     for junction in root.iterfind("junction"):
         if junction.get("type") == "internal":
             continue
         requests = list(junction.iterfind("request"))
         yield NetFileJunction(
-            _text(junction, "id"),
+            _required_text(junction, "id"),
             junction.get("type", ""),
             tuple(junction.get("incLanes", "").split()),
-            {int(_text(r, "index")): _links_of(_text(r, "foes")) for r in requests},
-            {int(_text(r, "index")): _links_of(_text(r, "response")) for r in requests},
+            {
+                int(_required_text(r, "index")): _links_of(_required_text(r, "foes"))
+                for r in requests
+            },
+            {
+                int(_required_text(r, "index")): _links_of(_required_text(r, "response"))
+                for r in requests
+            },
         )
 
 

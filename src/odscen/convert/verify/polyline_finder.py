@@ -77,7 +77,7 @@ class Polylines:
         return cls(points, offsets(map(len, shapes)))
 
     @cached_property
-    def _steps(self) -> FloatArray:
+    def _step_lengths(self) -> FloatArray:
         """Length from each point to the next of the same line, 0 from the last; ``(N,)``."""
         steps = np.zeros(len(self.points))
         steps[:-1] = np.hypot(*np.diff(self.points[:, :2], axis=0).T)
@@ -85,23 +85,23 @@ class Polylines:
         return steps
 
     @cached_property
-    def _arc(self) -> FloatArray:
-        return np.concatenate([[0.0], np.cumsum(self._steps)])
+    def _arc_lengths(self) -> FloatArray:
+        return np.concatenate([[0.0], np.cumsum(self._step_lengths)])
 
     @cached_property
     def lengths(self) -> FloatArray:
         """Length of each line in metres."""
-        lengths: FloatArray = self._arc[self.first[1:]] - self._arc[self.first[:-1]]
+        lengths: FloatArray = self._arc_lengths[self.first[1:]] - self._arc_lengths[self.first[:-1]]
         return lengths
 
     def at(self, line: IntArray, along: FloatArray, length: FloatArray) -> Pieces:
         """Pieces of ``length`` whose middles lie ``along`` metres into lines; inside them only."""
-        where = self._arc[self.first[line]] + along
-        row = np.searchsorted(self._arc, where, side="right") - 1
-        share = ((where - self._arc[row]) / self._steps[row])[:, None]
+        where = self._arc_lengths[self.first[line]] + along
+        row = np.searchsorted(self._arc_lengths, where, side="right") - 1
+        share = ((where - self._arc_lengths[row]) / self._step_lengths[row])[:, None]
         step = self.points[row + 1] - self.points[row]
         points = self.points[row] + share * step
-        ahead = step[:, :2] / self._steps[row, None]
+        ahead = step[:, :2] / self._step_lengths[row, None]
         return Pieces(points[:, :2], ahead, length, line, points[:, 2])
 
     def cut(self, step: float) -> Pieces:
@@ -121,7 +121,7 @@ class Finder:
     pieces: Pieces
 
     @cached_property
-    def _tree(self) -> cKDTree:
+    def _piece_tree(self) -> cKDTree:
         return cKDTree(self.pieces.xy)
 
     def around(
@@ -145,7 +145,7 @@ class Finder:
         pieces = self.pieces
         if not len(pieces.xy):
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        found: Any = self._tree.query_ball_point(places.xy, radius)  # lists, one per place
+        found: Any = self._piece_tree.query_ball_point(places.xy, radius)  # lists, one per place
         count = np.array([len(rows) for rows in found], dtype=np.int64)
         near = np.concatenate([np.zeros(0, np.int64), *found]).astype(np.int64)
         place = np.repeat(np.arange(len(found)), count)

@@ -143,12 +143,12 @@ def _ruled_places(
             place.roads.update(counts)
             inside = (odr.roads[RoadId(road)].junction for road in counts)
             place.junctions.update(junction for junction in inside if junction is not None)
-        for counts in _roads_under(net, _ends(ruled), drivable, keys):
+        for counts in _roads_under(net, _lanes_around(ruled), drivable, keys):
             place.roads.update(road for road, _ in counts.most_common(1))
     return found
 
 
-def _ends(links: Sequence[NetFileLink]) -> list[str]:
+def _lanes_around(links: Sequence[NetFileLink]) -> list[str]:
     """Lanes of vehicles before and behind links."""
     return list(dict.fromkeys(lane for ln in links if ln.via for lane in (ln.source, ln.target)))
 

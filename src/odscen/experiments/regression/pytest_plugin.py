@@ -83,9 +83,9 @@ class _ScenarioTest(pytest.Item):
         except ValueError:
             raise pytest.UsageError(f"odscen_seeds: {self.seed!r} is not a whole number") from None
         expect = self.config.getini("odscen_expect")
-        settings = _settings(seed=seed, expect=expect)
-        result = _run(self.config, factory.mktemp("odscen"), self.path, settings)
-        found = _shortcomings(result)
+        settings = _make_settings(seed=seed, expect=expect)
+        result = _run_scenario(self.config, factory.mktemp("odscen"), self.path, settings)
+        found = _list_shortcomings(result)
         if found:
             pytest.fail("\n".join(found), pytrace=False)
 
@@ -126,12 +126,12 @@ def odscen_run(
 
         folder = tmp_path_factory.mktemp("odscen")
         try:
-            settings = _settings(seed=seed, until=until, expect=expect)
-            result = _run(request.config, folder, scenario, settings, workspace=workspace)
+            settings = _make_settings(seed=seed, until=until, expect=expect)
+            result = _run_scenario(request.config, folder, scenario, settings, workspace=workspace)
         except OdscenError as error:
             problem = str(error)
         else:
-            problem = "\n".join(_shortcomings(result))
+            problem = "\n".join(_list_shortcomings(result))
             if not problem:
                 return result
         pytest.fail(problem)
@@ -139,7 +139,7 @@ def odscen_run(
     return run
 
 
-def _settings(
+def _make_settings(
     *, seed: int | None, until: float | None = None, expect: Sequence[str]
 ) -> RunSettings:
     from odscen.figures.judging.expectations import parse_expectation
@@ -149,7 +149,7 @@ def _settings(
     return RunSettings(seed=seed, until=until, expectations=expectations)
 
 
-def _run(
+def _run_scenario(
     config: pytest.Config,
     out: Path,
     scenario: Path,
@@ -170,14 +170,14 @@ def _run(
     return runs.run(store, Path(scenario), settings=settings, out=out)
 
 
-def _shortcomings(result: Run) -> list[str]:
+def _list_shortcomings(result: Run) -> list[str]:
     from odscen.figures.judging.criteria import missed_rows, missed_words
     from odscen.records.outcomes import RunStatus
 
     if result.status is RunStatus.FAILED:
         return [f"the run failed: {result.summary['error']}"]
     return [
-        f"expected {verdict['expectation']}, but it is {_plain(verdict['value'])}"
+        f"expected {verdict['expectation']}, but it is {_format_value(verdict['value'])}"
         for verdict in result.summary["expectations"]
         if not verdict["passed"] and verdict["expectation"] != "criteria"
     ] + [
@@ -187,5 +187,5 @@ def _shortcomings(result: Run) -> list[str]:
     ]
 
 
-def _plain(value: float | None) -> str:
+def _format_value(value: float | None) -> str:
     return "nothing" if value is None else f"{value:g}"

@@ -95,16 +95,19 @@ def departure_headways(
         A lane that always has a vehicle at the line.
     """
     of_approach: dict[str, list[StopLane]] = {}
-    for one in lanes:
-        of_approach.setdefault(one.approach, []).append(one)
-    headways = {one.lane: _FIRST for one in lanes}
+    for stop_lane in lanes:
+        of_approach.setdefault(stop_lane.approach, []).append(stop_lane)
+    headways = {lane.lane: _FIRST for lane in lanes}
     for _ in range(_MOST):
         shares = {
-            one.lane: 1.0 if one.lane == full else min(1.0, one.flow * headways[one.lane] / 3600.0)
-            for one in lanes
+            lane.lane: 1.0
+            if lane.lane == full
+            else min(1.0, lane.flow * headways[lane.lane] / 3600.0)
+            for lane in lanes
         }
         new = {
-            one.lane: _headway(one, of_approach, relations[one.approach], shares) for one in lanes
+            lane.lane: _departure_headway(lane, of_approach, relations[lane.approach], shares)
+            for lane in lanes
         }
         change = max(abs(new[lane] - headways[lane]) for lane in new)
         headways = new
@@ -116,12 +119,12 @@ def departure_headways(
 def all_way_capacities(lanes: Sequence[StopLane], relations: Relations) -> dict[str, float]:
     """Vehicles an hour that each lane can carry, with the flows of all others as they are."""
     return {
-        one.lane: 3600.0 / departure_headways(lanes, relations, full=one.lane)[one.lane]
-        for one in lanes
+        lane.lane: 3600.0 / departure_headways(lanes, relations, full=lane.lane)[lane.lane]
+        for lane in lanes
     }
 
 
-def _headway(
+def _departure_headway(
     lane: StopLane,
     of_approach: Mapping[str, Sequence[StopLane]],
     related: Mapping[str, str],
@@ -129,33 +132,35 @@ def _headway(
 ) -> float:
     sides: dict[str, list[float]] = {OPPOSING: [], FROM_LEFT: [], FROM_RIGHT: []}
     for approach, side in related.items():
-        sides[side] += [shares[one.lane] for one in of_approach.get(approach, ())][:_LANES]
+        sides[side] += [shares[lane.lane] for lane in of_approach.get(approach, ())][:_LANES]
     group = _geometry_group(
         len(of_approach[lane.approach]),
-        *(min(len(one), _LANES) for one in sides.values()),
+        *(min(len(side), _LANES) for side in sides.values()),
         legs=len(of_approach),
     )
     left, right, heavy = _ADJUSTED[group in _BASE_LANES]
     adjusted = left * lane.left + right * lane.right + heavy * lane.heavy
     likely, seconds = [0.0] * 5, [0.0] * 5
-    numbers = [_numbers(one[:_LANES]) for one in sides.values()]
-    for counts in product(*(range(len(one)) for one in numbers)):
+    numbers = [_vehicle_count_odds(side[:_LANES]) for side in sides.values()]
+    for counts in product(*(range(len(number)) for number in numbers)):
         chance = 1.0
         for number, count in zip(numbers, counts, strict=True):
             chance *= number[count]
-        case = _case(*counts)
+        case = _conflict_case(*counts)
         likely[case] += chance
-        seconds[case] += chance * _base(group, case, sum(counts))
+        seconds[case] += chance * _base_headway(group, case, sum(counts))
     frame = _LANES if max(map(len, of_approach.values())) >= _LANES else 2
-    corrected = _correlated(likely, [len(one[:_LANES]) for one in sides.values()], frame)
+    corrected = _correlate_arrivals(likely, [len(side[:_LANES]) for side in sides.values()], frame)
     means = [
-        seconds[case] / likely[case] if likely[case] > 0.0 else _base(group, case, _FEWEST[case])
+        seconds[case] / likely[case]
+        if likely[case] > 0.0
+        else _base_headway(group, case, _FEWEST[case])
         for case in range(5)
     ]
     return sum(p * (h + adjusted) for p, h in zip(corrected, means, strict=True))
 
 
-def _numbers(shares: Sequence[float]) -> list[float]:
+def _vehicle_count_odds(shares: Sequence[float]) -> list[float]:
     """How likely there are 0, 1, 2, ... vehicles, each lane having one with its own share."""
     found = [1.0]
     for share in shares:
@@ -164,7 +169,7 @@ def _numbers(shares: Sequence[float]) -> list[float]:
     return found
 
 
-def _case(opposing: int, from_left: int, from_right: int) -> int:
+def _conflict_case(opposing: int, from_left: int, from_right: int) -> int:
     """Degree of conflict, counted from 0."""
     there = (opposing > 0) + (from_left > 0) + (from_right > 0)
     if there == 1:
@@ -172,7 +177,7 @@ def _case(opposing: int, from_left: int, from_right: int) -> int:
     return (0, 1, 3, 4)[there]
 
 
-def _correlated(likely: Sequence[float], lanes: Sequence[int], frame: int) -> list[float]:
+def _correlate_arrivals(likely: Sequence[float], lanes: Sequence[int], frame: int) -> list[float]:
     """Corrected for vehicles that come one after the other: HCM Equations 21-21 to 21-26.
 
     The equations have one correction for each state of a case; states with a vehicle on a lane
@@ -186,14 +191,14 @@ def _correlated(likely: Sequence[float], lanes: Sequence[int], frame: int) -> li
         p[4] - 6 * p[3],
         -10 * p[4],
     )
-    all_of = _states([frame] * 3)
-    parts = [one / most for one, most in zip(_states(lanes), all_of, strict=True)]
+    all_of = _lane_state_counts([frame] * 3)
+    parts = [one / most for one, most in zip(_lane_state_counts(lanes), all_of, strict=True)]
     return [
         one + _CORRELATION * added * part for one, added, part in zip(p, more, parts, strict=True)
     ]
 
 
-def _states(lanes: Sequence[int]) -> tuple[int, ...]:
+def _lane_state_counts(lanes: Sequence[int]) -> tuple[int, ...]:
     """In how many ways the lanes of the three sides can be occupied, for each case."""
     opposing, left, right = (2**number - 1 for number in lanes)
     crossing = opposing * left + opposing * right + left * right
@@ -216,7 +221,7 @@ def _geometry_group(own: int, opposing: int, from_left: int, from_right: int, *,
     return "6"
 
 
-def _base(group: str, case: int, vehicles: int) -> float:
+def _base_headway(group: str, case: int, vehicles: int) -> float:
     if group in _BASE:
         return _BASE[group][case]
     column = _BASE_LANES[group][case]

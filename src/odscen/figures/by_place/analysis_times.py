@@ -94,10 +94,10 @@ class AnalysisTimes:
                 begin, end = torn.row(0)
                 raise InputError(
                     f"the run was measured from {begin:g} to {end:g} s in one: warm-up and interval"
-                    f" must be multiples of {end - begin:g} s, not {self._words()}"
+                    f" must be multiples of {end - begin:g} s, not {self._describe_times()}"
                 )
 
-    def _words(self) -> str:
+    def _describe_times(self) -> str:
         interval = "none" if self.interval is None else f"{self.interval:g} s"
         return f"{self.warm_up:g} s and {interval}"
 

@@ -299,11 +299,11 @@ def _link_capacities(
         turns = [
             (begin, time, until, through_gaps(opposing, time, until, most=flow_of[via]))
             for begin, own in by_begin.items()
-            for time, until in _merged([one for one in own if one.permitted])
+            for time, until in _merge_spans([green for green in own if green.permitted])
         ]
         share = _as_driven(entries.get(via, nothing), turns)
         totals = {
-            begin: sum(one.until - one.time for one in own if not one.permitted)
+            begin: sum(green.until - green.time for green in own if not green.permitted)
             * flow_of[via]
             / 3600.0
             for begin, own in by_begin.items()
@@ -338,7 +338,7 @@ def _as_driven(entries: FloatArray, turns: Sequence[tuple[float, float, float, f
     return served / room if greens >= FEWEST_GREENS and room else 1.0
 
 
-def _merged(greens: Iterable[_Green]) -> list[tuple[float, float]]:
+def _merge_spans(greens: Iterable[_Green]) -> list[tuple[float, float]]:
     """Spans without a break between them as one."""
     found: list[tuple[float, float]] = []
     for time, until, _ in sorted(greens):

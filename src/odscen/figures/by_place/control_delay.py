@@ -132,7 +132,7 @@ def _lost_on(
     if not set(_NEEDED) <= set(trajectories.collect_schema()):
         return None
     known = drivers.select("id", "factor", "max_speed").with_row_index("vehicle")
-    found = _stretch_sums(_ratios(trajectories, known, lanes), period)
+    found = _stretch_sums(_speed_ratios(trajectories, known, lanes), period)
     return (
         found.join(known.select("vehicle", "id"), on="vehicle")
         .join(lanes.select("junction", "movement", first="place", via="lane"), on="first")
@@ -182,7 +182,7 @@ class _Ratios:
     ratio: FloatArray
 
 
-def _ratios(trajectories: pl.LazyFrame, known: pl.DataFrame, lanes: pl.DataFrame) -> _Ratios:
+def _speed_ratios(trajectories: pl.LazyFrame, known: pl.DataFrame, lanes: pl.DataFrame) -> _Ratios:
     """Of known vehicles on known lanes, whose numbers are their rows."""
     import numpy as np
     import polars as pl

@@ -90,7 +90,7 @@ def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | Non
         for other in others:
             before[other].add(one)
     busiest = sorted(turns, key=lambda turn: (-turns[turn], turn))[:_TRIED]
-    routes = {_grown(turn, turns, onwards, before) for turn in busiest}
+    routes = {_grow_route(turn, turns, onwards, before) for turn in busiest}
     for _, route in sorted(routes, key=lambda found: (-found[0], found[1])):
         # Turns that join need not do so lane by lane.
         with suppress(InputError):
@@ -120,7 +120,7 @@ class _Headings:
         return bool(abs(np.angle(into / out)) < _STRAIGHT)
 
 
-def _grown(
+def _grow_route(
     turn: tuple[str, ...],
     turns: dict[tuple[str, ...], int],
     onwards: dict[str, set[str]],
@@ -163,13 +163,13 @@ def path_between(graph: MapGraph, first: str, last: str) -> tuple[str, ...]:
     InputError
         If there is no such segment, or no path.
     """
-    path = _shortest(graph, first, last, None)
+    path = _find_shortest_path(graph, first, last, None)
     if path is None:
         raise InputError(f"one cannot drive from {first} to {last}")
-    return _passed(graph, path)
+    return _passed_segments(graph, path)
 
 
-def _passed(graph: MapGraph, path: Int32Array) -> tuple[str, ...]:
+def _passed_segments(graph: MapGraph, path: Int32Array) -> tuple[str, ...]:
     """Segments in the order in which a path leads over them."""
     rows = graph.lanes.segment[path].tolist()
     return tuple(graph.segments.ids[row] for row, _ in itertools.groupby(rows))
@@ -189,13 +189,13 @@ def corridor_along(graph: MapGraph, segments: Sequence[str]) -> Corridor:
         raise InputError("a corridor needs at least one segment")
     names = _with_junctions(graph, named)
     mask = np.isin(graph.lanes.segment, segment_rows(graph.segments, names))
-    path = _shortest(graph, names[0], names[-1], mask)
-    if path is None or list(_passed(graph, path)) != names:
+    path = _find_shortest_path(graph, names[0], names[-1], mask)
+    if path is None or list(_passed_segments(graph, path)) != names:
         raise InputError(
             f"one cannot drive along {some_of(names, most=20, between=', ')} in this order; "
             "--from and --to find a route"
         )
-    return _measured(graph, names, path)
+    return _measure_corridor(graph, names, path)
 
 
 def _with_junctions(graph: MapGraph, names: Sequence[str]) -> list[str]:
@@ -215,7 +215,9 @@ def _with_junctions(graph: MapGraph, names: Sequence[str]) -> list[str]:
     return whole
 
 
-def _shortest(graph: MapGraph, first: str, last: str, mask: BoolArray | None) -> Int32Array | None:
+def _find_shortest_path(
+    graph: MapGraph, first: str, last: str, mask: BoolArray | None
+) -> Int32Array | None:
     """Nodes of the shortest path from where one enters ``first`` to where one leaves ``last``."""
     lanes = graph.lanes
     start, end = (int(segment_rows(graph.segments, [name])[0]) for name in (first, last))
@@ -232,7 +234,7 @@ def _shortest(graph: MapGraph, first: str, last: str, mask: BoolArray | None) ->
     return None if best is None else router.path(best[1], best[2])
 
 
-def _measured(graph: MapGraph, names: Sequence[str], path: Int32Array) -> Corridor:
+def _measure_corridor(graph: MapGraph, names: Sequence[str], path: Int32Array) -> Corridor:
     lanes = graph.lanes
     line = np.column_stack([lanes.x[path], lanes.y[path]])
     metres = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])

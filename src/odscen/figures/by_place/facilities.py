@@ -128,10 +128,10 @@ class NetFacts:
 
 def movement_facilities(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
     """``movement``, ``junction``, ``approach``, ``facility`` of each way through a junction."""
-    return facts.once("movement_facilities", places, lambda: _facilities(places, facts))
+    return facts.once("movement_facilities", places, lambda: _classify_facilities(places, facts))
 
 
-def _facilities(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
+def _classify_facilities(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
     import polars as pl
 
     col = pl.col
@@ -258,7 +258,7 @@ def highway_density(
     import polars as pl
 
     col = pl.col
-    known = facts.once("highways", places, lambda: _highways(places, facts))
+    known = facts.once("highways", places, lambda: _find_highways(places, facts))
     # A map without any has no row, and most maps are such.
     if known.is_empty():
         return _no_density()
@@ -296,7 +296,7 @@ def _no_density() -> pl.DataFrame:
     )  # fmt: skip
 
 
-def _highways(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
+def _find_highways(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
     """Edges of freeways and multilane highways."""
     import polars as pl
 
@@ -323,7 +323,7 @@ def _highways(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
 
 def has_highways(places: LanePlaces, facts: NetFacts) -> bool:
     """Whether the map has freeways or multilane highways, of which density is a figure."""
-    return not facts.once("highways", places, lambda: _highways(places, facts)).is_empty()
+    return not facts.once("highways", places, lambda: _find_highways(places, facts)).is_empty()
 
 
 def heavy_share(

@@ -111,11 +111,11 @@ def two_way_capacities(streams: Sequence[Stream]) -> dict[str, float]:
     """
     junction = _TwoWayStop(streams)
     found: dict[str, float] = {}
-    for one in sorted(streams, key=junction.order):
-        if one.yields_to:
-            found[one.via] = junction.potential(one) * junction.impedance(one, found)
+    for stream in sorted(streams, key=junction.order):
+        if stream.yields_to:
+            found[stream.via] = junction.potential(stream) * junction.impedance(stream, found)
         else:
-            found[one.via] = MAJOR_RIGHT if one.turn == RIGHT else MAJOR_THROUGH
+            found[stream.via] = MAJOR_RIGHT if stream.turn == RIGHT else MAJOR_THROUGH
     return found
 
 
@@ -124,37 +124,39 @@ class _TwoWayStop:
 
     def __init__(self, streams: Sequence[Stream]) -> None:
         self._streams = streams
-        self._of = {one.via: one for one in streams}
-        self._major = {one.approach for one in streams if not one.yields_to}
+        self._of = {stream.via: stream for stream in streams}
+        self._major = {stream.approach for stream in streams if not stream.yields_to}
         lanes = {
             approach: {
-                one.lane for one in streams if one.approach == approach and not one.yields_to
+                stream.lane
+                for stream in streams
+                if stream.approach == approach and not stream.yields_to
             }
             for approach in self._major
         }
-        self._lanes = min(max((len(one) for one in lanes.values()), default=1), 3)
-        roads = {road for one in streams for road in (one.road, one.onto)}
+        self._lanes = min(max((len(lane) for lane in lanes.values()), default=1), 3)
+        roads = {road for stream in streams for road in (stream.road, stream.onto)}
         self._at_t = len(roads) == 3
-        used = [one.lane for one in streams]
+        used = [stream.lane for stream in streams]
         self._shared = {lane for lane in used if used.count(lane) > 1}
 
-    def order(self, one: Stream) -> int:
+    def order(self, stream: Stream) -> int:
         """Place in the order in which capacities are known: the ranks of HCM Exhibit 20-1."""
-        if one.approach in self._major:
+        if stream.approach in self._major:
             return 0
-        return {RIGHT: 1, THROUGH: 2}.get(one.turn, 3)
+        return {RIGHT: 1, THROUGH: 2}.get(stream.turn, 3)
 
-    def potential(self, one: Stream) -> float:
-        kind = _LEFT_OF_MAJOR if one.approach in self._major else one.turn
+    def potential(self, stream: Stream) -> float:
+        kind = _LEFT_OF_MAJOR if stream.approach in self._major else stream.turn
         column = self._lanes - 1
-        critical = _CRITICAL[kind][column] + _HEAVY_CRITICAL[column] * one.heavy
+        critical = _CRITICAL[kind][column] + _HEAVY_CRITICAL[column] * stream.heavy
         if self._at_t and kind == LEFT:
             critical -= _AT_T
-        follow_up = _FOLLOW_UP[kind][column] + _HEAVY_FOLLOW_UP[column] * one.heavy
-        flow = sum(self._weight(one, other) * other.flow for other in self._streams)
+        follow_up = _FOLLOW_UP[kind][column] + _HEAVY_FOLLOW_UP[column] * stream.heavy
+        flow = sum(self._conflict_weight(stream, other) * other.flow for other in self._streams)
         return potential_capacity(flow, critical=critical, follow_up=follow_up)
 
-    def _weight(self, one: Stream, other: Stream) -> float:
+    def _conflict_weight(self, one: Stream, other: Stream) -> float:
         """How often a vehicle of ``other`` counts as conflicting: HCM Equations 20-2 to 20-15."""
         minor = one.approach not in self._major
         if other.via in one.yields_to:
@@ -167,12 +169,12 @@ class _TwoWayStop:
         turns_off = not other.yields_to and other.onto == one.road
         return 0.5 if minor and turns_off and other.lane in self._shared else 0.0
 
-    def impedance(self, one: Stream, known: Mapping[str, float]) -> float:
+    def impedance(self, stream: Stream, known: Mapping[str, float]) -> float:
         """Share of the time in which no queue of those that go before is in the way."""
-        if self.order(one) < 2:
+        if self.order(stream) < 2:
             return 1.0
         majors, crossing, others = 1.0, 1.0, 1.0
-        for via in sorted(one.yields_to & known.keys()):
+        for via in sorted(stream.yields_to & known.keys()):
             other = self._of[via]
             if not other.yields_to:
                 continue

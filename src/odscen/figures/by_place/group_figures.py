@@ -89,7 +89,7 @@ def group_sums(
     if states is not None:
         greens = shown_greens(programs, states, clock, facts)
         capacity = pl.concat(
-            [_capacity(passed, groups, facts, greens), capacity], how="diagonal_relaxed"
+            [_capacity_of_groups(passed, groups, facts, greens), capacity], how="diagonal_relaxed"
         )
     parts.append(capacity)
     seen = pl.concat([part.select("lane_group") for part in parts[:2]]).unique()
@@ -106,7 +106,7 @@ def group_sums(
     )
 
 
-def _capacity(
+def _capacity_of_groups(
     passed: pl.DataFrame, groups: LaneGroups, facts: NetFacts, greens: pl.DataFrame
 ) -> pl.DataFrame:
     lit = groups.ways.join(greens, on="via", how="semi")

@@ -90,7 +90,7 @@ def _lane_groups(places: LanePlaces, facts: NetFacts) -> LaneGroups:
     inner = places.ways.filter(
         (pl.col("via") == pl.col("lane")) & ~pl.col("source").is_in(narrow)
     ).sort("junction", "via")
-    named = _named(inner.select("junction", "source", "movement").rows())
+    named = _name_groups(inner.select("junction", "source", "movement").rows())
     ways = inner.with_columns(
         lane_group=pl.Series([named[one] for one in inner["source"]], dtype=text)
     ).select("junction", "via", "source", "movement", "lane_group")
@@ -153,7 +153,7 @@ class _Net:
         """Metres from the end of a lane back to where it is no longer by itself."""
         metres, seen = self.length[lane], {lane}
         while True:
-            previous = [one for one in self._before[lane] if self._junction[one] == junction]
+            previous = [name for name in self._before[lane] if self._junction[name] == junction]
             if len(previous) != 1 or previous[0] in seen or len(self._after[previous[0]]) != 1:
                 return metres
             lane = previous[0]
@@ -161,7 +161,7 @@ class _Net:
             metres += self.length[lane]
 
 
-def _named(rows: Sequence[tuple[str, str, str]]) -> dict[str, str]:
+def _name_groups(rows: Sequence[tuple[str, str, str]]) -> dict[str, str]:
     """Name of the group of each lane before a junction; rows of junction, lane and movement."""
     parent: dict[str, str] = {}
 

@@ -67,23 +67,23 @@ class LanePlaces:
 
     @cached_property
     def lanes(self) -> pl.DataFrame:
-        return self._table("lanes")
+        return self._make_table("lanes")
 
     @cached_property
     def ways(self) -> pl.DataFrame:
-        return self._table("ways")
+        return self._make_table("ways")
 
     @cached_property
     def segments(self) -> pl.DataFrame:
-        return self._table("segments")
+        return self._make_table("segments")
 
     @cached_property
     def junctions(self) -> pl.DataFrame:
-        return self._table("junctions")
+        return self._make_table("junctions")
 
     @cached_property
     def movements(self) -> pl.DataFrame:
-        return self._table("movements")
+        return self._make_table("movements")
 
     def to_json(self) -> str:
         """One JSON document, columns as lists."""
@@ -113,7 +113,7 @@ class LanePlaces:
             }
         return cls(columns)
 
-    def _table(self, name: str) -> pl.DataFrame:
+    def _make_table(self, name: str) -> pl.DataFrame:
         import polars as pl
 
         types = {str: pl.String, float: pl.Float64, bool: pl.Boolean}

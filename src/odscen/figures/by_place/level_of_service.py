@@ -31,12 +31,12 @@ _LEVELS: tuple[Level, ...] = ("A", "B", "C", "D", "E", "F")
 
 def street_level(share: pl.Expr) -> pl.Expr:
     """Level of a segment by travel speed over free-flow speed; null where that is null."""
-    return _graded(share, [share > bound for bound in STREET_SPEED])
+    return _grade_value(share, [share > bound for bound in STREET_SPEED])
 
 
 def highway_level(density: pl.Expr) -> pl.Expr:
     """Level of a freeway or multilane highway by passenger cars per km and lane."""
-    return _graded(density, [density <= bound for bound in HIGHWAY_DENSITY])
+    return _grade_value(density, [density <= bound for bound in HIGHWAY_DENSITY])
 
 
 def junction_level(delay: pl.Expr, control: pl.Expr) -> pl.Expr:
@@ -45,12 +45,12 @@ def junction_level(delay: pl.Expr, control: pl.Expr) -> pl.Expr:
 
     return (
         pl.when(control == "signal")
-        .then(_graded(delay, [delay <= bound for bound in SIGNAL_DELAY]))
-        .otherwise(_graded(delay, [delay <= bound for bound in PRIORITY_DELAY]))
+        .then(_grade_value(delay, [delay <= bound for bound in SIGNAL_DELAY]))
+        .otherwise(_grade_value(delay, [delay <= bound for bound in PRIORITY_DELAY]))
     )
 
 
-def _graded(value: pl.Expr, reached: list[pl.Expr]) -> pl.Expr:
+def _grade_value(value: pl.Expr, reached: list[pl.Expr]) -> pl.Expr:
     import polars as pl
 
     level = pl.lit(_LEVELS[-1])

@@ -74,7 +74,7 @@ class ParkingUse:
         """Hold the stays of a run against its plan."""
         import polars as pl
 
-        wanted = {one.id: one.ends_in for one in plan.actors if one.ends_in is not None}
+        wanted = {actor.id: actor.ends_in for actor in plan.actors if actor.ends_in is not None}
         names = {"actor": list(wanted), "wanted": list(wanted.values())}
         table = pl.DataFrame(names, schema={"actor": pl.String, "wanted": pl.String})
         joined = stays.join(table, on="actor", how="left", maintain_order="left")
@@ -84,8 +84,8 @@ class ParkingUse:
         """Use of an area; of all together if none is named."""
         import polars as pl
 
-        places = sum(one.places for one in self.areas if area in (None, one.id))
-        mine = self._of(area)
+        places = sum(parking.places for parking in self.areas if area in (None, parking.id))
+        mine = self._stays_in(area)
         arrived = pl.col("arrival").is_between(self.begin, self.end, closed="left")
         left = pl.col("departure").is_between(self.begin, self.end, closed="left")
         wanted = pl.lit(value=True) if area is None else pl.col("wanted") == area
@@ -105,7 +105,7 @@ class ParkingUse:
 
     def taken(self, area: str | None = None) -> Taken:
         """Places taken over time."""
-        mine = self._of(area)
+        mine = self._stays_in(area)
         arrival = np.clip(mine["arrival"].to_numpy(), self.begin, self.end)
         departure = mine["departure"].fill_null(self.end).to_numpy()
         departure = np.clip(departure, self.begin, self.end)
@@ -115,7 +115,7 @@ class ParkingUse:
         gone = np.searchsorted(np.sort(departure), times, side="right")
         return Taken(times, come - gone)
 
-    def _of(self, area: str | None) -> pl.DataFrame:
+    def _stays_in(self, area: str | None) -> pl.DataFrame:
         import polars as pl
 
         return self.stays if area is None else self.stays.filter(pl.col("area") == area)

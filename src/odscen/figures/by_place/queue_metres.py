@@ -52,11 +52,11 @@ def positions(rows: pl.DataFrame, facts: NetFacts) -> pl.Series:
     by_lane = rows.select("lane").with_row_index("row").group_by("lane").agg("row")
     for lane, lane_rows in zip(by_lane["lane"], by_lane["row"], strict=True):
         own = lane_rows.to_numpy()
-        found[own] = _along(facts.shapes[lane], points[own]) * lengths[lane]
+        found[own] = _share_along(facts.shapes[lane], points[own]) * lengths[lane]
     return pl.Series("pos", found)
 
 
-def _along(shape: FloatArray, points: FloatArray) -> FloatArray:
+def _share_along(shape: FloatArray, points: FloatArray) -> FloatArray:
     """Share of a line ``(K, 2)`` up to the place on it that is nearest to each point."""
     import numpy as np
 
@@ -115,20 +115,22 @@ def queue_backs(
     if not set(NEEDED) <= set(trajectories.collect_schema()):
         return None
     step = record_step(trajectories) if period is None else period
-    slow = _slow(trajectories, groups)
+    slow = _slow_records(trajectories, groups)
     if slow.is_empty():
-        return _backs([], [], [])
-    rows = _placed(slow, _entries(trajectories, groups), groups, facts, period=step)
-    joined = _joined(rows)
+        return _queue_backs([], [], [])
+    rows = _place_slow_vehicles(
+        slow, _junction_entries(trajectories, groups), groups, facts, period=step
+    )
+    joined = _join_queue(rows)
     if not len(joined):
-        return _backs([], [], [])
+        return _queue_backs([], [], [])
     at, rear = rows.at[joined], rows.rear[joined]
     first = np.flatnonzero(changes(at))
     group, moment = np.divmod(at[first], len(rows.moments))
-    return _backs(rows.names[group], rows.moments[moment], np.maximum.reduceat(rear, first))
+    return _queue_backs(rows.names[group], rows.moments[moment], np.maximum.reduceat(rear, first))
 
 
-def _backs(groups: Any, times: Any, metres: Any) -> pl.DataFrame:
+def _queue_backs(groups: Any, times: Any, metres: Any) -> pl.DataFrame:
     import polars as pl
 
     schema = {"lane_group": pl.String, "time": pl.Float64, "metres": pl.Float64}
@@ -144,7 +146,7 @@ def record_step(trajectories: pl.LazyFrame) -> float:
     return float(step or 1.0)
 
 
-def _entries(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
+def _junction_entries(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
     """Who entered which junction when, by which lane group; sorted by time."""
     import polars as pl
 
@@ -164,7 +166,7 @@ def _entries(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
     )
 
 
-def _slow(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
+def _slow_records(trajectories: pl.LazyFrame, groups: LaneGroups) -> pl.DataFrame:
     """Records of those who can be queued, by vehicle and time; ``number`` is the vehicle's."""
     import polars as pl
 
@@ -215,7 +217,7 @@ class _SlowRows:
         return self.group * np.int64(len(self.moments)) + self.moment
 
 
-def _placed(
+def _place_slow_vehicles(
     slow: pl.DataFrame,
     entered: pl.DataFrame,
     groups: LaneGroups,
@@ -234,7 +236,7 @@ def _placed(
     moved = starts | changes(x) | changes(y)
     pos = positions(slow.filter(moved), facts).to_numpy()[np.cumsum(moved) - 1]
     stretches = (
-        _grouped(slow.filter(starts).with_row_index("stretch"), entered, groups)
+        _group_slow_vehicles(slow.filter(starts).with_row_index("stretch"), entered, groups)
         .join(facts.drivers.select("id", body="length"), on="id", how="left")
         .join(facts.limits.select("lane", metres="length"), on="lane", how="left")
         .select(
@@ -261,7 +263,9 @@ def _placed(
     )
 
 
-def _grouped(slow: pl.DataFrame, entered: pl.DataFrame, groups: LaneGroups) -> pl.DataFrame:
+def _group_slow_vehicles(
+    slow: pl.DataFrame, entered: pl.DataFrame, groups: LaneGroups
+) -> pl.DataFrame:
     """The lane group of each slow vehicle, and ``ahead``: metres from its lane to the line."""
     import polars as pl
 
@@ -289,16 +293,16 @@ def _grouped(slow: pl.DataFrame, entered: pl.DataFrame, groups: LaneGroups) -> p
     )
 
 
-def _joined(rows: _SlowRows) -> IntArray:
+def _join_queue(rows: _SlowRows) -> IntArray:
     """Those that are in the queue, by lane group and moment, and from the line backwards."""
     # In which order they are who are beside each other does not matter.
     order = np.lexsort((rows.front, rows.moment, rows.group))
     front = rows.front[order]
-    cluster: IntArray = np.cumsum(_clusters(rows.at[order], front, rows.rear[order]))
-    return order[_queued(order, rows.spell, cluster, front)]
+    cluster: IntArray = np.cumsum(_begin_clusters(rows.at[order], front, rows.rear[order]))
+    return order[_find_queued(order, rows.spell, cluster, front)]
 
 
-def _clusters(at: IntArray, front: FloatArray, rear: FloatArray) -> BoolArray:
+def _begin_clusters(at: IntArray, front: FloatArray, rear: FloatArray) -> BoolArray:
     """Who begins another cluster: who is more than the gap behind all that are before it.
 
     Parameters
@@ -319,7 +323,9 @@ def _clusters(at: IntArray, front: FloatArray, rear: FloatArray) -> BoolArray:
     return first | np.concatenate(([False], behind))
 
 
-def _queued(order: IntArray, spell: IntArray, cluster: IntArray, front: FloatArray) -> BoolArray:
+def _find_queued(
+    order: IntArray, spell: IntArray, cluster: IntArray, front: FloatArray
+) -> BoolArray:
     """Who is in a queue; the vehicles of a moment are reached by it again and again.
 
     Parameters

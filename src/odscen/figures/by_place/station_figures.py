@@ -40,7 +40,7 @@ def line_crossings(
     if not set(NEEDED) <= set(trajectories.collect_schema()):
         return None
     col = pl.col
-    reach = _reach(lines, facts)
+    reach = _station_reach(lines, facts)
     rows = (
         trajectories.select(
             id=col("vehicle_id").cast(str),
@@ -60,8 +60,8 @@ def line_crossings(
         .with_columns(behind=col("pos") + col("offset"), body=col("body").fill_null(5.0))
     )
     period = record_step(trajectories)
-    fronts = _passed(seen, period)
-    rears = _passed(seen.with_columns(behind=col("behind") - col("body")), period)
+    fronts = _find_passages(seen, period)
+    rears = _find_passages(seen.with_columns(behind=col("behind") - col("body")), period)
     return (
         fronts.sort("time")
         .join_asof(
@@ -82,7 +82,7 @@ def line_crossings(
     )  # fmt: skip
 
 
-def _passed(seen: pl.DataFrame, period: float) -> pl.DataFrame:
+def _find_passages(seen: pl.DataFrame, period: float) -> pl.DataFrame:
     import polars as pl
 
     col = pl.col
@@ -109,7 +109,9 @@ def _passed(seen: pl.DataFrame, period: float) -> pl.DataFrame:
     )
 
 
-def _reach(lines: Mapping[str, Sequence[tuple[str, float]]], facts: NetFacts) -> pl.DataFrame:
+def _station_reach(
+    lines: Mapping[str, Sequence[tuple[str, float]]], facts: NetFacts
+) -> pl.DataFrame:
     """Lanes around each place of each line, and what is added to positions there."""
     import polars as pl
 
@@ -123,13 +125,13 @@ def _reach(lines: Mapping[str, Sequence[tuple[str, float]]], facts: NetFacts) ->
     for line, places in lines.items():
         for number, (lane, pos) in enumerate(places):
             offsets = {lane: -pos}
-            ahead = [(one, length[lane] - pos) for one in after.get(lane, ())]
+            ahead = [(name, length[lane] - pos) for name in after.get(lane, ())]
             while ahead:
                 one, start = ahead.pop()
                 if one in length and one not in offsets and start < REACH:
                     offsets[one] = start
                     ahead += [(other, start + length[one]) for other in after.get(one, ())]
-            behind = [(one, -pos) for one in before.get(lane, ())]
+            behind = [(name, -pos) for name in before.get(lane, ())]
             while behind:
                 one, end = behind.pop()
                 if one in length and one not in offsets and end > -REACH:
@@ -172,19 +174,19 @@ def station_figures(
 
     col = pl.col
     lines = {
-        f"{one.id} {name}": getattr(one, name)
-        for one in stations
+        f"{station.id} {name}": getattr(station, name)
+        for station in stations
         for name in ("first", "second")
-        if getattr(one, name)
+        if getattr(station, name)
     }
     crossed = line_crossings(trajectories, lines, facts)
     if crossed is None:
         return None
-    parts = [_station(one, crossed, clock) for one in stations]
+    parts = [_figures_of_station(station, crossed, clock) for station in stations]
     number = (col("end") - col("begin")) / 3600.0
     empty = [pl.lit(None, pl.Float64).alias(name) for name in COLUMNS]
     rows = [
-        part.with_columns(one for one in empty if one.meta.output_name() not in part.columns)
+        part.with_columns(expr for expr in empty if expr.meta.output_name() not in part.columns)
         for part in parts
     ]
     return pl.concat(
@@ -193,18 +195,20 @@ def station_figures(
     )
 
 
-def _station(one: PlannedStation, crossed: pl.DataFrame, clock: pl.DataFrame) -> pl.DataFrame:
+def _figures_of_station(
+    planned_station: PlannedStation, crossed: pl.DataFrame, clock: pl.DataFrame
+) -> pl.DataFrame:
     import polars as pl
 
     col = pl.col
-    first = crossed.filter(col("line") == f"{one.id} first")
-    second = crossed.filter(col("line") == f"{one.id} second")
-    if one.kind == "detector":
-        share = col("covered").sum() / len(one.first)
+    first = crossed.filter(col("line") == f"{planned_station.id} first")
+    second = crossed.filter(col("line") == f"{planned_station.id} second")
+    if planned_station.kind == "detector":
+        share = col("covered").sum() / len(planned_station.first)
         found = _on_clock(
             first, clock, vehicles=pl.len(), speed=col("speed").mean(), occupied=share
         ).with_columns(occupancy=col("occupied").fill_null(0.0) / (col("end") - col("begin")))
-    elif one.kind == "section":
+    elif planned_station.kind == "section":
         done = second.sort("time").join_asof(
             first.select("id", "time", came="time").sort("time"), on="time", by="id"
         )
@@ -229,8 +233,8 @@ def _station(one: PlannedStation, crossed: pl.DataFrame, clock: pl.DataFrame) ->
         )
     return found.with_columns(
         col("vehicles").fill_null(0).cast(pl.Int64),
-        station=pl.lit(one.id),
-        kind=pl.lit(one.kind),
+        station=pl.lit(planned_station.id),
+        kind=pl.lit(planned_station.kind),
     )
 
 

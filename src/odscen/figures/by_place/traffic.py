@@ -235,14 +235,14 @@ def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
     """Everything that is a quotient of sums, and the columns in their order."""
     import polars as pl
 
-    rates, more, order = _rates(tuple(sums.columns))
+    rates, more, order = _rate_columns(tuple(sums.columns))
     found = sums.with_columns(rates)
     found = found.with_columns(more) if more else found
     return pl.DataFrame([found[name] for name in order])
 
 
 @lru_cache(maxsize=32)
-def _rates(columns: tuple[str, ...]) -> tuple[list[pl.Expr], list[pl.Expr], list[str]]:
+def _rate_columns(columns: tuple[str, ...]) -> tuple[list[pl.Expr], list[pl.Expr], list[str]]:
     """Quotients, what follows from them, and all columns in their order.
 
     Making the expressions takes longer than computing them for the places of a small map.

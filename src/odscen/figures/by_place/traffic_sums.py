@@ -53,7 +53,7 @@ def network_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -
     """Sums over all lanes; ``vehicles`` are those under way at the begin or started since."""
     import polars as pl
 
-    found = lanes.group_by(INTERVAL).agg(_sum("departed", "arrived", *TRAFFIC, *LOST))
+    found = lanes.group_by(INTERVAL).agg(_sum_columns("departed", "arrived", *TRAFFIC, *LOST))
     length = float(places.lanes.filter("motor").unique("lane")["length"].sum())
     under_way = (pl.col("departed") - pl.col("arrived")).cum_sum().shift(1, fill_value=0)
     return _on_clock(clock, found, INTERVAL).with_columns(
@@ -69,8 +69,8 @@ def segment_sums(parts: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -
     parts
         From :func:`odscen.figures.by_place.lane_parts.lane_parts`.
     """
-    found = parts.group_by("segment", *INTERVAL).agg(_sum(*SUMS, SPREAD))
-    return _filled(found, clock, places.segments)
+    found = parts.group_by("segment", *INTERVAL).agg(_sum_columns(*SUMS, SPREAD))
+    return _fill_intervals(found, clock, places.segments)
 
 
 def junction_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -> pl.DataFrame:
@@ -83,11 +83,11 @@ def junction_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
         .group_by("junction", *INTERVAL)
         .agg(
             _came_in().filter(inside).sum().alias("vehicles"),
-            *(_known(pl.col(name).filter(inside), name) for name in TRAFFIC),
-            *_sum(*LOST),
+            *(_sum_known(pl.col(name).filter(inside), name) for name in TRAFFIC),
+            *_sum_columns(*LOST),
         )
     )
-    return _filled(found, clock, places.junctions)
+    return _fill_intervals(found, clock, places.junctions)
 
 
 def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -> pl.DataFrame:
@@ -106,13 +106,15 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
         .agg(
             pl.col("entered").filter(pl.col("lane") == pl.col("via")).sum().alias("through"),
             _came_in().sum().alias("vehicles"),
-            *_sum(*TRAFFIC, *LOST),
+            *_sum_columns(*TRAFFIC, *LOST),
         )
     )
     before = rows.filter(pl.col("via").is_null())
     used = before.select(pl.col("lane").is_in(connections["source"].unique().implode())).to_series()
-    by_lane = _shared(before.filter(used).with_columns(source="lane"), connections, "source")
-    by_edge = _shared(before.filter(~used), connections, "approach")
+    by_lane = _share_lost_time(
+        before.filter(used).with_columns(source="lane"), connections, "source"
+    )
+    by_edge = _share_lost_time(before.filter(~used), connections, "approach")
     found = (
         connections.join(by_lane, on=("source", "begin"), how="left", suffix="_of_lane")
         .join(by_edge, on=("approach", "begin"), how="left", suffix="_of_edge")
@@ -123,12 +125,12 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
             for name in LOST
         )
         .group_by("movement", *INTERVAL)
-        .agg(_sum(*SUMS))
+        .agg(_sum_columns(*SUMS))
     )
-    return _filled(found, clock, places.movements)
+    return _fill_intervals(found, clock, places.movements)
 
 
-def _shared(lost: pl.DataFrame, connections: pl.DataFrame, by: str) -> pl.DataFrame:
+def _share_lost_time(lost: pl.DataFrame, connections: pl.DataFrame, by: str) -> pl.DataFrame:
     """Time lost per vehicle that entered a junction from a lane or edge in an interval."""
     import polars as pl
 
@@ -158,13 +160,13 @@ def _came_in() -> pl.Expr:
 
 
 @lru_cache(maxsize=16)
-def _sum(*names: str) -> Sequence[pl.Expr]:
+def _sum_columns(*names: str) -> Sequence[pl.Expr]:
     import polars as pl
 
-    return [_known(pl.col(name), name) for name in names]
+    return [_sum_known(pl.col(name), name) for name in names]
 
 
-def _known(column: pl.Expr, name: str) -> pl.Expr:
+def _sum_known(column: pl.Expr, name: str) -> pl.Expr:
     """Sum of a column; null where it was not recorded at all."""
     import polars as pl
 
@@ -173,7 +175,7 @@ def _known(column: pl.Expr, name: str) -> pl.Expr:
     return pl.when(pl.col(name).count() > 0).then(column.sum()).alias(name)
 
 
-def _filled(found: pl.DataFrame, clock: pl.DataFrame, places: pl.DataFrame) -> pl.DataFrame:
+def _fill_intervals(found: pl.DataFrame, clock: pl.DataFrame, places: pl.DataFrame) -> pl.DataFrame:
     """One row for each place that a vehicle came to and each interval; length in km."""
     import polars as pl
 

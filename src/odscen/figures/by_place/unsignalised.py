@@ -87,11 +87,11 @@ def unsignalised_sums(
     import polars as pl
 
     # Of no other lane groups than those of the map, which are made once as well.
-    ways = facts.once("unlit_ways", places, lambda: _ways(groups, places, facts))
+    ways = facts.once("unlit_ways", places, lambda: _find_unsignalised_ways(groups, places, facts))
     outer = facts.once("outer_lanes", places, lambda: _outer_lanes(groups, facts))
-    bearings = facts.once("bearings", places, lambda: _bearings(groups, places, facts))
+    bearings = facts.once("bearings", places, lambda: _approach_bearings(groups, places, facts))
     junctions = dict(groups.ways.select("via", "junction").rows())
-    flows = _flows(passed, facts, clock)
+    flows = _measure_flows(passed, facts, clock)
     found = []
     for (begin, seconds), rows in _by_interval(flows, clock):
         driven: dict[str, dict[str, _Way]] = defaultdict(dict)
@@ -102,15 +102,15 @@ def unsignalised_sums(
                 flow, heavy = rows.get(via, (0.0, 0.0))
                 stream = way.stream._replace(flow=flow, heavy=heavy)
                 driven[junctions[via]][via] = _Way(stream, way.facility, way.onto_ring)
-        for one in driven.values():
-            for via, hourly in _capacities(one, outer, bearings).items():
+        for row in driven.values():
+            for via, hourly in _compute_capacities(row, outer, bearings).items():
                 found.append((via, begin, hourly * seconds / 3600.0))
     schema = {"via": pl.String, "begin": pl.Float64, "capacity": pl.Float64}
     by_way = pl.DataFrame(found, schema=schema, orient="row").sort("via", "begin")
     yielding = [via for via, one in ways.items() if one.facility != Facility.MAJOR.value]
     some = groups.ways.filter(pl.col("via").is_in(yielding)).select("lane_group").unique()
     lanes = shared_lanes(by_way, passed, groups).join(some, on="lane_group", how="semi")
-    seen = _seen(passed, groups, clock)
+    seen = _queue_observations(passed, groups, clock)
     return (
         lanes.join(seen, on=("source", "begin"), how="left")
         .with_columns(served=pl.col("served").fill_null(0))
@@ -125,7 +125,9 @@ def unsignalised_sums(
     )
 
 
-def _ways(groups: LaneGroups, places: LanePlaces, facts: NetFacts) -> dict[str, _Way]:
+def _find_unsignalised_ways(
+    groups: LaneGroups, places: LanePlaces, facts: NetFacts
+) -> dict[str, _Way]:
     """Connections that are not at lights, without flows, by ``via``."""
     import polars as pl
 
@@ -149,7 +151,7 @@ def _ways(groups: LaneGroups, places: LanePlaces, facts: NetFacts) -> dict[str, 
     return found
 
 
-def _flows(passed: pl.DataFrame, facts: NetFacts, clock: pl.DataFrame) -> pl.DataFrame:
+def _measure_flows(passed: pl.DataFrame, facts: NetFacts, clock: pl.DataFrame) -> pl.DataFrame:
     """``begin``, ``via``, ``number`` of vehicles and ``heavy``, the share of trucks and buses."""
     import polars as pl
 
@@ -176,57 +178,59 @@ def _by_interval(
     return [((begin, length[begin]), rows) for begin, rows in found.items()]
 
 
-def _capacities(
+def _compute_capacities(
     ways: Mapping[str, _Way], outer: Mapping[str, bool], bearings: Mapping[str, float]
 ) -> dict[str, float]:
     """Vehicles an hour of each connection of one junction."""
-    streams = [one.stream for one in ways.values()]
+    streams = [way.stream for way in ways.values()]
     found = two_way_capacities(streams)
     stops = {via for via, one in ways.items() if one.facility == Facility.ALL_WAY_STOP.value}
     if stops:
         lanes = _stop_lanes([ways[via].stream for via in sorted(stops)])
-        at_line = all_way_capacities(lanes, _relations(lanes, bearings))
+        at_line = all_way_capacities(lanes, _relate_approaches(lanes, bearings))
         found |= {via: at_line[ways[via].stream.lane] for via in stops}
-    entries = [one for one in ways.values() if one.facility == Facility.ROUNDABOUT.value]
+    entries = [way for way in ways.values() if way.facility == Facility.ROUNDABOUT.value]
     for entry in entries:
-        found[entry.stream.via] = _entry(entry.stream, ways, outer)
+        found[entry.stream.via] = _roundabout_entry_capacity(entry.stream, ways, outer)
     return found
 
 
-def _entry(one: Stream, ways: Mapping[str, _Way], outer: Mapping[str, bool]) -> float:
+def _roundabout_entry_capacity(
+    stream: Stream, ways: Mapping[str, _Way], outer: Mapping[str, bool]
+) -> float:
     """Vehicles an hour that a lane can carry into a roundabout."""
     streams = [way.stream for way in ways.values()]
-    before = [other for other in streams if other.via in one.yields_to]
+    before = [other for other in streams if other.via in stream.yields_to]
     beside = {
         via
         for way in ways.values()
-        if way.stream.approach == one.approach
+        if way.stream.approach == stream.approach
         for via in way.stream.yields_to
     }
-    own = [other for other in streams if other.lane == one.lane]
+    own = [other for other in streams if other.lane == stream.lane]
     trucks = sum(other.flow * other.heavy for other in own)
     flow = sum(other.flow for other in own)
     cars = entry_capacity(
         sum(as_cars(other.flow, other.heavy) for other in before),
-        lanes=len({other.lane for other in streams if other.approach == one.approach}),
+        lanes=len({other.lane for other in streams if other.approach == stream.approach}),
         around=len({other.lane for other in streams if other.via in beside}),
-        outer=outer.get(one.lane, True),
+        outer=outer.get(stream.lane, True),
     )
     return cars / as_cars(1.0, trucks / flow if flow else 0.0)
 
 
 def _stop_lanes(streams: Sequence[Stream]) -> list[StopLane]:
     of_lane: dict[str, list[Stream]] = defaultdict(list)
-    for one in streams:
-        of_lane[one.lane].append(one)
+    for stream in streams:
+        of_lane[stream.lane].append(stream)
     found = []
     for lane, ones in sorted(of_lane.items()):
-        flow = sum(one.flow for one in ones)
+        flow = sum(stream.flow for stream in ones)
         shares = {
-            turn: sum(one.flow for one in ones if one.turn == turn) / flow if flow else 0.0
+            turn: sum(stream.flow for stream in ones if stream.turn == turn) / flow if flow else 0.0
             for turn in (LEFT, RIGHT)
         }
-        heavy = sum(one.flow * one.heavy for one in ones) / flow if flow else 0.0
+        heavy = sum(stream.flow * stream.heavy for stream in ones) / flow if flow else 0.0
         found.append(
             StopLane(
                 lane, ones[0].approach, flow, left=shares[LEFT], right=shares[RIGHT], heavy=heavy
@@ -235,21 +239,21 @@ def _stop_lanes(streams: Sequence[Stream]) -> list[StopLane]:
     return found
 
 
-def _relations(lanes: Sequence[StopLane], bearings: Mapping[str, float]) -> Relations:
+def _relate_approaches(lanes: Sequence[StopLane], bearings: Mapping[str, float]) -> Relations:
     """From where vehicles of other approaches come, by the directions in which they drive."""
-    approaches = sorted({one.approach for one in lanes})
-    found: Relations = {one: {} for one in approaches}
-    for one in approaches:
+    approaches = sorted({lane.approach for lane in lanes})
+    found: Relations = {approach: {} for approach in approaches}
+    for approach in approaches:
         for other in approaches:
-            if other != one:
-                turned = (bearings[other] - bearings[one]) % (2 * math.pi)
+            if other != approach:
+                turned = (bearings[other] - bearings[approach]) % (2 * math.pi)
                 side = FROM_RIGHT if turned < math.pi else FROM_LEFT
                 opposing = abs(turned - math.pi) <= _SIDE
-                found[one][other] = OPPOSING if opposing else side
+                found[approach][other] = OPPOSING if opposing else side
     return found
 
 
-def _bearings(groups: LaneGroups, places: LanePlaces, facts: NetFacts) -> dict[str, float]:
+def _approach_bearings(groups: LaneGroups, places: LanePlaces, facts: NetFacts) -> dict[str, float]:
     """Direction in which each approach comes to its line, radians, SUMO's frame."""
     approaches = dict(
         places.ways.filter(places.ways["via"] == places.ways["lane"])
@@ -272,7 +276,9 @@ def _outer_lanes(groups: LaneGroups, facts: NetFacts) -> dict[str, bool]:
     return {lane: lane in first for lane in lanes["lane"]}
 
 
-def _seen(passed: pl.DataFrame, groups: LaneGroups, clock: pl.DataFrame) -> pl.DataFrame:
+def _queue_observations(
+    passed: pl.DataFrame, groups: LaneGroups, clock: pl.DataFrame
+) -> pl.DataFrame:
     """``source``, ``begin``, vehicles ``served``, and whether the queue was there all the time."""
     import polars as pl
 
@@ -290,14 +296,14 @@ def _seen(passed: pl.DataFrame, groups: LaneGroups, clock: pl.DataFrame) -> pl.D
         for begin, end in spans_of_time:
             spans = [(max(a, begin), min(b, end)) for a, b, _ in ones if a < end and b > begin]
             served = sum(entered and begin <= time < end for _, time, entered in ones)
-            found.append((lane, begin, served, _covered(spans) >= _FULL * (end - begin)))
+            found.append((lane, begin, served, _covered_seconds(spans) >= _FULL * (end - begin)))
     schema = {
         "source": pl.String, "begin": pl.Float64, "served": pl.Int64, "full": pl.Boolean,
     }  # fmt: skip
     return pl.DataFrame(found, schema=schema, orient="row")
 
 
-def _covered(spans: Sequence[tuple[float, float]]) -> float:
+def _covered_seconds(spans: Sequence[tuple[float, float]]) -> float:
     """Seconds that are in one of the spans or more."""
     total, until = 0.0, -math.inf
     for begin, end in sorted(spans):

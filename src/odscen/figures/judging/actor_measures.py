@@ -92,11 +92,11 @@ def worst_conflict(
     return Measured(float(row[measure]), float(row["begin"]))
 
 
-def _arrived(_: RunRecords, outcome: ActorOutcome) -> Measured:
+def _measure_arrival(_: RunRecords, outcome: ActorOutcome) -> Measured:
     return Measured(float(outcome.status is ActorStatus.ARRIVED), outcome.arrived)
 
 
-def _count(name: str, kind: EventKind) -> Callable[[RunRecords, ActorOutcome], Measured]:
+def _count_measure(name: str, kind: EventKind) -> Callable[[RunRecords, ActorOutcome], Measured]:
     return lambda records, outcome: Measured(
         float(getattr(outcome, name)), first_event(records, kind, outcome.id)
     )
@@ -110,7 +110,7 @@ def _of_outcome(name: str) -> Callable[[RunRecords, ActorOutcome], Measured | No
     return found
 
 
-def _conflict(measure: str) -> Callable[[RunRecords, ActorOutcome], Measured | None]:
+def _conflict_measure(measure: str) -> Callable[[RunRecords, ActorOutcome], Measured | None]:
     def found(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
         if outcome.inserted is None:
             return None
@@ -137,7 +137,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="1 if the actor reached its goal, 0 if not.",
         source="events",
         better=Better.HIGHER,
-        compute=_arrived,
+        compute=_measure_arrival,
     ),
     ActorMeasure(
         name="collided",
@@ -146,7 +146,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="How many times the actor collided.",
         source="events",
         better=Better.LOWER,
-        compute=_count("collisions", EventKind.COLLISION),
+        compute=_count_measure("collisions", EventKind.COLLISION),
     ),
     ActorMeasure(
         name="emergency_stopped",
@@ -155,7 +155,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="How many times the actor braked harder than it comfortably can.",
         source="events",
         better=Better.LOWER,
-        compute=_count("emergency_stops", EventKind.EMERGENCY_STOP),
+        compute=_count_measure("emergency_stops", EventKind.EMERGENCY_STOP),
     ),
     ActorMeasure(
         name="teleported",
@@ -164,7 +164,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="How many times SUMO teleported the actor.",
         source="events",
         better=Better.LOWER,
-        compute=_count("teleports", EventKind.TELEPORT_START),
+        compute=_count_measure("teleports", EventKind.TELEPORT_START),
     ),
     ActorMeasure(
         name="min_ttc",
@@ -174,7 +174,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         source=_SSM,
         better=Better.HIGHER,
         basis=Basis.CONFLICTS,
-        compute=_conflict("ttc"),
+        compute=_conflict_measure("ttc"),
     ),
     ActorMeasure(
         name="min_pet",
@@ -184,7 +184,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         source=_SSM,
         better=Better.HIGHER,
         basis=Basis.CONFLICTS,
-        compute=_conflict("pet"),
+        compute=_conflict_measure("pet"),
     ),
     ActorMeasure(
         name="max_drac",
@@ -194,7 +194,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         source=_SSM,
         better=Better.LOWER,
         basis=Basis.CONFLICTS,
-        compute=_conflict("drac"),
+        compute=_conflict_measure("drac"),
     ),
     ActorMeasure(
         name="max_speed",

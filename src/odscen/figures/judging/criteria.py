@@ -22,10 +22,10 @@ def criteria_of(texts: Sequence[str]) -> tuple[Expectation, ...]:
 
 def criteria_problems(scenario: Scenario) -> tuple[Problem, ...]:
     """Find criteria that cannot be judged: other words than those of figures, unknown actors."""
-    return tuple(_problems(scenario))
+    return tuple(_find_problems(scenario))
 
 
-def _problems(scenario: Scenario) -> Iterator[Problem]:
+def _find_problems(scenario: Scenario) -> Iterator[Problem]:
     known = {actor.id for actor in scenario.actors}
     flows = tuple(f"{flow.id}." for flow in scenario.flows)
     egos = any(actor.ego for actor in scenario.actors)

@@ -200,7 +200,7 @@ def parse_expectation(
         figure, names = actor_measure(name), ACTOR_NAMES
     counts = isinstance(figure, RunFigure) and figure.count
     if figure is None:
-        kind, hint = _KIND[names is NAMES], _hint(name, names)
+        kind, hint = _KIND[names is NAMES], _suggest_names(name, names)
         raise InputError(f"expectation {text!r}: no {kind} is named {name!r}; {hint}")
     if percent and not counts:
         raise InputError(
@@ -227,7 +227,7 @@ def parse_expectation(
 _KIND = {True: "figure", False: "measure of an actor"}
 
 
-def _hint(name: str, names: Sequence[str]) -> str:
+def _suggest_names(name: str, names: Sequence[str]) -> str:
     close = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
     return f"did you mean {', '.join(close)}?" if close else f"known are {', '.join(names)}"
 
@@ -249,43 +249,43 @@ def evaluate(
     does an expectation of an actor without ``records``, or of one that the run does not have.
     """
     records = RunRecords() if records is None else records
-    return tuple(_verdict(expectation, summary, records) for expectation in expectations)
+    return tuple(_judge_expectation(expectation, summary, records) for expectation in expectations)
 
 
-def _verdict(
+def _judge_expectation(
     expectation: Expectation, summary: Mapping[str, Any], records: RunRecords
 ) -> ExpectationVerdict:
-    found = _measured(expectation, summary, records)
+    found = _measure_expectation(expectation, summary, records)
     if found is None:
         return ExpectationVerdict(expectation.text, None, passed=False)
     passed = expectation.holds(found.value)
     return ExpectationVerdict(expectation.text, found.value, passed, found.time)
 
 
-def _measured(
+def _measure_expectation(
     expectation: Expectation, summary: Mapping[str, Any], records: RunRecords
 ) -> Measured | None:
     measure = expectation.figure
     if expectation.actor is not None:
         return _of_actors(expectation, cast("ActorMeasure", measure), records)
-    value = _value(expectation, summary)
-    return None if value is None else Measured(value, _instant(expectation.name, records))
+    value = _value_of_figure(expectation, summary)
+    return None if value is None else Measured(value, _instant_of_figure(expectation.name, records))
 
 
 def _of_actors(
     expectation: Expectation, measure: ActorMeasure, records: RunRecords
 ) -> Measured | None:
     """Value of the actor; of several egos the one that is furthest from meeting it."""
-    chosen = [one for one in records.outcomes if one.id == expectation.actor]
+    chosen = [outcome for outcome in records.outcomes if outcome.id == expectation.actor]
     if not chosen and expectation.actor == EGO:
-        chosen = [one for one in records.outcomes if one.ego]
-    found = [measure.compute(records, one) for one in chosen]
-    known = [one for one in found if one is not None]
+        chosen = [outcome for outcome in records.outcomes if outcome.ego]
+    found = [measure.compute(records, outcome) for outcome in chosen]
+    known = [measured for measured in found if measured is not None]
     if not known or len(known) < len(found):
         return None
     if expectation.op == "==":
-        return max(known, key=lambda one: abs(one.value - expectation.bound))
-    return (min if ">" in expectation.op else max)(known, key=lambda one: one.value)
+        return max(known, key=lambda measured: abs(measured.value - expectation.bound))
+    return (min if ">" in expectation.op else max)(known, key=lambda measured: measured.value)
 
 
 _CONFLICT_COLUMNS = {"min_ttc": "ttc", "min_pet": "pet", "max_drac": "drac"}
@@ -297,7 +297,7 @@ _COUNTED_EVENTS = {
 }
 
 
-def _instant(name: str, records: RunRecords) -> float | None:
+def _instant_of_figure(name: str, records: RunRecords) -> float | None:
     """When a figure of the run came about, if it has an instant: the first, or the worst."""
     kind = _COUNTED_EVENTS.get(name)
     if kind is not None:
@@ -311,7 +311,7 @@ def _instant(name: str, records: RunRecords) -> float | None:
     return None if worst is None else worst.time
 
 
-def _value(expectation: Expectation, summary: Mapping[str, Any]) -> float | None:
+def _value_of_figure(expectation: Expectation, summary: Mapping[str, Any]) -> float | None:
     if expectation == USABLE:
         return usability_score(summary)
     if expectation == CRITERIA:

@@ -106,7 +106,7 @@ def compare_figure(a: Mapping[int, float | None], b: Mapping[int, float | None])
 def _paired_margin(differences: FloatArray) -> float:
     r"""``t * s / sqrt(n)``, s the standard deviation of the n differences."""
     n = len(differences)
-    return _quantile(n - 1) * float(differences.std(ddof=1)) / float(np.sqrt(n))
+    return _student_quantile(n - 1) * float(differences.std(ddof=1)) / float(np.sqrt(n))
 
 
 def _welch_margin(one: FloatArray, other: FloatArray) -> float:
@@ -115,10 +115,10 @@ def _welch_margin(one: FloatArray, other: FloatArray) -> float:
     if u + v == 0.0:
         return 0.0
     freedom = (u + v) ** 2 / (u**2 / (len(one) - 1) + v**2 / (len(other) - 1))
-    return _quantile(freedom) * float(np.sqrt(u + v))
+    return _student_quantile(freedom) * float(np.sqrt(u + v))
 
 
-def _quantile(freedom: float) -> float:
+def _student_quantile(freedom: float) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))

@@ -54,7 +54,7 @@ def conflict_table(rows: Iterable[Mapping[str, object]]) -> pl.DataFrame:
     schema = {name: pl.String if name in _TEXTS else pl.Float64 for name in _SCHEMA_NAMES}
     table = pl.DataFrame(list(rows), schema=schema)
     pair = [pl.min_horizontal("one", "other"), pl.max_horizontal("one", "other")]
-    return _joined([table.with_columns(pair[0].alias("one"), pair[1].alias("other"))])
+    return _join_overlapping([table.with_columns(pair[0].alias("one"), pair[1].alias("other"))])
 
 
 def conflicts_of_slices(tables: Sequence[pl.DataFrame]) -> pl.DataFrame:
@@ -63,10 +63,10 @@ def conflicts_of_slices(tables: Sequence[pl.DataFrame]) -> pl.DataFrame:
     The device starts anew with each slice. Two who were in conflict until the end of one slice and
     are again within the time for which it would have gone on to watch them have one conflict.
     """
-    return tables[0] if len(tables) == 1 else _joined(tables)
+    return tables[0] if len(tables) == 1 else _join_overlapping(tables)
 
 
-def _joined(tables: Sequence[pl.DataFrame]) -> pl.DataFrame:
+def _join_overlapping(tables: Sequence[pl.DataFrame]) -> pl.DataFrame:
     """Rows of the same two as one where their times overlap, or nearly so from table to table."""
     import polars as pl
 

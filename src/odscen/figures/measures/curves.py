@@ -46,7 +46,7 @@ class CurveTable(NamedTuple):
 def presence(actors: Sequence[ActorOutcome], *, end: float) -> ActorCounts:
     """How many were on the road, had arrived, and were not inserted yet, up to ``end`` seconds."""
     depart, inserted, arrived = (
-        np.array([_number(getattr(actor, key)) for actor in actors])
+        np.array([_number_or_nan(getattr(actor, key)) for actor in actors])
         for key in ("depart", "inserted", "arrived")
     )
     return counts_over_time(depart, inserted, arrived, end=end, width=bin_width(end))
@@ -82,5 +82,5 @@ def run_curves(
     )
 
 
-def _number(value: object) -> float:
+def _number_or_nan(value: object) -> float:
     return float(value) if isinstance(value, int | float) else float("nan")

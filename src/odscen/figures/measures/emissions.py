@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _HBEFA = "HBEFA 4.2, as SUMO has it"
 
 
-def _total(substance: str, unit: float) -> Callable[[RunData], float | None]:
+def _total_emission(substance: str, unit: float) -> Callable[[RunData], float | None]:
     """Sum over the network in units of so many grams; ``None`` if not recorded."""
 
     def total(run: RunData) -> float | None:
@@ -51,7 +51,7 @@ FIGURES = (
         source=_HBEFA,
         better=Better.LOWER,
         basis=Basis.ROADS,
-        compute=_total("co2", 1000.0),
+        compute=_total_emission("co2", 1000.0),
     ),
     RunFigure(
         name="fuel_total",
@@ -63,7 +63,7 @@ FIGURES = (
         basis=Basis.ROADS,
         section=ReportSection.KEY_FIGURES,
         note=_fuel_per_km,
-        compute=_total("fuel", 1000.0),
+        compute=_total_emission("fuel", 1000.0),
     ),
     RunFigure(
         name="nox_total",
@@ -73,7 +73,7 @@ FIGURES = (
         source=_HBEFA,
         better=Better.LOWER,
         basis=Basis.ROADS,
-        compute=_total("nox", 1.0),
+        compute=_total_emission("nox", 1.0),
     ),
     RunFigure(
         name="pmx_total",
@@ -83,7 +83,7 @@ FIGURES = (
         source=_HBEFA,
         better=Better.LOWER,
         basis=Basis.ROADS,
-        compute=_total("pmx", 1.0),
+        compute=_total_emission("pmx", 1.0),
     ),
     RunFigure(
         name="co2_per_km",

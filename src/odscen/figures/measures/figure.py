@@ -170,12 +170,12 @@ class RunData:
     @cached_property
     def vehicles(self) -> Sequence[ActorOutcome]:
         """Outcomes of the planned vehicles."""
-        return [one for one in self.outcomes if one.category != "pedestrian"]
+        return [outcome for outcome in self.outcomes if outcome.category != "pedestrian"]
 
     @cached_property
     def pedestrians(self) -> Sequence[ActorOutcome]:
         """Outcomes of the planned pedestrians."""
-        return [one for one in self.outcomes if one.category == "pedestrian"]
+        return [outcome for outcome in self.outcomes if outcome.category == "pedestrian"]
 
     @cached_property
     def network(self) -> Mapping[str, Any]:

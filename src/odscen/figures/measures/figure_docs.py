@@ -18,7 +18,7 @@ _BETTER = {Better.LOWER: "lower", Better.HIGHER: "higher", Better.NEITHER: ""}
 def run_figure_table() -> str:
     """Figures of a run: names, units, what they are, who says so and what a suite allows."""
     heads = ("name", "unit", "what it is", "source", "better", "tolerance")
-    return markdown_table(heads, (_row(figure) for figure in RUN_FIGURES))
+    return markdown_table(heads, (_figure_row(figure) for figure in RUN_FIGURES))
 
 
 def column_table() -> str:
@@ -45,7 +45,7 @@ def between_markers(text: str, name: str, content: str) -> str:
     return f"{before}{begin}{content}{end}{after}"
 
 
-def _row(figure: Figure) -> Sequence[str]:
+def _figure_row(figure: Figure) -> Sequence[str]:
     tolerance = "none" if figure.tolerance == "0" else figure.tolerance
     what = f"**{figure.label}**: {figure.definition}"
     better = _BETTER[figure.better]

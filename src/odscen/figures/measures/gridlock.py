@@ -74,26 +74,34 @@ def find_incidents(
         When the run ended, seconds; who was to depart later is not missed.
     """
     found = [*_on_the_road(events), *_not_inserted(plan, outcomes, end)]
-    return tuple(sorted(found, key=_order))
+    return tuple(sorted(found, key=_incident_order))
 
 
-def _order(one: Incident) -> tuple[int, float, float]:
-    if one.kind is IncidentKind.JAM:
-        return (0, one.time, 0.0) if one.until is None else (1, one.time - one.until, one.time)
-    not_inserted = one.kind is IncidentKind.NOT_INSERTED
-    return (2, -one.count, one.time) if not_inserted else (3, one.time, 0.0)
+def _incident_order(incident: Incident) -> tuple[int, float, float]:
+    if incident.kind is IncidentKind.JAM:
+        return (
+            (0, incident.time, 0.0)
+            if incident.until is None
+            else (1, incident.time - incident.until, incident.time)
+        )
+    not_inserted = incident.kind is IncidentKind.NOT_INSERTED
+    return (2, -incident.count, incident.time) if not_inserted else (3, incident.time, 0.0)
 
 
 def incident_summary(found: Sequence[Incident]) -> dict[str, Any]:
     """Counts of all, and the first :data:`LISTED`, for ``summary.json``."""
-    kinds = Counter(one.kind for one in found)
-    not_inserted = sum(one.count for one in found if one.kind is IncidentKind.NOT_INSERTED)
+    kinds = Counter(incident.kind for incident in found)
+    not_inserted = sum(
+        incident.count for incident in found if incident.kind is IncidentKind.NOT_INSERTED
+    )
     return {
         "jams": kinds[IncidentKind.JAM],
-        "jams_at_the_end": sum(one.kind is IncidentKind.JAM and one.until is None for one in found),
+        "jams_at_the_end": sum(
+            incident.kind is IncidentKind.JAM and incident.until is None for incident in found
+        ),
         "moved_on": kinds[IncidentKind.TELEPORTED],
         "kept_out": not_inserted,
-        "places": [rounded(asdict(one)) for one in found[:LISTED]],
+        "places": [rounded(asdict(incident)) for incident in found[:LISTED]],
     }
 
 
@@ -107,13 +115,13 @@ def _on_the_road(events: Iterable[Event]) -> list[Incident]:
             begin = open_jams.pop(str(event.lane), None)
             if begin is not None:
                 since = begin.time - (begin.waited or 0.0)
-                found.append(_jam(begin, since + (event.waited or 0.0)))
+                found.append(_jam_incident(begin, since + (event.waited or 0.0)))
         elif event.kind is EventKind.TELEPORT_START:
-            found.append(_teleported(event))
-    return [*found, *(_jam(begin, None) for begin in open_jams.values())]
+            found.append(_teleport_incident(event))
+    return [*found, *(_jam_incident(begin, None) for begin in open_jams.values())]
 
 
-def _jam(begin: Event, until: float | None) -> Incident:
+def _jam_incident(begin: Event, until: float | None) -> Incident:
     return Incident(
         kind=IncidentKind.JAM,
         time=begin.time - (begin.waited or 0.0),
@@ -128,7 +136,7 @@ def _jam(begin: Event, until: float | None) -> Incident:
     )
 
 
-def _teleported(event: Event) -> Incident:
+def _teleport_incident(event: Event) -> Incident:
     return Incident(
         kind=IncidentKind.TELEPORTED,
         time=event.time - (event.waited or 0.0),

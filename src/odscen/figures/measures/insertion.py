@@ -25,7 +25,7 @@ FIGURES = (
         display=CM,
         section=ReportSection.KEY_FIGURES,
         note="from the planned place",
-        compute=lambda run: largest([one.insertion_error for one in run.outcomes]),
+        compute=lambda run: largest([outcome.insertion_error for outcome in run.outcomes]),
     ),
     RunFigure(
         name="insertion_error_mean",
@@ -36,7 +36,7 @@ FIGURES = (
         better=Better.LOWER,
         tolerance="5 cm",
         display=CM,
-        compute=lambda run: mean([one.insertion_error for one in run.outcomes]),
+        compute=lambda run: mean([outcome.insertion_error for outcome in run.outcomes]),
     ),
     RunFigure(
         name="depart_delay_max",
@@ -48,6 +48,6 @@ FIGURES = (
         better=Better.LOWER,
         tolerance="5 % or 1 s",
         display=CLOCK,
-        compute=lambda run: largest([one.depart_delay for one in run.outcomes]),
+        compute=lambda run: largest([outcome.depart_delay for outcome in run.outcomes]),
     ),
 )

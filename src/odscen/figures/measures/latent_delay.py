@@ -22,43 +22,43 @@ if TYPE_CHECKING:
 
 def due(outcomes: Sequence[ActorOutcome], end: float | None) -> list[ActorOutcome]:
     """Those who were to depart before the run ended at ``end`` s; all if that is not known."""
-    return [one for one in outcomes if end is None or one.depart < end]
+    return [outcome for outcome in outcomes if end is None or outcome.depart < end]
 
 
 def served(outcomes: Sequence[ActorOutcome]) -> list[ActorOutcome]:
     """Those for whom the network has a route: who has none waits for no room, and is no delay."""
-    return [one for one in outcomes if one.problem is None]
+    return [outcome for outcome in outcomes if outcome.problem is None]
 
 
-def latent_delay(one: ActorOutcome, end: float | None) -> float | None:
+def latent_delay(actor_outcome: ActorOutcome, end: float | None) -> float | None:
     """Seconds from the planned departure to the insertion, or to the end of the run.
 
     ``None`` for one that was not inserted in a run whose end is not known.
     """
-    if one.status is not ActorStatus.WAITING:
-        return max(one.depart_delay or 0.0, 0.0)
-    return None if end is None else max(end - one.depart, 0.0)
+    if actor_outcome.status is not ActorStatus.WAITING:
+        return max(actor_outcome.depart_delay or 0.0, 0.0)
+    return None if end is None else max(end - actor_outcome.depart, 0.0)
 
 
-def total_delay(one: ActorOutcome, end: float | None) -> float | None:
+def total_delay(actor_outcome: ActorOutcome, end: float | None) -> float | None:
     """Seconds of latent delay and time loss; ``None`` if either is not known."""
-    latent = latent_delay(one, end)
-    if latent is None or one.status is ActorStatus.WAITING:
+    latent = latent_delay(actor_outcome, end)
+    if latent is None or actor_outcome.status is ActorStatus.WAITING:
         return latent
-    return None if one.time_loss is None else latent + one.time_loss
+    return None if actor_outcome.time_loss is None else latent + actor_outcome.time_loss
 
 
 def mean_delay(outcomes: Sequence[ActorOutcome], end: float | None) -> float | None:
     """Mean over all who were due; ``None`` where time loss was not measured of any who departed."""
     expected = served(due(outcomes, end))
-    departed = [one for one in expected if one.status is not ActorStatus.WAITING]
-    if departed and all(one.time_loss is None for one in departed):
+    departed = [outcome for outcome in expected if outcome.status is not ActorStatus.WAITING]
+    if departed and all(outcome.time_loss is None for outcome in departed):
         return None
-    return mean([total_delay(one, end) for one in expected])
+    return mean([total_delay(outcome, end) for outcome in expected])
 
 
 def _mean_latent(run: RunData) -> float | None:
-    return mean([latent_delay(one, run.end) for one in served(due(run.vehicles, run.end))])
+    return mean([latent_delay(outcome, run.end) for outcome in served(due(run.vehicles, run.end))])
 
 
 FIGURES = (

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def _with_status(run: RunData, *statuses: ActorStatus) -> int:
-    return sum(one.status in statuses for one in run.outcomes)
+    return sum(outcome.status in statuses for outcome in run.outcomes)
 
 
 FIGURES = (
@@ -132,7 +132,7 @@ FIGURES = (
         section=ReportSection.KEY_FIGURES,
         alarming=True,
         on_page=True,
-        compute=lambda run: sum(one.teleports > 0 for one in run.outcomes),
+        compute=lambda run: sum(outcome.teleports > 0 for outcome in run.outcomes),
     ),
     RunFigure(
         name="collided",
@@ -147,7 +147,7 @@ FIGURES = (
         section=ReportSection.KEY_FIGURES,
         alarming=True,
         on_page=True,
-        compute=lambda run: sum(one.collisions > 0 for one in run.outcomes),
+        compute=lambda run: sum(outcome.collisions > 0 for outcome in run.outcomes),
     ),
     RunFigure(
         name="emergency_stopped",
@@ -160,6 +160,6 @@ FIGURES = (
         display=COUNT,
         part=SummaryPart.ACTORS,
         on_page=True,
-        compute=lambda run: sum(one.emergency_stops > 0 for one in run.outcomes),
+        compute=lambda run: sum(outcome.emergency_stops > 0 for outcome in run.outcomes),
     ),
 )

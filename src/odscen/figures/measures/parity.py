@@ -63,12 +63,12 @@ def parity_figures(states: pl.DataFrame, lights: pl.DataFrame, plan: Plan) -> di
         "samples": total,
         "mirrored": both.height,
         "share_mirrored": round(both.height / total, 6) if total else None,
-        **_errors(both),
+        **_position_errors(both),
         "by_category": _by_category(both, plan),
-        "departures": _departures(states, plan),
-        "absent": _absent(states, plan),
-        "lights": _lights(lights),
-        "worst": _worst(both, plan),
+        "departures": _compare_departures(states, plan),
+        "absent": _list_absent(states, plan),
+        "lights": _compare_lights(lights),
+        "worst": _list_worst_moments(both, plan),
     }
 
 
@@ -99,15 +99,15 @@ def errors_by_place(states: pl.DataFrame, *, size: float) -> tuple[FloatArray, F
     return cells.select("i", "j").to_numpy() * size, cells["position"].to_numpy()
 
 
-def _errors(both: pl.DataFrame) -> dict[str, dict[str, float] | None]:
+def _position_errors(both: pl.DataFrame) -> dict[str, dict[str, float] | None]:
     return {
-        "position_error_m": _percentiles(both["position"].to_numpy()),
-        "height_error_m": _percentiles(both["height"].to_numpy()),
-        "heading_error_deg": _percentiles(both["heading"].to_numpy()),
+        "position_error_m": _percentiles_of(both["position"].to_numpy()),
+        "height_error_m": _percentiles_of(both["height"].to_numpy()),
+        "heading_error_deg": _percentiles_of(both["heading"].to_numpy()),
     }
 
 
-def _percentiles(values: FloatArray) -> dict[str, float] | None:
+def _percentiles_of(values: FloatArray) -> dict[str, float] | None:
     if not len(values):
         return None
     found = np.percentile(values, PERCENTILES)
@@ -121,12 +121,12 @@ def _by_category(both: pl.DataFrame, plan: Plan) -> dict[str, Any]:
     categories = pl.Series([actor.category for actor in plan.actors], dtype=pl.String)
     named = both.with_columns(categories.gather(both["row"]).alias("category"))
     return {
-        str(key[0]): {"samples": part.height, **_errors(part)}
+        str(key[0]): {"samples": part.height, **_position_errors(part)}
         for key, part in sorted(named.group_by("category"))
     }
 
 
-def _departures(states: pl.DataFrame, plan: Plan) -> dict[str, Any]:
+def _compare_departures(states: pl.DataFrame, plan: Plan) -> dict[str, Any]:
     """Planned against SUMO's first step, and SUMO's against CARLA's first sight of each."""
     import polars as pl
 
@@ -148,13 +148,13 @@ def _departures(states: pl.DataFrame, plan: Plan) -> dict[str, Any]:
         "planned": len(plan.actors),
         "in_sumo": rows.height,
         "in_carla": len(behind),
-        "sumo_after_plan_s": _percentiles(np.array(late)),
-        "sumo_off_plan_m": _percentiles(np.array(off)),
-        "carla_after_sumo_s": _percentiles(np.array(behind)),
+        "sumo_after_plan_s": _percentiles_of(np.array(late)),
+        "sumo_off_plan_m": _percentiles_of(np.array(off)),
+        "carla_after_sumo_s": _percentiles_of(np.array(behind)),
     }
 
 
-def _absent(states: pl.DataFrame, plan: Plan) -> list[dict[str, Any]]:
+def _list_absent(states: pl.DataFrame, plan: Plan) -> list[dict[str, Any]]:
     """Who was on the road in SUMO and not shown, with how many steps; the longest first."""
     import polars as pl
 
@@ -170,7 +170,7 @@ def _absent(states: pl.DataFrame, plan: Plan) -> list[dict[str, Any]]:
     ]
 
 
-def _lights(lights: pl.DataFrame) -> dict[str, Any]:
+def _compare_lights(lights: pl.DataFrame) -> dict[str, Any]:
     import polars as pl
 
     wrong = lights.filter(pl.col("sumo") != pl.col("carla"))
@@ -186,13 +186,16 @@ def _lights(lights: pl.DataFrame) -> dict[str, Any]:
     }
 
 
-def _worst(both: pl.DataFrame, plan: Plan) -> list[dict[str, Any]]:
+def _list_worst_moments(both: pl.DataFrame, plan: Plan) -> list[dict[str, Any]]:
     """The worst moment of each road user, the worst first."""
     rows = both.sort("position", descending=True).group_by("row", maintain_order=True).first()
-    return [_moment(plan.actors[row["row"]], row) for row in rows.head(WORST).iter_rows(named=True)]
+    return [
+        _describe_moment(plan.actors[row["row"]], row)
+        for row in rows.head(WORST).iter_rows(named=True)
+    ]
 
 
-def _moment(actor: PlannedActor, row: dict[str, Any]) -> dict[str, Any]:
+def _describe_moment(actor: PlannedActor, row: dict[str, Any]) -> dict[str, Any]:
     names = ("time", "x", "y", "position", "height", "heading")
     return {
         "actor": actor.id,

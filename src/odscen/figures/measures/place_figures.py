@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-def _column(name: str) -> Callable[[], pl.Expr]:
+def _make_column(name: str) -> Callable[[], pl.Expr]:
     def column() -> pl.Expr:
         import polars as pl
 
@@ -45,7 +45,7 @@ FIGURES = (
         source="SUMO lane data, entered and departed",
         tolerance="5 % or 1",
         display=COUNT,
-        column=_column("vehicles"),
+        column=_make_column("vehicles"),
     ),
     SegmentFigure(
         name="mean_speed",
@@ -56,7 +56,7 @@ FIGURES = (
         better=Better.HIGHER,
         tolerance="10 % or 1 m/s",
         display=KMH,
-        column=_column("speed"),
+        column=_make_column("speed"),
         tells=True,
     ),
     SegmentFigure(
@@ -78,7 +78,7 @@ FIGURES = (
         source="SUMO lane data, entered and departed",
         tolerance="5 % or 1",
         display=COUNT,
-        column=_column("vehicles"),
+        column=_make_column("vehicles"),
     ),
     JunctionFigure(
         name="waiting_time",
@@ -90,7 +90,7 @@ FIGURES = (
         better=Better.LOWER,
         tolerance="10 % or 1.5 s",
         display=CLOCK,
-        column=_column("waiting"),
+        column=_make_column("waiting"),
         tells=True,
     ),
     ActorFigure(

@@ -21,7 +21,7 @@ _RATIOS = "travel time over free-flow time"
 _RATIO = Display("", digits=2)
 
 
-def _ratios(run: RunData) -> pl.Series:
+def _travel_time_ratios(run: RunData) -> pl.Series:
     if _RATIOS not in run.kept:
         run.kept[_RATIOS] = _of_trips(run.trips)
     ratios: pl.Series = run.kept[_RATIOS]
@@ -39,15 +39,15 @@ def _of_trips(trips: pl.DataFrame | None) -> pl.Series:
 
 
 def _mean_ratio(run: RunData) -> float | None:
-    mean = _ratios(run).mean()
+    mean = _travel_time_ratios(run).mean()
     return mean if isinstance(mean, float) else None
 
 
 def _late_ratio(run: RunData) -> float | None:
-    return _ratios(run).quantile(0.95, "linear")
+    return _travel_time_ratios(run).quantile(0.95, "linear")
 
 
-def _buffer(run: RunData) -> float | None:
+def _buffer_index(run: RunData) -> float | None:
     mean, late = _mean_ratio(run), _late_ratio(run)
     return None if mean is None or late is None else late / mean - 1.0
 
@@ -88,6 +88,6 @@ FIGURES = (
         source=_FHWA,
         better=Better.LOWER,
         basis=Basis.TRIPS,
-        compute=_buffer,
+        compute=_buffer_index,
     ),
 )

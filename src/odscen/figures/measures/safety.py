@@ -30,7 +30,7 @@ _SSM = f"{_FHWA}; SUMO's SSM device"
 _SECONDS = Display("s", digits=2)
 
 
-def _known(run: RunData, measure: str, *, walking: bool) -> list[float]:
+def _known_values(run: RunData, measure: str, *, walking: bool) -> list[float]:
     """Values of a measure in conflicts between vehicles, or of pedestrians with them."""
     if run.conflicts is None:
         return []
@@ -40,11 +40,13 @@ def _known(run: RunData, measure: str, *, walking: bool) -> list[float]:
     return values
 
 
-def _least(measure: str, limit: float, *, walking: bool = False) -> Callable[[RunData], float]:
-    return lambda run: min([limit, *_known(run, measure, walking=walking)])
+def _least_value(
+    measure: str, limit: float, *, walking: bool = False
+) -> Callable[[RunData], float]:
+    return lambda run: min([limit, *_known_values(run, measure, walking=walking)])
 
 
-def _serious(run: RunData) -> float | None:
+def _count_serious(run: RunData) -> float | None:
     if run.conflicts is None:
         return None
     return float(run.conflicts.select(is_serious().sum()).item())
@@ -68,7 +70,7 @@ FIGURES = (
         section=ReportSection.CONFLICTS,
         note="of vehicles",
         limit=SEEN_TTC,
-        compute=_least("ttc", SEEN_TTC),
+        compute=_least_value("ttc", SEEN_TTC),
     ),
     RunFigure(
         name="max_drac",
@@ -82,7 +84,7 @@ FIGURES = (
         section=ReportSection.CONFLICTS,
         note="DRAC, of vehicles",
         limit=SEEN_DRAC,
-        compute=lambda run: max([SEEN_DRAC, *_known(run, "drac", walking=False)]),
+        compute=lambda run: max([SEEN_DRAC, *_known_values(run, "drac", walking=False)]),
     ),
     RunFigure(
         name="min_pet",
@@ -96,7 +98,7 @@ FIGURES = (
         section=ReportSection.CONFLICTS,
         note="of vehicles at one spot",
         limit=SEEN_PET,
-        compute=_least("pet", SEEN_PET),
+        compute=_least_value("pet", SEEN_PET),
     ),
     RunFigure(
         name="pedestrian_min_pet",
@@ -110,7 +112,7 @@ FIGURES = (
         section=ReportSection.CONFLICTS,
         note="at one spot",
         limit=SEEN_PET,
-        compute=_least("pet", SEEN_PET, walking=True),
+        compute=_least_value("pet", SEEN_PET, walking=True),
     ),
     RunFigure(
         name="serious_conflicts",
@@ -125,6 +127,6 @@ FIGURES = (
         section=ReportSection.CONFLICTS,
         note=_of_all,
         alarming=True,
-        compute=_serious,
+        compute=_count_serious,
     ),
 )

@@ -66,14 +66,14 @@ def signal_use(
     """
     import polars as pl
 
-    greens = _greens(programs, states, end)
+    greens = _find_greens(programs, states, end)
     table = greens.group_by("light", "group").agg(
         greens=pl.len(), green=(pl.col("end") - pl.col("begin")).sum()
     )
     listed = pl.DataFrame(
         [
             (number, light.id, light.junctions[0], group.id, ", ".join(group.movements), group.walk)
-            for number, (light, group) in enumerate(_groups(programs))
+            for number, (light, group) in enumerate(_list_groups(programs))
         ],
         schema={
             "order": pl.Int64, "light": pl.String, "junction": pl.String, "group": pl.String,
@@ -84,9 +84,9 @@ def signal_use(
     table = listed.join(table, on=["light", "group"], how="left").with_columns(
         pl.col("greens").fill_null(0).cast(pl.Int64), pl.col("green").fill_null(0.0)
     )
-    passed = None if rows is None else _passages(programs, rows, ways)
+    passed = None if rows is None else _find_passages(programs, rows, ways)
     if passed is not None:
-        used = _used(greens, passed)
+        used = _measure_use(greens, passed)
         table = table.join(used, on=["light", "group"], how="left")
     known = ("vehicles", "cycle_failures", "unused_green")
     missing = [name for name in known if name not in table.columns]
@@ -108,11 +108,13 @@ def signal_use(
     )
 
 
-def _groups(programs: Sequence[LightProgram]) -> list[tuple[LightProgram, ShownGroup]]:
+def _list_groups(programs: Sequence[LightProgram]) -> list[tuple[LightProgram, ShownGroup]]:
     return [(light, group) for light in programs for group in light.groups]
 
 
-def _greens(programs: Sequence[LightProgram], states: pl.DataFrame, end: float) -> pl.DataFrame:
+def _find_greens(
+    programs: Sequence[LightProgram], states: pl.DataFrame, end: float
+) -> pl.DataFrame:
     """Greens of each group: ``light``, ``group``, ``number``, ``begin`` and ``end``, s."""
     import polars as pl
 
@@ -136,7 +138,7 @@ def _greens(programs: Sequence[LightProgram], states: pl.DataFrame, end: float) 
     )
 
 
-def _passages(
+def _find_passages(
     programs: Sequence[LightProgram], rows: pl.LazyFrame, ways: pl.DataFrame | None
 ) -> pl.DataFrame | None:
     """Vehicles and the times at which they passed a light, and stopped before it if they did."""
@@ -148,7 +150,7 @@ def _passages(
     inside = pl.DataFrame(
         [
             (lane, light.id, group.id)
-            for light, group in _groups(programs)
+            for light, group in _list_groups(programs)
             for lanes in group.lanes
             for lane in lanes[1:]
         ],
@@ -175,7 +177,7 @@ def _passages(
     )
     if ways is None or passed.is_empty():
         return passed.with_columns(stopped=pl.lit(None, dtype=pl.Float64))
-    edges = _approaches(programs, ways)
+    edges = _find_approaches(programs, ways)
     stopped = (
         seen(rows.filter(pl.col("vehicle_speed") < STOPPED), edges)
         .group_by("id", "light")
@@ -185,7 +187,7 @@ def _passages(
     return passed.join(stopped, on=["id", "light"], how="left")
 
 
-def _approaches(programs: Sequence[LightProgram], ways: pl.DataFrame) -> pl.DataFrame:
+def _find_approaches(programs: Sequence[LightProgram], ways: pl.DataFrame) -> pl.DataFrame:
     """Lanes on the way to each light."""
     import polars as pl
 
@@ -197,7 +199,7 @@ def _approaches(programs: Sequence[LightProgram], ways: pl.DataFrame) -> pl.Data
             lanes.setdefault(edge, set()).add(lane)
     found = {
         (lane, light.id)
-        for light, group in _groups(programs)
+        for light, group in _list_groups(programs)
         for first in group.lanes
         for edge in edges.get(first[0], ())
         for lane in lanes.get(edge, ())
@@ -206,7 +208,7 @@ def _approaches(programs: Sequence[LightProgram], ways: pl.DataFrame) -> pl.Data
     return pl.DataFrame(sorted(found), schema=schema, orient="row")
 
 
-def _used(greens: pl.DataFrame, passed: pl.DataFrame) -> pl.DataFrame:
+def _measure_use(greens: pl.DataFrame, passed: pl.DataFrame) -> pl.DataFrame:
     """Vehicles, cycle failures and unused seconds of each group."""
     import polars as pl
 
@@ -252,7 +254,7 @@ def _of_greens(
     import numpy as np
 
     begin, end, at = (np.asarray(some, dtype=np.float64) for some in (begins, ends, times))
-    since = np.array([np.inf if one is None else one for one in stopped], dtype=np.float64)
+    since = np.array([np.inf if value is None else value for value in stopped], dtype=np.float64)
     # A vehicle waits through the greens that begin after its stop and end before it passes.
     first = np.searchsorted(begin, since, side="right")
     last = np.searchsorted(end, at, side="left")
@@ -305,7 +307,7 @@ def read_signal_use_table(file: Path) -> pl.DataFrame:
         return found.select(list(schema)).fill_nan(None)
 
 
-def _share(run: RunData, part: str, whole: str) -> float | None:
+def _share_of_signals(run: RunData, part: str, whole: str) -> float | None:
     if run.signals is None:
         return None
     known = run.signals["vehicles"].is_not_null()
@@ -327,7 +329,7 @@ FIGURES = (
         display=_PERCENT,
         section=ReportSection.SIGNALS,
         note="greens that did not clear the queue",
-        compute=lambda run: _share(run, "cycle_failures", "greens"),
+        compute=lambda run: _share_of_signals(run, "cycle_failures", "greens"),
     ),
     RunFigure(
         name="unused_green",
@@ -342,6 +344,6 @@ FIGURES = (
         display=_PERCENT,
         section=ReportSection.SIGNALS,
         note="green in which no vehicle passed",
-        compute=lambda run: _share(run, "unused_green", "green"),
+        compute=lambda run: _share_of_signals(run, "unused_green", "green"),
     ),
 )

@@ -149,20 +149,20 @@ class Outcomes:
         """Write down who has arrived: nothing more happens to them, and :meth:`rows` is quicker."""
         for name, history in self._histories.items():
             if history.arrival is not None and name in self._actors and name not in self._rows:
-                self._rows[name] = outcome_row(self._outcome(name))
+                self._rows[name] = outcome_row(self._outcome_of(name))
 
     def outcomes(self) -> tuple[ActorOutcome, ...]:
         """One outcome per planned actor, in the plan's order."""
-        return tuple(map(self._outcome, self._actors))
+        return tuple(map(self._outcome_of, self._actors))
 
     def rows(self) -> Iterator[str]:
         """The same as rows of ``actors.json``."""
         for name in self._actors:
-            yield self._rows.get(name) or outcome_row(self._outcome(name))
+            yield self._rows.get(name) or outcome_row(self._outcome_of(name))
 
-    def _outcome(self, name: str) -> ActorOutcome:
+    def _outcome_of(self, name: str) -> ActorOutcome:
         history = self._histories.get(name) or _ActorHistory()
-        return _outcome(self._actors[name], history, self._trips.get(name, _NO_TRIP))
+        return _make_outcome(self._actors[name], history, self._trips.get(name, _NO_TRIP))
 
 
 def actor_outcomes(
@@ -180,7 +180,7 @@ def actor_outcomes(
     return found.outcomes()
 
 
-def _status(history: _ActorHistory) -> ActorStatus:
+def _status_of(history: _ActorHistory) -> ActorStatus:
     if history.arrival:
         return ActorStatus.ARRIVED
     if history.stranded:
@@ -188,9 +188,9 @@ def _status(history: _ActorHistory) -> ActorStatus:
     return ActorStatus.RUNNING if history.departure else ActorStatus.WAITING
 
 
-def _outcome(actor: PlannedActor, history: _ActorHistory, trip: Trip) -> ActorOutcome:
+def _make_outcome(actor: PlannedActor, history: _ActorHistory, trip: Trip) -> ActorOutcome:
     departure, arrival = history.departure, history.arrival
-    status = _status(history)
+    status = _status_of(history)
     inserted = departure.time if departure else None
     # Who appears by a rule is due when it does, and not before.
     depart = inserted if actor.appears and inserted is not None else actor.depart

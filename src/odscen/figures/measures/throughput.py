@@ -16,7 +16,7 @@ LEAST_VEHICLES = 5
 """A junction that fewer vehicles enter in a run is not looked at for the worst delay."""
 
 
-def _throughput(run: RunData) -> float:
+def _measure_throughput(run: RunData) -> float:
     network = run.network
     hours = (network["end"] - network["begin"]) / 3600.0
     return float(network["arrived"] / hours)
@@ -35,7 +35,7 @@ def _worst_junction_delay(run: RunData) -> float | None:
     return worst if isinstance(worst, float) else None
 
 
-def _arrivals(values: Mapping[str, Any]) -> str:
+def _describe_arrivals(values: Mapping[str, Any]) -> str:
     arrivals = values.get("throughput")
     return "" if arrivals is None else f"{arrivals:,.0f} arrived per hour"
 
@@ -50,7 +50,7 @@ FIGURES = (
         basis=Basis.ROADS,
         display=Display("km", digits=0),
         section=ReportSection.KEY_FIGURES,
-        note=_arrivals,
+        note=_describe_arrivals,
         compute=lambda run: float(run.network["distance"]) / 1000.0,
     ),
     RunFigure(
@@ -62,7 +62,7 @@ FIGURES = (
         better=Better.HIGHER,
         basis=Basis.ROADS,
         display=Display("veh/h", digits=0),
-        compute=_throughput,
+        compute=_measure_throughput,
     ),
     RunFigure(
         name="worst_junction_delay",

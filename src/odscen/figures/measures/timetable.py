@@ -51,33 +51,33 @@ def stops_served(visits: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def _served(run: RunData) -> float:
+def _count_served(run: RunData) -> float:
     return float(0 if run.visits is None else run.visits.height)
 
 
-def _late(run: RunData) -> float | None:
-    return None if run.visits is None else _number(lateness(run.visits)["late"].mean())
+def _mean_lateness(run: RunData) -> float | None:
+    return None if run.visits is None else _number_or_none(lateness(run.visits)["late"].mean())
 
 
 def _on_time(run: RunData) -> float | None:
     if run.visits is None:
         return None
-    return _number((lateness(run.visits)["late"] <= LATE).mean())
+    return _number_or_none((lateness(run.visits)["late"] <= LATE).mean())
 
 
-def _parked(run: RunData) -> float | None:
+def _count_parked(run: RunData) -> float | None:
     return None if run.parking is None else float(run.parking.use().ended)
 
 
-def _diverted(run: RunData) -> float | None:
+def _count_diverted(run: RunData) -> float | None:
     return None if run.parking is None else float(run.parking.use().diverted)
 
 
-def _occupancy(run: RunData) -> float | None:
+def _mean_occupancy(run: RunData) -> float | None:
     return None if run.parking is None else run.parking.use().occupancy
 
 
-def _number(value: object) -> float | None:
+def _number_or_none(value: object) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
 
@@ -92,7 +92,7 @@ FIGURES = (
         basis=Basis.STOPS,
         display=Display("", digits=0),
         section=ReportSection.TRANSIT,
-        compute=_served,
+        compute=_count_served,
     ),
     RunFigure(
         name="departure_lateness",
@@ -105,7 +105,7 @@ FIGURES = (
         basis=Basis.STOPS,
         display=Display("s", digits=1),
         section=ReportSection.TRANSIT,
-        compute=_late,
+        compute=_mean_lateness,
     ),
     RunFigure(
         name="on_time_departures",
@@ -129,7 +129,7 @@ FIGURES = (
         basis=Basis.PARKING,
         display=Display("", digits=0),
         section=ReportSection.PARKING,
-        compute=_parked,
+        compute=_count_parked,
     ),
     RunFigure(
         name="parking_diverted",
@@ -141,7 +141,7 @@ FIGURES = (
         basis=Basis.PARKING,
         display=Display("", digits=0),
         section=ReportSection.PARKING,
-        compute=_diverted,
+        compute=_count_diverted,
     ),
     RunFigure(
         name="parking_occupancy",
@@ -153,6 +153,6 @@ FIGURES = (
         basis=Basis.PARKING,
         display=Display("%", 100.0, 1),
         section=ReportSection.PARKING,
-        compute=_occupancy,
+        compute=_mean_occupancy,
     ),
 )

@@ -35,7 +35,7 @@ def write_tables(figures: TrafficFigures, folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     for name in TABLES:
         table: pl.DataFrame = getattr(figures, name)
-        _short(table).write_csv(folder / f"{name}.csv")
+        _round_floats(table).write_csv(folder / f"{name}.csv")
 
 
 def read_tables(folder: Path) -> TrafficFigures | None:
@@ -60,14 +60,14 @@ def read_tables(folder: Path) -> TrafficFigures | None:
                 raise InputError(
                     "not a table of figures: there is no column 'begin'", file=str(file)
                 )
-            found[name] = with_missing(pl.read_csv(file, schema=_schema(names)))
+            found[name] = with_missing(pl.read_csv(file, schema=_column_types(names)))
     return TrafficFigures(**found)
 
 
 def write_stations(stations: pl.DataFrame, folder: Path) -> None:
     """Write what the stations of the study counted, ``stations.csv``."""
     folder.mkdir(exist_ok=True)
-    _short(stations).write_csv(folder / STATIONS_TABLE)
+    _round_floats(stations).write_csv(folder / STATIONS_TABLE)
 
 
 def read_stations(folder: Path) -> pl.DataFrame | None:
@@ -109,10 +109,10 @@ def places_from_json(text: str, table: TableName) -> pl.DataFrame:
         what="figures of a run",
     ) as data:
         rows = data.get(table, ()) if table == "lane_groups" else data[table]
-        return pl.DataFrame(rows, schema=_schema(rows[0] if rows else ()))
+        return pl.DataFrame(rows, schema=_column_types(rows[0] if rows else ()))
 
 
-def _schema(names: Iterable[str]) -> dict[str, type[pl.DataType]]:
+def _column_types(names: Iterable[str]) -> dict[str, type[pl.DataType]]:
     import polars as pl
 
     types: dict[str, type[pl.DataType]] = {
@@ -135,12 +135,12 @@ def figures_json(data: RunData, figures: TrafficFigures) -> str:
         "version": VERSION,
         "units": {"run": units, "tables": COLUMN_UNITS},
         "run": rounded(of_run),
-        **{name: _short(table).to_dicts() for name, table in figures.whole.items()},
+        **{name: _round_floats(table).to_dicts() for name, table in figures.whole.items()},
     }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
-def _short(table: pl.DataFrame) -> pl.DataFrame:
+def _round_floats(table: pl.DataFrame) -> pl.DataFrame:
     import polars.selectors as cs
 
     return table.with_columns(cs.float().round(_DIGITS))

@@ -34,28 +34,28 @@ _TRIPINFO = "SUMO tripinfo"
 _EVENTS = "SUMO, departed and arrived"
 
 
-def _times(outcomes: Outcomes) -> list[float]:
-    return [one.travel_time for one in outcomes if one.travel_time is not None]
+def _travel_times(outcomes: Outcomes) -> list[float]:
+    return [outcome.travel_time for outcome in outcomes if outcome.travel_time is not None]
 
 
-def _percentile(outcomes: Outcomes, share: float) -> float | None:
-    times = _times(outcomes)
+def _travel_time_percentile(outcomes: Outcomes, share: float) -> float | None:
+    times = _travel_times(outcomes)
     return float(np.percentile(times, share)) if times else None
 
 
 def _mean_speed(outcomes: Outcomes) -> float | None:
     """Space mean: metres of all over their seconds."""
     moved = [
-        (one.route_length, one.travel_time)
-        for one in outcomes
-        if one.travel_time and one.route_length is not None
+        (outcome.route_length, outcome.travel_time)
+        for outcome in outcomes
+        if outcome.travel_time and outcome.route_length is not None
     ]
     seconds = sum(time for _, time in moved)
     return sum(length for length, _ in moved) / seconds if seconds else None
 
 
-def _arrived(outcomes: Outcomes) -> Outcomes:
-    return [one for one in outcomes if one.status is ActorStatus.ARRIVED]
+def _keep_arrived(outcomes: Outcomes) -> Outcomes:
+    return [outcome for outcome in outcomes if outcome.status is ActorStatus.ARRIVED]
 
 
 def _of_mode(
@@ -77,7 +77,7 @@ def _of_mode(
             section=section,
             note=f"of {walker}s that arrived",
             on_page=True,
-            compute=lambda run: mean(sorted(_times(of(run)))),
+            compute=lambda run: mean(sorted(_travel_times(of(run)))),
         ),
         RunFigure(
             name=f"{prefix}median_travel_time",
@@ -87,7 +87,7 @@ def _of_mode(
             source=_EVENTS,
             better=Better.LOWER,
             display=CLOCK,
-            compute=lambda run: _percentile(of(run), 50.0),
+            compute=lambda run: _travel_time_percentile(of(run), 50.0),
         ),
         RunFigure(
             name=f"{prefix}p95_travel_time",
@@ -97,7 +97,7 @@ def _of_mode(
             source=f"{_EVENTS}; FHWA-HOP-06-070",
             better=Better.LOWER,
             display=CLOCK,
-            compute=lambda run: _percentile(of(run), 95.0),
+            compute=lambda run: _travel_time_percentile(of(run), 95.0),
         ),
         RunFigure(
             name=f"{prefix}mean_speed",
@@ -140,7 +140,7 @@ def _of_mode(
             display=CLOCK,
             section=section,
             note="mostly at crossings" if afoot else "below 0.1 m/s",
-            compute=lambda run: mean([one.waiting_time for one in _arrived(of(run))]),
+            compute=lambda run: mean([outcome.waiting_time for outcome in _keep_arrived(of(run))]),
         ),
     )
 
@@ -161,6 +161,6 @@ FIGURES = (
         display=Display("", digits=1),
         section=ReportSection.KEY_FIGURES,
         note="on average",
-        compute=lambda run: mean([one.stops for one in _arrived(run.vehicles)]),
+        compute=lambda run: mean([outcome.stops for outcome in _keep_arrived(run.vehicles)]),
     ),
 )

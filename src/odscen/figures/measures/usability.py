@@ -130,11 +130,13 @@ class Usability:
     @property
     def because(self) -> str:
         """The reasons that make it no better than it is, in one line; empty if usable."""
-        return "; ".join(one.words for one in self.reasons if one.level is self.level)
+        return "; ".join(reason.words for reason in self.reasons if reason.level is self.level)
 
     def to_dict(self) -> dict[str, Any]:
         """For ``summary.json``."""
-        reasons = [{**rounded(asdict(one)), "places": list(one.places)} for one in self.reasons]
+        reasons = [
+            {**rounded(asdict(reason)), "places": list(reason.places)} for reason in self.reasons
+        ]
         return {"level": self.level, "headline": self.headline, "reasons": reasons}
 
 
@@ -159,20 +161,24 @@ def run_usability(
         When it was to end, if it was stopped by hand.
     """
     found = [
-        _gridlock(incidents, end),
+        _judge_gridlock(incidents, end),
         _not_inserted(outcomes, incidents, end),
-        _teleported(outcomes, incidents),
+        _judge_teleports(outcomes, incidents),
         _not_served(outcomes, end),
-        _latent(outcomes, end),
+        _judge_latent_delay(outcomes, end),
         None if until is None else _stopped_early(end, until),
     ]
-    reasons = [one for one in found if one is not None and one.level is not UsabilityLevel.USABLE]
+    reasons = [
+        reason
+        for reason in found
+        if reason is not None and reason.level is not UsabilityLevel.USABLE
+    ]
     return judged(reasons)
 
 
 def judged(reasons: Iterable[UsabilityReason]) -> Usability:
     """Verdict from its reasons: as bad as the worst of them."""
-    ordered = tuple(sorted(reasons, key=lambda one: one.level.score))
+    ordered = tuple(sorted(reasons, key=lambda reason: reason.level.score))
     return Usability(ordered[0].level if ordered else UsabilityLevel.USABLE, ordered)
 
 
@@ -189,15 +195,17 @@ def usability_score(summary: Mapping[str, Any]) -> float | None:
     return None if not verdict else float(UsabilityLevel(verdict["level"]).score)
 
 
-def _gridlock(incidents: Sequence[Incident], end: float) -> UsabilityReason | None:
-    jams = [one for one in incidents if one.kind is IncidentKind.JAM]
-    lasting = [one for one in jams if one.until is None]
-    circles = [one for one in jams if one.reason is StopReason.CIRCLE]
-    closed = [one for one in circles if one.until is None]
+def _judge_gridlock(incidents: Sequence[Incident], end: float) -> UsabilityReason | None:
+    jams = [incident for incident in incidents if incident.kind is IncidentKind.JAM]
+    lasting = [jam for jam in jams if jam.until is None]
+    circles = [jam for jam in jams if jam.reason is StopReason.CIRCLE]
+    closed = [circle for circle in circles if circle.until is None]
     named = closed or lasting or circles
     if not named:
         return None
-    longest = max((end if one.until is None else one.until) - one.time for one in named)
+    longest = max(
+        (end if incident.until is None else incident.until) - incident.time for incident in named
+    )
     level = BOUNDS[UsabilityKind.GRIDLOCK].level(longest if lasting else 1.0)
     if closed:
         level = UsabilityLevel.NOT_USABLE
@@ -207,8 +215,8 @@ def _gridlock(incidents: Sequence[Incident], end: float) -> UsabilityReason | No
     number = f"{len(named)} times {what}" if len(named) > 1 else what
     first = named[0]
     since = f"since {first.time:.0f} s ({reason_label(first.reason)})"
-    words = f"{number}, first at {_spot(first)} {since}"
-    places = tuple(_spot(one) for one in named[:_PLACES])
+    words = f"{number}, first at {_describe_spot(first)} {since}"
+    places = tuple(_describe_spot(incident) for incident in named[:_PLACES])
     return UsabilityReason(UsabilityKind.GRIDLOCK, level, longest, len(named), words, places)
 
 
@@ -216,47 +224,47 @@ def _not_inserted(
     outcomes: Sequence[ActorOutcome], incidents: Sequence[Incident], end: float
 ) -> UsabilityReason | None:
     expected = due(outcomes, end - PATIENCE)
-    missing = [one for one in expected if one.status is ActorStatus.WAITING]
-    kept = [one for one in incidents if one.kind is IncidentKind.NOT_INSERTED]
-    kept.sort(key=lambda one: (-one.count, one.time))
-    places = tuple(f"{_spot(one)}: {one.count}" for one in kept[:_PLACES])
-    most = f", most at {_spot(kept[0])} ({reason_label(kept[0].reason)})" if kept else ""
-    return _share(
+    missing = [outcome for outcome in expected if outcome.status is ActorStatus.WAITING]
+    kept = [incident for incident in incidents if incident.kind is IncidentKind.NOT_INSERTED]
+    kept.sort(key=lambda incident: (-incident.count, incident.time))
+    places = tuple(f"{_describe_spot(incident)}: {incident.count}" for incident in kept[:_PLACES])
+    most = f", most at {_describe_spot(kept[0])} ({reason_label(kept[0].reason)})" if kept else ""
+    return _judge_share(
         UsabilityKind.NOT_INSERTED,
         len(missing),
         len(expected),
-        f"road users {_were(missing)} not inserted",
+        f"road users {_was_or_were(missing)} not inserted",
         most,
         places,
     )
 
 
-def _teleported(
+def _judge_teleports(
     outcomes: Sequence[ActorOutcome], incidents: Sequence[Incident]
 ) -> UsabilityReason | None:
-    inserted = [one for one in outcomes if one.inserted is not None]
-    gone = [one for one in inserted if one.teleports]
-    where = [one for one in incidents if one.kind is IncidentKind.TELEPORTED]
-    places = tuple(dict.fromkeys(_spot(one) for one in where))[:_PLACES]
+    inserted = [outcome for outcome in outcomes if outcome.inserted is not None]
+    gone = [outcome for outcome in inserted if outcome.teleports]
+    where = [incident for incident in incidents if incident.kind is IncidentKind.TELEPORTED]
+    places = tuple(dict.fromkeys(_describe_spot(incident) for incident in where))[:_PLACES]
     first = f", first at {places[0]} ({reason_label(where[0].reason)})" if places else ""
-    words = f"inserted road users {_were(gone)} teleported"
-    return _share(UsabilityKind.TELEPORTED, len(gone), len(inserted), words, first, places)
+    words = f"inserted road users {_was_or_were(gone)} teleported"
+    return _judge_share(UsabilityKind.TELEPORTED, len(gone), len(inserted), words, first, places)
 
 
 def _not_served(outcomes: Sequence[ActorOutcome], end: float) -> UsabilityReason | None:
     arriving = [
-        one
-        for one in outcomes
-        if one.goal is not None
-        and one.free_flow_time is not None
-        and one.depart + SLOW * one.free_flow_time + LATE < end
+        outcome
+        for outcome in outcomes
+        if outcome.goal is not None
+        and outcome.free_flow_time is not None
+        and outcome.depart + SLOW * outcome.free_flow_time + LATE < end
     ]
-    late = [one for one in arriving if one.status is not ActorStatus.ARRIVED]
+    late = [outcome for outcome in arriving if outcome.status is not ActorStatus.ARRIVED]
     words = "road users due had not arrived (demand not served)"
-    return _share(UsabilityKind.NOT_SERVED, len(late), len(arriving), words, "", ())
+    return _judge_share(UsabilityKind.NOT_SERVED, len(late), len(arriving), words, "", ())
 
 
-def _share(
+def _judge_share(
     kind: UsabilityKind,
     count: int,
     number: int,
@@ -267,13 +275,15 @@ def _share(
     if not count:
         return None
     share = count / number
-    text = f"{count:,} of {number:,} {words} ({_percent(share)}){where}"
+    text = f"{count:,} of {number:,} {words} ({_format_percent(share)}){where}"
     return UsabilityReason(kind, BOUNDS[kind].level(share), share, count, text, places)
 
 
-def _latent(outcomes: Sequence[ActorOutcome], end: float) -> UsabilityReason | None:
-    expected = [one for one in served(due(outcomes, end)) if one.category != "pedestrian"]
-    waits = [latent_delay(one, end) or 0.0 for one in expected]
+def _judge_latent_delay(outcomes: Sequence[ActorOutcome], end: float) -> UsabilityReason | None:
+    expected = [
+        outcome for outcome in served(due(outcomes, end)) if outcome.category != "pedestrian"
+    ]
+    waits = [latent_delay(outcome, end) or 0.0 for outcome in expected]
     value = mean(waits)
     if value is None:
         return None
@@ -289,19 +299,19 @@ def _stopped_early(end: float, until: float) -> UsabilityReason:
     return UsabilityReason(UsabilityKind.STOPPED_EARLY, level, end, 0, words)
 
 
-def _spot(one: Incident) -> str:
+def _describe_spot(incident: Incident) -> str:
     """``"r1-0 (x 12 m, y 40 m)"``."""
-    name = one.place or one.lane or one.actor
-    if one.x is None or one.y is None:
+    name = incident.place or incident.lane or incident.actor
+    if incident.x is None or incident.y is None:
         return name
-    return f"{name} (x {one.x:.0f} m, y {one.y:.0f} m)"
+    return f"{name} (x {incident.x:.0f} m, y {incident.y:.0f} m)"
 
 
-def _were(some: Sequence[object]) -> str:
+def _was_or_were(some: Sequence[object]) -> str:
     return "was" if len(some) == 1 else "were"
 
 
-def _percent(share: float) -> str:
+def _format_percent(share: float) -> str:
     """Two digits at least, so that a few of many are never 0 %."""
     percent = 100.0 * share
     return f"{percent:.1f} %" if percent >= 0.1 else f"{percent:.2g} %"

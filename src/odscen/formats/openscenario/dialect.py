@@ -24,12 +24,12 @@ def xml(tag: str, /, *children: _Element | None, **attributes: object) -> _Eleme
     found = etree.Element(tag)
     for key, value in attributes.items():
         if value is not None:
-            found.set(key.rstrip("_"), _written(value))
+            found.set(key.rstrip("_"), _format_attribute(value))
     found.extend(child for child in children if child is not None)
     return found
 
 
-def _written(value: object) -> str:
+def _format_attribute(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):

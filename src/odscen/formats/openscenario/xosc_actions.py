@@ -81,14 +81,14 @@ class Actions:
     def before(self, part: Any, actor: str) -> Iterator[Any]:
         """Yield actions of rules of an actor that stand before an action, in their order."""
         for rule in self.rules:
-            for one in (one for item in rule.then for one in item.parts):
+            for one in (part for item in rule.then for part in item.parts):
                 if getattr(one, one.kind) is part:
                     return
                 if rule.actor == actor:
                     yield one
 
 
-def _speed(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
+def _write_speed(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
     given = (("rate", part.rate), ("time", part.over), ("distance", part.within))
     dimension, value = next((pair for pair in given if pair[1] is not None), ("time", 0.0))
     if dimension == "rate" and made.dialect.for_scenario_runner:
@@ -96,7 +96,7 @@ def _speed(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
     return [speed_action(part.to, _SHAPES[part.shape], dimension, value)]
 
 
-def _brake(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
+def _write_brake(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
     if part.hold is not None:
         made.notes.approximated.append((where, "what follows does not wait for the hold"))
     if made.dialect.for_scenario_runner:
@@ -104,25 +104,25 @@ def _brake(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
     return [speed_action(0.0, "linear", "rate", part.by)]
 
 
-def _stop(_made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
+def _write_stop(_made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
     if part.within is None:
         return [speed_action(0.0, "step", "time", 0.0)]
     return [speed_action(0.0, "linear", "distance", part.within)]
 
 
-def _controller(made: Actions, **axes: bool) -> _Element:
+def _controller_action(made: Actions, **axes: bool) -> _Element:
     action = xml("ActivateControllerAction", **axes)
     if made.dialect.minor == 0:
         return private(action)
     return private(xml("ControllerAction", action))
 
 
-def _go(made: Actions, _part: Any, _actor: str, _where: str) -> list[_Element]:
-    return [_controller(made, longitudinal=True)]
+def _write_go(made: Actions, _part: Any, _actor: str, _where: str) -> list[_Element]:
+    return [_controller_action(made, longitudinal=True)]
 
 
-def _release(made: Actions, _part: Any, _actor: str, _where: str) -> list[_Element]:
-    return [_controller(made, lateral=True, longitudinal=True)]
+def _write_release(made: Actions, _part: Any, _actor: str, _where: str) -> list[_Element]:
+    return [_controller_action(made, lateral=True, longitudinal=True)]
 
 
 def _lane_change(over: float, target: _Element, offset: float | None = None) -> _Element:
@@ -138,7 +138,7 @@ def _lane_change(over: float, target: _Element, offset: float | None = None) -> 
     return private(xml("LateralAction", change))
 
 
-def _lane(_made: Actions, part: Any, actor: str, _where: str) -> list[_Element]:
+def _write_lane(_made: Actions, part: Any, actor: str, _where: str) -> list[_Element]:
     if part.by is None:
         raise CannotSayError("a change to the lane that leads to a place")
     target = xml("RelativeTargetLane", entityRef=actor, value=int(part.by))
@@ -154,7 +154,7 @@ def _cut_in(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]
     return [_lane_change(part.over, xml("RelativeTargetLane", entityRef=part.to, value=0))]
 
 
-def _offset(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
+def _write_offset(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     asked = [one.offset.to for one in made.before(part, actor) if one.offset is not None]
     moves = abs(part.to - (asked[-1] if asked else made.actors[actor].lateral_offset))
     if not moves and not made.dialect.for_scenario_runner:  # no acceleration tells how long
@@ -206,7 +206,7 @@ def _keep_gap(made: Actions, part: Any, _actor: str, where: str) -> list[_Elemen
     ]
 
 
-def _walk(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
+def _write_walk(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     speed = part.speed or made.actors[actor].speed or _WALKING
     made.notes.approximated.append((where, "the walk begins where the walker is, not at a point"))
     spots = [made.places.spot(place) for place in (*part.through, part.to)]
@@ -216,7 +216,7 @@ def _walk(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     ]
 
 
-def _goal(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
+def _write_goal(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
     if made.dialect.for_scenario_runner:
         msg = UNSAID_GOAL
         raise CannotSayError(msg)
@@ -228,7 +228,7 @@ def acquire(places: Places, node: str) -> _Element:
     return private(xml("RoutingAction", xml("AcquirePositionAction", places.goal(node))))
 
 
-def _arrive(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
+def _write_arrive(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     master, own = (made.places.spot(place).element() for place in (part.when_at, part.at))
     master.tag, own.tag = "TargetPositionMaster", "TargetPosition"
     speed, steady = part.speed, None
@@ -245,19 +245,19 @@ def _arrive(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     return [private(xml("SynchronizeAction", master, own, final, masterEntityRef=part.to))]
 
 
-def _ignore(made: Actions, _part: Any, _actor: str, where: str) -> list[_Element]:
+def _write_ignore(made: Actions, _part: Any, _actor: str, where: str) -> list[_Element]:
     made.notes.approximated.append((where, IGNORES))
     return []
 
 
-def _vanish(made: Actions, _part: Any, actor: str, where: str) -> list[_Element]:
+def _write_vanish(made: Actions, _part: Any, actor: str, where: str) -> list[_Element]:
     if made.dialect.for_scenario_runner:
         made.notes.approximated.append((where.partition(".")[0], BELOW))
     at = made.places.start(made.actors[actor])
     return [delete_entity(actor, at, made.dialect)]
 
 
-def _appear(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
+def _write_appear(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     if made.dialect.for_scenario_runner:
         made.notes.approximated.append((where.partition(".")[0], BELOW))
     own = made.actors[actor]
@@ -283,7 +283,7 @@ _LIGHTS: Final = {
 _INDICATORS: Final = {"left": "indicatorLeft", "right": "indicatorRight", "hazard": "warningLights"}
 
 
-def _lights(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
+def _write_lights(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
     if made.dialect.minor < 3:  # the schema of 1.2 wants a light of the vehicle and one of the user
         raise CannotSayError("lights of vehicles, which can be written from 1.3 on")
     states = {name: "on" if getattr(part, field) else "off" for field, name in _LIGHTS.items()
@@ -309,7 +309,7 @@ def _lights(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element
     ]
 
 
-def _signal(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
+def _write_signal(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
     source = made.places.source
     if made.dialect.for_scenario_runner:
         raise CannotSayError(
@@ -326,23 +326,23 @@ def _signal(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element
 
 
 _MAKERS: Final[Mapping[str, Callable[[Actions, Any, str, str], list[_Element]]]] = {
-    "speed": _speed,
-    "brake": _brake,
-    "stop": _stop,
-    "go": _go,
-    "lane": _lane,
+    "speed": _write_speed,
+    "brake": _write_brake,
+    "stop": _write_stop,
+    "go": _write_go,
+    "lane": _write_lane,
     "cut_in": _cut_in,
-    "offset": _offset,
+    "offset": _write_offset,
     "keep_gap": _keep_gap,
-    "walk": _walk,
+    "walk": _write_walk,
     "path": path,
     "replay": replay,
-    "goal": _goal,
-    "arrive": _arrive,
-    "appear": _appear,
-    "vanish": _vanish,
-    "lights": _lights,
-    "release": _release,
-    "ignore": _ignore,
-    "signal": _signal,
+    "goal": _write_goal,
+    "arrive": _write_arrive,
+    "appear": _write_appear,
+    "vanish": _write_vanish,
+    "lights": _write_lights,
+    "release": _write_release,
+    "ignore": _write_ignore,
+    "signal": _write_signal,
 }

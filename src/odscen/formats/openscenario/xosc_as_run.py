@@ -53,16 +53,16 @@ class AsRun:
         """``ScenarioObject`` of each road user who was there."""
         for user in self.recorded.users:
             if user.id in self.lines:
-                yield entity_of(self._facts(user), self.dialect)
+                yield entity_of(self._entity_facts(user), self.dialect)
 
     def storyboard(self) -> _Element:
         """``Storyboard``."""
-        groups = [self._moves(name) for name in self.lines]
-        states = self._states()
+        groups = [self._write_moves(name) for name in self.lines]
+        states = self._signal_states()
         if states and self.dialect.for_scenario_runner:
             words = "ScenarioRunner refuses them by the id of a signal"
             self.triggers.notes.left_out.append(("traffic lights", words))
-        elif changes := list(self._changes(states)):
+        elif changes := list(self._write_signal_changes(states)):
             groups.append(maneuver_group("traffic lights", None, changes))
         until, sky = self.recorded.until, self.environment
         whole = act("as run", groups, self.triggers, until=until, sky=sky)
@@ -70,12 +70,12 @@ class AsRun:
         end = self.triggers.at_time(until, "end of the run")
         return xml(
             "Storyboard",
-            xml("Init", xml("Actions", *self._init(states))),
+            xml("Init", xml("Actions", *self._write_init(states))),
             xml("Story", xml("ParameterDeclarations"), whole, name=name),
             xml("StopTrigger", end),
         )
 
-    def _facts(self, user: PlannedActor) -> EntityFacts:
+    def _entity_facts(self, user: PlannedActor) -> EntityFacts:
         category = Category(user.category)
         known = None if user.model is None else self.source.assets.dimensions(user.model)
         height = (known or DEFAULT_BODY[category]).height
@@ -89,12 +89,12 @@ class AsRun:
             properties={"type": kind},
         )
 
-    def _init(self, states: Sequence[tuple[float, dict[str, str]]]) -> Iterator[_Element]:
+    def _write_init(self, states: Sequence[tuple[float, dict[str, str]]]) -> Iterator[_Element]:
         if self.environment is not None:
             yield xml("GlobalAction", xml("EnvironmentAction", self.environment))
         for time, shown in states[:1]:
             if time <= 0.0 and not self.dialect.for_scenario_runner:
-                yield from _lights(shown)
+                yield from _write_lights(shown)
         for name, (times, spots) in self.lines.items():
             there = times[0] <= 0.0
             if there or self.dialect.for_scenario_runner:
@@ -102,21 +102,21 @@ class AsRun:
                 teleport = private(xml("TeleportAction", spot.element()))
                 yield xml("Private", teleport, entityRef=name)
 
-    def _moves(self, name: str) -> _Element:
+    def _write_moves(self, name: str) -> _Element:
         times, spots = self.lines[name]
         line = follow_line(self.dialect, f"{name} as run", spots, times, clock="absolute")
         actions = [line] if times[0] <= 0.0 else [add_entity(name, spots[0], self.dialect), line]
-        events = [self._event(f"{name} moves", actions, times[0])]
+        events = [self._write_event(f"{name} moves", actions, times[0])]
         gone = times[-1] + self.recorded.step
         if gone < self.recorded.until:
             leaves = delete_entity(name, spots[-1], self.dialect)
-            events.append(self._event(f"{name} is gone", [leaves], gone))
+            events.append(self._write_event(f"{name} is gone", [leaves], gone))
         return maneuver_group(name, name, events)
 
-    def _event(self, name: str, actions: Sequence[_Element], time: float) -> _Element:
+    def _write_event(self, name: str, actions: Sequence[_Element], time: float) -> _Element:
         return event(name, actions, xml("StartTrigger", self.triggers.at_time(time, name)), 1)
 
-    def _states(self) -> list[tuple[float, dict[str, str]]]:
+    def _signal_states(self) -> list[tuple[float, dict[str, str]]]:
         """At each time the signals that change, with what they show from then on."""
         table = self.recorded.states
         if table is None:
@@ -126,7 +126,7 @@ class AsRun:
         found = []
         for (time,), rows in table.sort("time", "light").group_by("time", maintain_order=True):
             letters |= dict(zip(rows["light"], rows["state"], strict=True))
-            shown = heads.states({one: letters[one] for one in letters})
+            shown = heads.states({letter: letters[letter] for letter in letters})
             changed = {
                 signal: state for signal, state in sorted(shown.items())
                 if before.get(signal) != state
@@ -136,13 +136,15 @@ class AsRun:
                 found.append((float(str(time)), changed))
         return found
 
-    def _changes(self, states: Sequence[tuple[float, dict[str, str]]]) -> Iterator[_Element]:
+    def _write_signal_changes(
+        self, states: Sequence[tuple[float, dict[str, str]]]
+    ) -> Iterator[_Element]:
         for time, shown in states:
             if time > 0.0:
-                yield self._event(f"lights at {time:g} s", list(_lights(shown)), time)
+                yield self._write_event(f"lights at {time:g} s", list(_write_lights(shown)), time)
 
 
-def _lights(shown: dict[str, str]) -> Iterator[_Element]:
+def _write_lights(shown: dict[str, str]) -> Iterator[_Element]:
     for signal, state in shown.items():
         yield light_action(signal, state.lower())
 
@@ -169,13 +171,13 @@ def lines_of(recorded: RecordedRun) -> _Lines:
         )
     rows = {str(name): part for (name,), part in kept.group_by("id", maintain_order=True)}
     return {
-        user.id: _line(user, rows[user.id], recorded.step)
+        user.id: _line_of_user(user, rows[user.id], recorded.step)
         for user in recorded.users
         if user.id in rows
     }
 
 
-def _line(
+def _line_of_user(
     user: PlannedActor, rows: pl.DataFrame, step: float
 ) -> tuple[list[float], list[GroundPose]]:
     back = reference_behind(user.category, user.length)

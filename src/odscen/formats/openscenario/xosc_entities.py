@@ -55,7 +55,7 @@ def entity(actor: Actor, places: Places, dialect: Dialect) -> _Element:
         model=actor.model,
         speed=actor.speed,
         body=places.body(actor),
-        properties=_properties(actor),
+        properties=_actor_properties(actor),
     )
     return entity_of(facts, dialect)
 
@@ -63,11 +63,11 @@ def entity(actor: Actor, places: Places, dialect: Dialect) -> _Element:
 def entity_of(facts: EntityFacts, dialect: Dialect) -> _Element:
     """``ScenarioObject`` of a road user."""
     walks = facts.category is Category.PEDESTRIAN
-    made = _pedestrian(facts, dialect) if walks else _vehicle(facts)
+    made = _write_pedestrian(facts, dialect) if walks else _write_vehicle(facts)
     return xml("ScenarioObject", made, name=facts.id)
 
 
-def _vehicle(facts: EntityFacts) -> _Element:
+def _write_vehicle(facts: EntityFacts) -> _Element:
     body = facts.body
     wheel = 0.6
     fastest = max(_FASTEST.get(facts.category, _USUAL_FASTEST), facts.speed or 0.0)
@@ -81,7 +81,7 @@ def _vehicle(facts: EntityFacts) -> _Element:
     return xml(
         "Vehicle",
         xml("ParameterDeclarations"),
-        _box(facts),
+        _write_box(facts),
         performance,
         axles,
         _property_rows(facts),
@@ -90,12 +90,12 @@ def _vehicle(facts: EntityFacts) -> _Element:
     )
 
 
-def _pedestrian(facts: EntityFacts, dialect: Dialect) -> _Element:
+def _write_pedestrian(facts: EntityFacts, dialect: Dialect) -> _Element:
     model = facts.model or "pedestrian"
     return xml(
         "Pedestrian",
         xml("ParameterDeclarations"),
-        _box(facts),
+        _write_box(facts),
         _property_rows(facts),
         name=model,
         mass=_MASS[Category.PEDESTRIAN],
@@ -104,7 +104,7 @@ def _pedestrian(facts: EntityFacts, dialect: Dialect) -> _Element:
     )
 
 
-def _box(facts: EntityFacts) -> _Element:
+def _write_box(facts: EntityFacts) -> _Element:
     body = facts.body
     ahead = reference_behind(facts.category, body.length)
     return xml(
@@ -114,7 +114,7 @@ def _box(facts: EntityFacts) -> _Element:
     )
 
 
-def _properties(actor: Actor) -> dict[str, str]:
+def _actor_properties(actor: Actor) -> dict[str, str]:
     """Fields of the actor, those too that a position or speed says without the node's name."""
     said = actor.model_dump(
         mode="json",
@@ -122,7 +122,7 @@ def _properties(actor: Actor) -> dict[str, str]:
         exclude={"id", "category"},
     )
     kind = "ego_vehicle" if actor.ego else "simulation"
-    return {"type": kind, **{PREFIX + name: _text(value) for name, value in said.items()}}
+    return {"type": kind, **{PREFIX + name: _property_text(value) for name, value in said.items()}}
 
 
 def _property_rows(facts: EntityFacts) -> _Element:
@@ -131,7 +131,7 @@ def _property_rows(facts: EntityFacts) -> _Element:
     return xml("Properties", *rows)
 
 
-def _text(value: object) -> str:
+def _property_text(value: object) -> str:
     """JSON, but for texts that are none themselves."""
     text = value if isinstance(value, str) else json.dumps(value)
     try:

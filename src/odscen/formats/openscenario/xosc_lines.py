@@ -98,12 +98,12 @@ def follow_line(
 
 def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     """Trajectory of the reference point of an actor whose front follows a path."""
-    spots, times = _spots(made, part), list(part.times or ())
+    spots, times = _spots_of_path(made, part), list(part.times or ())
     base = part.relative_to and made.actors.get(part.relative_to)
     own = made.actors[actor]
     walks = own.category is Category.PEDESTRIAN
     front = 0.0 if walks else made.places.centre_ahead(own) + made.places.body(own).length / 2.0
-    begin = _begins(made, part, actor)
+    begin = _start_of_path(made, part, actor)
     if base:
         begin = GroundPose(0.0, 0.0, 0.0, 0.0).back(made.places.centre_ahead(base))
         begin = begin if base is own else None
@@ -111,16 +111,19 @@ def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
         made.notes.approximated.append((where, "it leads there from where the actor begins"))
         begin = made.places.start(own)
     first = spots[0] if begin is None else begin.back(-front)
-    line = _headed([first, *spots])
+    line = _add_headings([first, *spots])
     if begin is None:
-        line = [line[1].back(_RUN_UP), *_headed(spots)]
+        line = [line[1].back(_RUN_UP), *_add_headings(spots)]
         made.notes.approximated.append((where, "the actor is put to its first point"))
     if begin is None or front > 0.0:
         made.notes.approximated.append((where, "the reference point follows, not the front"))
     vertices = [begin or line[0].back(front), *(spot.back(front) for spot in line[1:])]
     if base:
         ahead = made.places.centre_ahead(base)
-        vertices = [RelativePose(one.x + ahead, one.y, 0.0, one.hdg, base.id) for one in vertices]
+        vertices = [
+            RelativePose(vertex.x + ahead, vertex.y, 0.0, vertex.hdg, base.id)
+            for vertex in vertices
+        ]
     name = f"{actor}: {where}"
     if times:
         before = 0.0 if begin is not None else 0.99 * times[0]
@@ -131,7 +134,7 @@ def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     return [found] if part.speed is None else [found, speed_action(part.speed, "step", "time", 0.0)]
 
 
-def _spots(made: Making, part: Any) -> list[GroundPose]:
+def _spots_of_path(made: Making, part: Any) -> list[GroundPose]:
     if part.relative_to is None:
         return [made.places.spot(place) for place in part.points]
     if made.dialect.for_scenario_runner:
@@ -164,7 +167,7 @@ def replay(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     return [made.trajectory(f"{actor}: {where}", spots, times, timed=True)]
 
 
-def _begins(made: Making, part: Any, actor: str) -> GroundPose | None:
+def _start_of_path(made: Making, part: Any, actor: str) -> GroundPose | None:
     """Where the reference point of an actor is when it begins a path, if that is known.
 
     It is known at first, and of who stands until then.
@@ -173,7 +176,7 @@ def _begins(made: Making, part: Any, actor: str) -> GroundPose | None:
     spot: GroundPose | None = made.places.start(own)
     moves = (own.initial_speed or 0.0) > 0.0
     rule = next(
-        (one for one in made.rules for item in one.then for p in item.parts if p.path is part),
+        (rule for rule in made.rules for item in rule.then for p in item.parts if p.path is part),
         None,
     )
     for one in made.before(part, actor):
@@ -197,7 +200,7 @@ def _begins(made: Making, part: Any, actor: str) -> GroundPose | None:
     return spot if at_once or not moves else None
 
 
-def _headed(spots: Sequence[GroundPose]) -> list[GroundPose]:
+def _add_headings(spots: Sequence[GroundPose]) -> list[GroundPose]:
     """Spots with the heading of the line through them."""
     found: list[GroundPose] = []
     for row, spot in enumerate(spots):

@@ -38,7 +38,7 @@ def traffic_signals(source: ExportSource, notes: ExportNotes) -> _Element | None
         return None
     programs = realized_lights(source.scenario, source.sumo_map)
     found = [
-        _controller(light, one.shown, notes)
+        _write_controller(light, one.shown, notes)
         for light, one in zip(lights, programs, strict=True)
         if any(light.signals)
     ]
@@ -100,12 +100,12 @@ def _phase_name(number: int, phase: ProgramPhase) -> str:
     return f"{number} {phase.name}".strip()
 
 
-def _controller(light: SumoLight, program: LightProgram, notes: ExportNotes) -> _Element:
+def _write_controller(light: SumoLight, program: LightProgram, notes: ExportNotes) -> _Element:
     plan, name = program.plans[0], program.junctions[0]
     where = f"signals of {name}"
     if len(program.plans) > 1:
         notes.approximated.append((where, "only the first plan of the day"))
-    if program.control != "fixed" or any(one.on_call or one.most for one in plan.phases):
+    if program.control != "fixed" or any(phase.on_call or phase.most for phase in plan.phases):
         notes.approximated.append((where, "each green as long as planned: nothing prolongs it"))
     heads, phases = Heads([light]), []
     for number, phase in enumerate(from_the_start(plan), start=1):
@@ -125,10 +125,10 @@ def from_the_start(plan: ShownPlan) -> Sequence[ProgramPhase]:
     A program begins ``offset`` seconds after that, as if it had run before; so the phase that is
     shown at the start may come in two parts.
     """
-    return tuple(_turned(plan.phases, -plan.offset % plan.cycle))
+    return tuple(_rotate_phases(plan.phases, -plan.offset % plan.cycle))
 
 
-def _turned(phases: Sequence[ProgramPhase], gone: float) -> Iterator[ProgramPhase]:
+def _rotate_phases(phases: Sequence[ProgramPhase], gone: float) -> Iterator[ProgramPhase]:
     """Phases after so many seconds of the cycle, then those before."""
     before, now = [], 0.0
     for phase in phases:

@@ -52,15 +52,17 @@ class Story:
         actors = {actor.id: actor for actor in self.scenario.actors}
         self._note_goals()
         groups = [
-            group for actor in self.scenario.actors if (group := self._later(actor)) is not None
+            group
+            for actor in self.scenario.actors
+            if (group := self._write_late_departure(actor)) is not None
         ]
-        rules, events = self._rules(actors)
-        groups, ends = groups + rules, self._ends(events)
+        rules, events = self._write_rules(actors)
+        groups, ends = groups + rules, self._write_run_ends(events)
         duration = self.scenario.simulation.duration
         triggers = Triggers(self.places, self.dialect, self.notes, {})
         return xml(
             "Storyboard",
-            xml("Init", xml("Actions", *self._init(self.scenario.actors))),
+            xml("Init", xml("Actions", *self._write_init(self.scenario.actors))),
             xml(
                 "Story",
                 xml("ParameterDeclarations"),
@@ -70,12 +72,12 @@ class Story:
             xml("StopTrigger", triggers.at_time(duration, _END), *ends),
         )
 
-    def _init(self, actors: Sequence[Actor]) -> Iterable[_Element]:
+    def _write_init(self, actors: Sequence[Actor]) -> Iterable[_Element]:
         if self.environment is not None:
             yield xml("GlobalAction", xml("EnvironmentAction", self.environment))
         for actor in actors:
             start = self.places.start(actor)
-            if actor.depart > 0 or self._appears(actor.id):
+            if actor.depart > 0 or self._appears_by_rule(actor.id):
                 if self.dialect.for_scenario_runner:
                     below = private(xml("TeleportAction", start.below().element()))
                     yield xml("Private", below, entityRef=actor.id)
@@ -89,7 +91,7 @@ class Story:
                 actions.append(acquire(self.places, actor.goal))
             yield xml("Private", *actions, entityRef=actor.id)
 
-    def _appears(self, actor: str) -> bool:
+    def _appears_by_rule(self, actor: str) -> bool:
         return any(
             rule.actor == actor and part.kind == "appear"
             for rule in self.scenario.rules
@@ -105,9 +107,9 @@ class Story:
                 if actor.goal is not None
             ]
 
-    def _later(self, actor: Actor) -> _Element | None:
+    def _write_late_departure(self, actor: Actor) -> _Element | None:
         """Maneuver group of an actor that departs later."""
-        if actor.depart <= 0 or self._appears(actor.id):
+        if actor.depart <= 0 or self._appears_by_rule(actor.id):
             return None
         triggers = Triggers(self.places, self.dialect, self.notes, {})
         actions = [
@@ -120,20 +122,22 @@ class Story:
         name = f"{actor.id} departs"
         return maneuver_group(name, actor.id, [event(name, actions, trigger, 1)])
 
-    def _rules(self, actors: dict[str, Actor]) -> tuple[list[_Element], dict[str, tuple[str, str]]]:
+    def _write_rules(
+        self, actors: dict[str, Actor]
+    ) -> tuple[list[_Element], dict[str, tuple[str, str]]]:
         """Maneuver groups of rules, and the first and last event of each.
 
         Those that cannot be said are left out, and whom they free.
         """
-        left = {rule.id: rule for rule in self.scenario.rules if _end(rule) != 0}
+        left = {rule.id: rule for rule in self.scenario.rules if _run_ending_item(rule) != 0}
         while True:
-            events = {name: _names(rule) for name, rule in left.items()}
+            events = {name: _first_and_last_event(rule) for name, rule in left.items()}
             found, refused = [], {}
             for index, rule in enumerate(self.scenario.rules):
                 if rule.id not in left:
                     continue
                 try:
-                    found.append(self._rule(rule, f"rules[{index}]", events, actors))
+                    found.append(self._write_rule(rule, f"rules[{index}]", events, actors))
                 except CannotSayError as error:
                     refused[rule.id] = (f"rules[{index}]", str(error))
             if not refused:
@@ -142,12 +146,12 @@ class Story:
                 self.notes.left_out.append(words)
                 del left[name]
 
-    def _ends(self, events: dict[str, tuple[str, str]]) -> list[_Element]:
+    def _write_run_ends(self, events: dict[str, tuple[str, str]]) -> list[_Element]:
         """Groups of conditions on which rules end the run."""
         triggers = Triggers(self.places, self.dialect, self.notes, events)
         found: list[_Element] = []
         for index, rule in enumerate(self.scenario.rules):
-            where, last = f"rules[{index}]", _end(rule)
+            where, last = f"rules[{index}]", _run_ending_item(rule)
             if last is None or (last and rule.id not in events):
                 continue
             try:
@@ -162,7 +166,7 @@ class Story:
             self.notes.approximated.append((where, words))
         return found
 
-    def _rule(
+    def _write_rule(
         self,
         rule: StoryRule,
         where: str,
@@ -176,7 +180,7 @@ class Story:
         triggers = Triggers(self.places, self.dialect, self.notes, events)
         makes = Actions(self.places, self.dialect, self.notes, actors, self.scenario.rules)
         made: list[_Element] = []
-        said = _said(rule)
+        said = _items_written(rule)
         for index in {*range(len(rule.then))} - {*said}:
             self.notes.approximated.append((f"{where}.then", f"item {index}: {IGNORES}"))
         for index in said:
@@ -254,20 +258,20 @@ def maneuver_group(name: str, actor: str | None, events: Sequence[_Element]) -> 
     )
 
 
-def _names(rule: StoryRule) -> tuple[str, str]:
+def _first_and_last_event(rule: StoryRule) -> tuple[str, str]:
     """Names of the first and the last event of a rule."""
-    said = _said(rule)
+    said = _items_written(rule)
     return _event_name(rule, said[0]), _event_name(rule, said[-1])
 
 
-def _said(rule: StoryRule) -> list[int]:
+def _items_written(rule: StoryRule) -> list[int]:
     """Items of a rule that do something there; all of them if none does."""
-    items = range(len(rule.then) if _end(rule) is None else _end(rule) or 0)
+    items = range(len(rule.then) if _run_ending_item(rule) is None else _run_ending_item(rule) or 0)
     found = [n for n in items if {part.kind for part in rule.then[n].parts} != {"ignore"}]
     return found or list(items)
 
 
-def _end(rule: StoryRule) -> int | None:
+def _run_ending_item(rule: StoryRule) -> int | None:
     """Item of a rule that ends the run: the stop trigger, and no event."""
     return next((n for n, one in enumerate(rule.then) if one.kind == "end"), None)
 

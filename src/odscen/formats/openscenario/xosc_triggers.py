@@ -73,7 +73,7 @@ class Triggers:
         CannotSayError
             If a part of it cannot be said.
         """
-        groups = _groups(condition, f"{where}.when", negated=False, delay=0.0)
+        groups = _condition_groups(condition, f"{where}.when", negated=False, delay=0.0)
         for place in dict.fromkeys(
             one.place for row in groups for one in row if one.equal is not None
         ):
@@ -85,7 +85,7 @@ class Triggers:
             *(
                 xml(
                     "ConditionGroup",
-                    *(self._condition(_numbered(leaf, n), actor) for leaf in group),
+                    *(self._write_condition(_number_condition(leaf, n), actor) for leaf in group),
                 )
                 for n, group in enumerate(groups, start=1)
             ),
@@ -93,18 +93,20 @@ class Triggers:
 
     def after(self, event: str) -> _Element:
         """``StartTrigger`` at the end of an event."""
-        return xml("StartTrigger", xml("ConditionGroup", self._wrapped(
-            f"after {event}", _state(event, "completeState"), 0.0, rising=False
+        return xml("StartTrigger", xml("ConditionGroup", self._value_condition(
+            f"after {event}", _event_state_condition(event, "completeState"), 0.0, rising=False
         )))  # fmt: skip
 
     def at_time(self, seconds: float, name: str) -> _Element:
         """``ConditionGroup`` that holds from a time on."""
         return xml(
             "ConditionGroup",
-            self._wrapped(name, self._time(seconds, above=True), 0.0, rising=False),
+            self._value_condition(
+                name, self._time_condition(seconds, above=True), 0.0, rising=False
+            ),
         )
 
-    def _condition(self, leaf: Leaf, actor: str) -> _Element:
+    def _write_condition(self, leaf: Leaf, actor: str) -> _Element:
         make = _MAKERS.get(leaf.kind)
         if make is None:
             raise CannotSayError(f"OpenSCENARIO has no condition {leaf.kind!r}")
@@ -122,16 +124,20 @@ class Triggers:
             )
         else:
             value = xml("ByValueCondition", value)
-        return self._named(leaf.name or leaf.place, value, leaf.delay, rising=leaf.rising)
+        return self._named_condition(leaf.name or leaf.place, value, leaf.delay, rising=leaf.rising)
 
-    def _wrapped(self, name: str, value: _Element, delay: float, *, rising: bool) -> _Element:
-        return self._named(name, xml("ByValueCondition", value), delay, rising=rising)
+    def _value_condition(
+        self, name: str, value: _Element, delay: float, *, rising: bool
+    ) -> _Element:
+        return self._named_condition(name, xml("ByValueCondition", value), delay, rising=rising)
 
-    def _named(self, name: str, value: _Element, delay: float, *, rising: bool) -> _Element:
+    def _named_condition(
+        self, name: str, value: _Element, delay: float, *, rising: bool
+    ) -> _Element:
         edge = "rising" if rising else "none"
         return xml("Condition", value, name=name, delay=delay, conditionEdge=edge)
 
-    def _time(self, seconds: float, *, above: bool) -> _Element:
+    def _time_condition(self, seconds: float, *, above: bool) -> _Element:
         return xml("SimulationTimeCondition", value=seconds, rule=self.dialect.rule(above=above))
 
     def bound(self, leaf: Leaf) -> dict[str, object]:
@@ -143,7 +149,7 @@ class Triggers:
         return {"value": float(value), "rule": self.dialect.rule(above=above != leaf.negated)}
 
 
-def _groups(
+def _condition_groups(
     condition: Condition, place: str, *, negated: bool, delay: float
 ) -> list[tuple[Leaf, ...]]:
     """Disjunction of conjunctions; a delay of a combination is one of each of its parts."""
@@ -151,14 +157,20 @@ def _groups(
     kind = condition.kind
     rising = condition.edge == "rising"
     if kind in ("all", "any", "not_"):
-        if rising and not negated and (equal := _equal(condition, place, delay)) is not None:
+        if (
+            rising
+            and not negated
+            and (equal := _equal_condition(condition, place, delay)) is not None
+        ):
             return [(equal,)]
         if rising:
             raise CannotSayError("the rising edge of a combination of conditions")
         if kind == "not_" and condition.not_ is not None:
-            return _groups(condition.not_, f"{place}.not", negated=not negated, delay=delay)
+            return _condition_groups(
+                condition.not_, f"{place}.not", negated=not negated, delay=delay
+            )
         parts = [
-            _groups(one, f"{place}.{kind}[{index}]", negated=negated, delay=delay)
+            _condition_groups(one, f"{place}.{kind}[{index}]", negated=negated, delay=delay)
             for index, one in enumerate(getattr(condition, kind))
         ]
         if (kind == "any") != negated:
@@ -173,7 +185,7 @@ def _groups(
     return [(leaf,)]
 
 
-def _equal(condition: Condition, place: str, delay: float) -> Leaf | None:
+def _equal_condition(condition: Condition, place: str, delay: float) -> Leaf | None:
     """A value that becomes equal to another, as far as two bounds say that."""
     if len(condition.all or ()) != 2:
         return None
@@ -192,7 +204,7 @@ def _equal(condition: Condition, place: str, delay: float) -> Leaf | None:
     return Leaf(kind, one, False, delay, True, place, equal=round((above + below) / 2.0, 9))
 
 
-def _numbered(leaf: Leaf, group: int) -> Leaf:
+def _number_condition(leaf: Leaf, group: int) -> Leaf:
     """Name a condition unlike that of the same place in another group.
 
     ScenarioRunner takes two conditions of one name for one.
@@ -205,7 +217,7 @@ def _refuse_negated(leaf: Leaf) -> None:
         raise CannotSayError(f"that {leaf.kind!r} does not hold")
 
 
-def _state(event: str, state: str) -> _Element:
+def _event_state_condition(event: str, state: str) -> _Element:
     return xml(
         "StoryboardElementStateCondition",
         storyboardElementType="event",
@@ -214,7 +226,7 @@ def _state(event: str, state: str) -> _Element:
     )
 
 
-def _time(made: Triggers, leaf: Leaf) -> _Element:
+def _write_time(made: Triggers, leaf: Leaf) -> _Element:
     return xml(
         "SimulationTimeCondition",
         value=leaf.part.after,
@@ -222,13 +234,13 @@ def _time(made: Triggers, leaf: Leaf) -> _Element:
     )
 
 
-def _ttc(made: Triggers, leaf: Leaf) -> _Element:
+def _write_ttc(made: Triggers, leaf: Leaf) -> _Element:
     target = xml("TimeToCollisionConditionTarget", xml("EntityRef", entityRef=leaf.part.to))
     distance = made.dialect.distance("longitudinal")
     return xml("TimeToCollisionCondition", target, freespace=True, **distance, **made.bound(leaf))
 
 
-def _headway(made: Triggers, leaf: Leaf) -> _Element:
+def _write_headway(made: Triggers, leaf: Leaf) -> _Element:
     distance = made.dialect.distance("longitudinal")
     return xml(
         "TimeHeadwayCondition",
@@ -239,7 +251,7 @@ def _headway(made: Triggers, leaf: Leaf) -> _Element:
     )
 
 
-def _distance(made: Triggers, leaf: Leaf) -> _Element:
+def _write_distance(made: Triggers, leaf: Leaf) -> _Element:
     part, bound = leaf.part, made.bound(leaf)
     along_route = part.along == "lane"
     kind = {"straight": "cartesianDistance", "lane": "longitudinal"}.get(part.along, part.along)
@@ -268,28 +280,28 @@ def _relative_speed(made: Triggers, leaf: Leaf) -> _Element:
     return xml("RelativeSpeedCondition", entityRef=leaf.part.to, **about, **made.bound(leaf))
 
 
-def _speed(made: Triggers, leaf: Leaf) -> _Element:
+def _write_speed(made: Triggers, leaf: Leaf) -> _Element:
     return xml("SpeedCondition", **made.bound(leaf))
 
 
-def _acceleration(made: Triggers, leaf: Leaf) -> _Element:
+def _write_acceleration(made: Triggers, leaf: Leaf) -> _Element:
     about = {"direction": "longitudinal"} if made.dialect.minor >= 2 else {}
     return xml("AccelerationCondition", **about, **made.bound(leaf))
 
 
-def _stopped(_made: Triggers, leaf: Leaf) -> _Element:
+def _write_stopped(_made: Triggers, leaf: Leaf) -> _Element:
     _refuse_negated(leaf)
     return xml("StandStillCondition", duration=float(leaf.part.seconds))
 
 
-def _reaches(made: Triggers, leaf: Leaf) -> _Element:
+def _write_reaches(made: Triggers, leaf: Leaf) -> _Element:
     if leaf.negated:
         raise CannotSayError("that a place is not reached")
     position = made.places.spot(leaf.part.place).element()
     return xml("ReachPositionCondition", position, tolerance=float(leaf.part.within))
 
 
-def _travelled(_made: Triggers, leaf: Leaf) -> _Element:
+def _write_travelled(_made: Triggers, leaf: Leaf) -> _Element:
     above = leaf.part.above is not None
     if above == leaf.negated:
         raise CannotSayError("that less than so many metres are travelled")
@@ -297,7 +309,7 @@ def _travelled(_made: Triggers, leaf: Leaf) -> _Element:
     return xml("TraveledDistanceCondition", value=float(value))
 
 
-def _signal(made: Triggers, leaf: Leaf) -> _Element:
+def _write_signal(made: Triggers, leaf: Leaf) -> _Element:
     _refuse_negated(leaf)
     if made.dialect.for_scenario_runner:
         raise CannotSayError(
@@ -317,7 +329,7 @@ def _signal(made: Triggers, leaf: Leaf) -> _Element:
     return xml("TrafficSignalCondition", name=signal, state=leaf.part.shows)
 
 
-def _rule(made: Triggers, leaf: Leaf) -> _Element:
+def _write_rule(made: Triggers, leaf: Leaf) -> _Element:
     _refuse_negated(leaf)
     if leaf.part.id not in made.events:
         raise CannotSayError(f"rule {leaf.part.id!r}, which is left out")
@@ -325,10 +337,10 @@ def _rule(made: Triggers, leaf: Leaf) -> _Element:
     state = leaf.state
     if state == "runningState" and made.dialect.for_scenario_runner:
         state = "startTransition"  # ScenarioRunner refuses running, and remembers the start
-    return _state(first if leaf.part.has == "started" else last, state)
+    return _event_state_condition(first if leaf.part.has == "started" else last, state)
 
 
-def _touched(_made: Triggers, leaf: Leaf) -> _Element:
+def _write_touched(_made: Triggers, leaf: Leaf) -> _Element:
     _refuse_negated(leaf)
     if leaf.part.to is None:
         return xml("CollisionCondition", xml("ByType", type="vehicle"))
@@ -344,18 +356,18 @@ _BY_VALUE: Final = frozenset(
     {"SimulationTimeCondition", "StoryboardElementStateCondition", "TrafficSignalCondition"}
 )
 _MAKERS: Final[Mapping[str, Callable[[Triggers, Leaf], _Element]]] = {
-    "time": _time,
-    "ttc": _ttc,
-    "headway": _headway,
-    "distance": _distance,
+    "time": _write_time,
+    "ttc": _write_ttc,
+    "headway": _write_headway,
+    "distance": _write_distance,
     "relative_speed": _relative_speed,
-    "speed": _speed,
-    "acceleration": _acceleration,
-    "stopped": _stopped,
-    "reaches": _reaches,
-    "travelled": _travelled,
-    "signal": _signal,
-    "rule": _rule,
-    "touched": _touched,
+    "speed": _write_speed,
+    "acceleration": _write_acceleration,
+    "stopped": _write_stopped,
+    "reaches": _write_reaches,
+    "travelled": _write_travelled,
+    "signal": _write_signal,
+    "rule": _write_rule,
+    "touched": _write_touched,
     "off_road": _off_road,
 }

@@ -54,18 +54,18 @@ def environment(
     said
         What the document says itself, written as properties so that it can be read again.
     """
-    minutes, seconds = divmod(int(clock or _hour(parameters) * 3600), 60)
+    minutes, seconds = divmod(int(clock or _hour_of_sun(parameters) * 3600), 60)
     time = f"{_DAY}T{minutes // 60:02}:{minutes % 60:02}:{seconds:02}"
     return xml(
         "Environment",
         xml("ParameterDeclarations") if dialect.minor == 0 else None,
         xml("TimeOfDay", animation=False, dateTime=time),
-        _weather(parameters, dialect),
+        _write_weather(parameters, dialect),
         xml(
             "RoadCondition",
-            xml("Properties", *(_property(*row) for row in said.items())) if said else None,
+            xml("Properties", *(_write_property(*row) for row in said.items())) if said else None,
             frictionScaleFactor=weather_effect(parameters).grip,
-            **_wetness(parameters, dialect),
+            **_wetness_attributes(parameters, dialect),
         ),
         name="environment",
     )
@@ -77,11 +77,11 @@ def said_of(scenario: Scenario) -> dict[str, Any]:
     return said | ({"clock": scenario.demand.clock} if scenario.demand.clock else {})
 
 
-def _property(name: str, value: Any) -> _Element:
+def _write_property(name: str, value: Any) -> _Element:
     return xml("Property", name=f"{SAID}{name}", value=json.dumps(value, sort_keys=True))
 
 
-def _wetness(parameters: Mapping[str, float], dialect: Dialect) -> dict[str, str]:
+def _wetness_attributes(parameters: Mapping[str, float], dialect: Dialect) -> dict[str, str]:
     """Words that 1.2 has for water on the road."""
     puddles = parameters.get("precipitation_deposits", 0.0)
     wet = max(puddles, parameters.get("wetness", 0.0))
@@ -90,13 +90,13 @@ def _wetness(parameters: Mapping[str, float], dialect: Dialect) -> dict[str, str
     return {"wetness": "wetWithPuddles" if puddles >= 50.0 else "moist"}
 
 
-def _hour(parameters: Mapping[str, float]) -> int:
+def _hour_of_sun(parameters: Mapping[str, float]) -> int:
     """Hour at which the sun stands about as high as the weather says, in the evening if low."""
     height = parameters.get("sun_altitude_angle", _SUN)
     return next(hour for limit, hour in _HOURS if height <= limit)
 
 
-def _weather(parameters: Mapping[str, float], dialect: Dialect) -> _Element:
+def _write_weather(parameters: Mapping[str, float], dialect: Dialect) -> _Element:
     rain = parameters.get("precipitation", 0.0)
     cloudiness = parameters.get("cloudiness", 0.0)
     clouds = next(word for limit, word in _CLOUDS if cloudiness < limit)

@@ -54,11 +54,11 @@ class RowPlaces:
             return None
         if self._inside[element] == 1:
             return self._only[element]
-        for one in (element, *element.iterancestors()):
-            if one in self._positions:
-                return self._positions[one]
-            path, attribute = _NAMED.get(str(one.tag), ("", ""))
+        for iterancestor in (element, *element.iterancestors()):
+            if iterancestor in self._positions:
+                return self._positions[iterancestor]
+            path, attribute = _NAMED.get(str(iterancestor.tag), ("", ""))
             if path:
-                named = one if path == "." else one.find(path)
+                named = iterancestor if path == "." else iterancestor.find(path)
                 return None if named is None else self._starts.get(named.get(attribute, ""))
         return None

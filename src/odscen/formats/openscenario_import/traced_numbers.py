@@ -53,7 +53,7 @@ class TracedNumber(float):
         made.formula, made.sources = formula, sources
         return made
 
-    def _with(self, other: object, sign: str, value: Any, *, turned: bool = False) -> Any:
+    def _combine_with(self, other: object, sign: str, value: Any, *, turned: bool = False) -> Any:
         if value is NotImplemented or not isinstance(other, int | float):
             return value
         if not isinstance(other, TracedNumber):
@@ -61,37 +61,37 @@ class TracedNumber(float):
                 return 0.0
             if (sign, other) in _NOTHING or (sign, other, turned) in _NOTHING_BEFORE:
                 return TracedNumber.of(value, self.formula, self.sources)
-        mine, its = _bracketed(self), _bracketed(other)
+        mine, its = _bracket_formula(self), _bracket_formula(other)
         formula = f"{its} {sign} {mine}" if turned else f"{mine} {sign} {its}"
         more = other.sources if isinstance(other, TracedNumber) else frozenset()
         return TracedNumber.of(value, formula, self.sources | more)
 
     def __add__(self, other: float) -> Any:
-        return self._with(other, "+", float.__add__(self, other))
+        return self._combine_with(other, "+", float.__add__(self, other))
 
     def __radd__(self, other: float) -> Any:
-        return self._with(other, "+", float.__radd__(self, other), turned=True)
+        return self._combine_with(other, "+", float.__radd__(self, other), turned=True)
 
     def __sub__(self, other: float) -> Any:
-        return self._with(other, "-", float.__sub__(self, other))
+        return self._combine_with(other, "-", float.__sub__(self, other))
 
     def __rsub__(self, other: float) -> Any:
-        return self._with(other, "-", float.__rsub__(self, other), turned=True)
+        return self._combine_with(other, "-", float.__rsub__(self, other), turned=True)
 
     def __mul__(self, other: float) -> Any:
-        return self._with(other, "*", float.__mul__(self, other))
+        return self._combine_with(other, "*", float.__mul__(self, other))
 
     def __rmul__(self, other: float) -> Any:
-        return self._with(other, "*", float.__rmul__(self, other), turned=True)
+        return self._combine_with(other, "*", float.__rmul__(self, other), turned=True)
 
     def __truediv__(self, other: float) -> Any:
-        return self._with(other, "/", float.__truediv__(self, other))
+        return self._combine_with(other, "/", float.__truediv__(self, other))
 
     def __rtruediv__(self, other: float) -> Any:
-        return self._with(other, "/", float.__rtruediv__(self, other), turned=True)
+        return self._combine_with(other, "/", float.__rtruediv__(self, other), turned=True)
 
     def __neg__(self) -> TracedNumber:
-        return TracedNumber.of(-float(self), f"-{_bracketed(self)}", self.sources)
+        return TracedNumber.of(-float(self), f"-{_bracket_formula(self)}", self.sources)
 
     def __abs__(self) -> TracedNumber:
         return TracedNumber.of(abs(float(self)), f"abs({self.formula})", self.sources)
@@ -100,7 +100,7 @@ class TracedNumber(float):
         return float, (float(self),)
 
 
-def _bracketed(value: float) -> str:
+def _bracket_formula(value: float) -> str:
     if not isinstance(value, TracedNumber):
         return f"{value!r}" if value >= 0 else f"({value!r})"
     simple = value.formula.replace("_", "").lstrip("$").isalnum()

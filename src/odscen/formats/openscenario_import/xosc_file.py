@@ -89,7 +89,7 @@ def choose_main_file(files: Sequence[GivenFile]) -> int:
     InputError
         If there are several, or none.
     """
-    roots = [_read_tree(one) for one in files]
+    roots = [_read_tree(file) for file in files]
     for tag in ("ParameterValueDistribution", "Storyboard"):
         rows = [row for row, root in enumerate(roots) if root.find(tag) is not None]
         if len(rows) == 1:
@@ -101,7 +101,7 @@ def choose_main_file(files: Sequence[GivenFile]) -> int:
             )
     raise InputError(
         "there is no scenario among the files: none has a Storyboard",
-        file=", ".join(one.name for one in files),
+        file=", ".join(file.name for file in files),
     )
 
 
@@ -177,14 +177,14 @@ class _RoadPoints:
         self._read_roads = read_roads
         self._loaded: RoadTable | None = None
 
-    def _table(self) -> RoadTable:
+    def _road_table(self) -> RoadTable:
         if self._loaded is None:
             self._loaded = RoadTable.of(self._read_roads())
         return self._loaded
 
     def point(self, road: str, s: float, t: float) -> tuple[float, float, float] | None:
         """X, y and heading with growing s, at s and t of a road; ``None`` if there is none."""
-        table = self._table()
+        table = self._road_table()
         row = table.road_index.get(RoadId(road))
         if row is None:
             return None
@@ -194,7 +194,7 @@ class _RoadPoints:
 
     def lane_t(self, road: str, lane: int, s: float) -> float | None:
         """T of the middle of a lane of any type at s; ``None`` if there is none."""
-        table = self._table()
+        table = self._road_table()
         row = table.road_index.get(RoadId(road))
         if row is None:
             return None

@@ -94,14 +94,14 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
         If what the file says is out of the bounds of scenarios.
     """
     report, root = source.report, source.root
-    entities = _entities(report, root)
+    entities = _read_all_entities(report, root)
     if len(source.graph.walks.x) == 0:
         _on_wheels(report, entities.values())
     positions = PositionReader(
-        report, source.graph, source.road_point, source.lane_t, _side(root), varied=source.varied,
+        report, source.graph, source.road_point, source.lane_t, _side_of_y(root), varied=source.varied,
         on_trajectory=trajectory_place,
     )  # fmt: skip
-    story, init, board, found = _begun(source, positions, entities, ego)
+    story, init, board, found = _begin_story(source, positions, entities, ego)
     actors = init.actors(story.driven)
     report.starts.update(
         (name, (round(float(at.x), 2), round(float(at.y), 2)))
@@ -113,11 +113,11 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
     duration = read_stop(report, board, story)
     data = {
         "name": name,
-        "description": "" if story.own and _title(root) == name else _title(root),
+        "description": "" if story.own and _read_title(root) == name else _read_title(root),
         "map": {"name": source.map_name, "sha256": source.sha256,
                 "spacing": source.graph.lanes.spacing},
         "roi": list(largest_part(source.graph.segments)),
-        "drivers": {"sets": [STEADY_DRIVER] if _steady(actors) else []},
+        "drivers": {"sets": [STEADY_DRIVER] if _any_steady(actors) else []},
         "actors": actors,
         "simulation": {"duration": duration},
         "environment": found.environment,
@@ -136,9 +136,9 @@ def report_without_map(source: MaplessSource, why: str, *, ego: EgoDriver = "sto
         If a value of the file is none; names element and line.
     """
     report, root = source.report, source.root
-    entities = _entities(report, root)
-    positions = Nowhere(report, side=_side(root), why=why)
-    story, _, board, _ = _begun(source, positions, entities, ego)
+    entities = _read_all_entities(report, root)
+    positions = Nowhere(report, side=_side_of_y(root), why=why)
+    story, _, board, _ = _begin_story(source, positions, entities, ego)
     story.read(board)
     read_stop(report, board, story)
     for tag in ("RoadNetwork", "LogicFile"):
@@ -146,7 +146,7 @@ def report_without_map(source: MaplessSource, why: str, *, ego: EgoDriver = "sto
             report.mark(element, "refused", why)
 
 
-def _entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]:
+def _read_all_entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]:
     report.mark(root, "taken")
     name_entities(report, root)
     for tag in ("FileHeader", "RoadNetwork", "LogicFile"):
@@ -155,12 +155,12 @@ def _entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]:
     return read_entities(report, root)
 
 
-def _side(root: _Element) -> float:
+def _side_of_y(root: _Element) -> float:
     """How ScenarioRunner tells files in CARLA's frame, whose y and headings are those of Unreal."""
-    return -1.0 if _title(root).startswith("CARLA:") else 1.0
+    return -1.0 if _read_title(root).startswith("CARLA:") else 1.0
 
 
-def _begun(
+def _begin_story(
     source: MaplessSource,
     positions: PositionReader,
     entities: dict[str, ReadEntity],
@@ -168,7 +168,7 @@ def _begun(
 ) -> tuple[StoryReader, InitReader, _Element, ReadEnvironment]:
     """Readers of the story, which is still to be read, and of ``Init``, which has been."""
     report, root = source.report, source.root
-    driven = frozenset(one.id for one in entities.values() if one.ego and ego != "story")
+    driven = frozenset(entity.id for entity in entities.values() if entity.ego and ego != "story")
     story = StoryReader(report, entities, driven, own=is_own(root))
     found = read_environment(report, root, source.weather, driven=bool(driven), own=story.own)
     signals = SignalReader(report, root, source.movement)
@@ -191,20 +191,20 @@ def _begun(
 def _on_wheels(report: ImportReport, entities: Iterable[ReadEntity]) -> None:
     """Make motorcycles of pedestrians, for SUMO has none where a map has nothing to walk on."""
     body, size = DEFAULT_BODY[Category.PEDESTRIAN], DEFAULT_BODY[Category.MOTORCYCLE]
-    for one in entities:
-        if one.category is Category.PEDESTRIAN:
-            one.category, one.length = Category.MOTORCYCLE, size.length
+    for entity in entities:
+        if entity.category is Category.PEDESTRIAN:
+            entity.category, entity.length = Category.MOTORCYCLE, size.length
             words = (
                 f"a motorcycle, {size.length:.1f} m long and {size.width:.1f} m wide in the place "
                 f"of {body.length:.1f} m and {body.width:.1f} m: the map has nothing to walk on"
             )
-            report.mark(one.element, "approximated", words)
+            report.mark(entity.element, "approximated", words)
 
 
-def _steady(actors: list[dict[str, Any]]) -> bool:
-    return any(one.get("style") == STEADY for one in actors)
+def _any_steady(actors: list[dict[str, Any]]) -> bool:
+    return any(actor.get("style") == STEADY for actor in actors)
 
 
-def _title(root: _Element) -> str:
+def _read_title(root: _Element) -> str:
     header = root.find("FileHeader")
     return "" if header is None else header.get("description", "")

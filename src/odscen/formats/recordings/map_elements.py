@@ -38,15 +38,21 @@ _SHORTEST = 0.05
 def map_elements(odr: OpenDrive, graph: LaneGraph) -> MapElements:
     """Elements of a map; lanes in the order of the lane graph's."""
     table = RoadTable.of(odr)
-    lanes = _lanes(odr, table, graph)
+    lanes = _make_lane_elements(odr, table, graph)
     walks = tuple(
-        CrosswalkElement(_at(one.polygon, one.z), _at(one.axis, one.z), one.width)
-        for one in crosswalks(odr, table)
+        CrosswalkElement(
+            _lift_to(crosswalk.polygon, crosswalk.z),
+            _lift_to(crosswalk.axis, crosswalk.z),
+            crosswalk.width,
+        )
+        for crosswalk in crosswalks(odr, table)
     )
-    return MapElements(lanes, tuple(_lines(odr, table)), tuple(road_edges(lanes)), walks)
+    return MapElements(
+        lanes, tuple(_make_line_elements(odr, table)), tuple(road_edges(lanes)), walks
+    )
 
 
-def _at(xy: FloatArray, z: float) -> FloatArray:
+def _lift_to(xy: FloatArray, z: float) -> FloatArray:
     return np.column_stack([xy, np.full(len(xy), z)])
 
 
@@ -59,7 +65,9 @@ class _Polylines(NamedTuple):
     outer: FloatArray
 
 
-def _polylines(table: RoadTable, rows: IntArray, s0: FloatArray, s1: FloatArray) -> _Polylines:
+def _sample_polylines(
+    table: RoadTable, rows: IntArray, s0: FloatArray, s1: FloatArray
+) -> _Polylines:
     """Points along lanes (rows of the table) between two road coordinates each."""
     n = np.maximum(np.ceil((s1 - s0) / POINT_STEP), 1.0).astype(np.int64) + 1
     of = np.repeat(np.arange(len(rows)), n)
@@ -70,11 +78,13 @@ def _polylines(table: RoadTable, rows: IntArray, s0: FloatArray, s1: FloatArray)
     return _Polylines(offsets(n), *lines)
 
 
-def _lanes(odr: OpenDrive, table: RoadTable, graph: LaneGraph) -> tuple[LaneElement, ...]:
+def _make_lane_elements(
+    odr: OpenDrive, table: RoadTable, graph: LaneGraph
+) -> tuple[LaneElement, ...]:
     own = graph.lanes
     rows = np.array([table.lane_index[key] for key in own.keys], dtype=np.int64)
-    lines = _polylines(table, rows, table.lane_s0[rows], table.lane_s1[rows])
-    entries, exits = _links(graph)
+    lines = _sample_polylines(table, rows, table.lane_s0[rows], table.lane_s1[rows])
+    entries, exits = _lane_links(graph)
     row_of = {key: row for row, key in enumerate(own.keys)}
     found = []
     for row, key in enumerate(own.keys):
@@ -101,9 +111,9 @@ def _lanes(odr: OpenDrive, table: RoadTable, graph: LaneGraph) -> tuple[LaneElem
                 speed_limit=float(graph.speed_limit[middle]),
                 entries=entries[row],
                 exits=exits[row],
-                left_lane=_usual(graph.left_lane[nodes]),
-                right_lane=_usual(graph.right_lane[nodes]),
-                opposite=_opposite(key, row, row_of, graph),
+                left_lane=_usual_neighbour(graph.left_lane[nodes]),
+                right_lane=_usual_neighbour(graph.right_lane[nodes]),
+                opposite=_opposite_lane(key, row, row_of, graph),
                 keeps_right=keeps_right,
                 change_left=bool(change & CHANGE_LEFT),
                 change_right=bool(change & CHANGE_RIGHT),
@@ -112,7 +122,7 @@ def _lanes(odr: OpenDrive, table: RoadTable, graph: LaneGraph) -> tuple[LaneElem
     return tuple(found)
 
 
-def _links(graph: LaneGraph) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
+def _lane_links(graph: LaneGraph) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
     """Rows of the lanes before and behind each lane, sorted."""
     on = graph.relation == Relation.SUCCESSOR
     source, target = graph.lane[graph.source[on]], graph.lane[graph.target[on]]
@@ -124,16 +134,16 @@ def _links(graph: LaneGraph) -> tuple[list[tuple[int, ...]], list[tuple[int, ...
     for before, after in pairs:
         exits[before].append(after)
         entries[after].append(before)
-    return [tuple(sorted(one)) for one in entries], [tuple(one) for one in exits]
+    return [tuple(sorted(entry)) for entry in entries], [tuple(one) for one in exits]
 
 
-def _usual(lanes: IntArray | np.ndarray[tuple[int], np.dtype[np.int32]]) -> int:
+def _usual_neighbour(lanes: IntArray | np.ndarray[tuple[int], np.dtype[np.int32]]) -> int:
     """Neighbour beside most nodes of a lane, or -1."""
     there, count = np.unique(lanes[lanes >= 0], return_counts=True)
     return int(there[np.argmax(count)]) if len(there) else -1
 
 
-def _opposite(key: LaneKey, row: int, row_of: dict[LaneKey, int], graph: LaneGraph) -> int:
+def _opposite_lane(key: LaneKey, row: int, row_of: dict[LaneKey, int], graph: LaneGraph) -> int:
     if abs(key.lane) != 1:
         return -1
     other = row_of.get(LaneKey(key.road, key.section, -key.lane), -1)
@@ -152,23 +162,23 @@ class _MarkedStretch(NamedTuple):
     color: str
 
 
-def _lines(odr: OpenDrive, table: RoadTable) -> Iterator[LineElement]:
+def _make_line_elements(odr: OpenDrive, table: RoadTable) -> Iterator[LineElement]:
     stretches = [
-        one
+        marked_stretch
         for road in odr.roads.values()
         for index, section in enumerate(road.sections)
-        for one in _stretches(table, road.id, index, section)
+        for marked_stretch in _marked_stretches(table, road.id, index, section)
     ]
-    rows = np.array([one.row for one in stretches], dtype=np.int64)
-    s0 = np.array([one.s0 for one in stretches])
-    s1 = np.array([one.s1 for one in stretches])
-    lines = _polylines(table, rows, s0, s1)
+    rows = np.array([stretch.row for stretch in stretches], dtype=np.int64)
+    s0 = np.array([stretch.s0 for stretch in stretches])
+    s1 = np.array([stretch.s1 for stretch in stretches])
+    lines = _sample_polylines(table, rows, s0, s1)
     for k, one in enumerate(stretches):
         points = (lines.inner if one.inner else lines.outer)[lines.start[k] : lines.start[k + 1]]
         yield LineElement(one.kind, one.color, points)
 
 
-def _stretches(
+def _marked_stretches(
     table: RoadTable, road: RoadId, index: int, section: LaneSection
 ) -> Iterator[_MarkedStretch]:
     for number, lane in section.lanes.items():
@@ -176,13 +186,13 @@ def _stretches(
         if not beside:
             continue
         row = table.lane_index[LaneKey(road, index, beside)]
-        for mark, s0, s1 in _intervals(lane.road_marks, section):
+        for mark, s0, s1 in _mark_intervals(lane.road_marks, section):
             if mark.type not in _UNPAINTED and s1 - s0 >= _SHORTEST:
                 color = "white" if mark.color in {"standard", ""} else mark.color
                 yield _MarkedStretch(row, not number, s0, s1, mark.type, color)
 
 
-def _intervals(
+def _mark_intervals(
     marks: Sequence[RoadMark], section: LaneSection
 ) -> Iterator[tuple[RoadMark, float, float]]:
     ends = [*(mark.s for mark in marks[1:]), section.s_end]

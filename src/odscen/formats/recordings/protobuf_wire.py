@@ -32,23 +32,23 @@ def varint(value: int) -> bytes:
     return bytes(found)
 
 
-def _tag(field: int, wire: int) -> bytes:
+def _encode_tag(field: int, wire: int) -> bytes:
     return varint(field << 3 | wire)
 
 
 def whole(field: int, value: int) -> bytes:
     """A field of an integer, enumeration or truth value."""
-    return _tag(field, _VARINT) + varint(value)
+    return _encode_tag(field, _VARINT) + varint(value)
 
 
 def double(field: int, value: float) -> bytes:
     """A field of a double."""
-    return _tag(field, _FIXED64) + struct.pack("<d", value)
+    return _encode_tag(field, _FIXED64) + struct.pack("<d", value)
 
 
 def message(field: int, content: bytes) -> bytes:
     """A field of a message, or of bytes."""
-    return _tag(field, _BYTES) + varint(len(content)) + content
+    return _encode_tag(field, _BYTES) + varint(len(content)) + content
 
 
 def text(field: int, value: str) -> bytes:

@@ -31,7 +31,9 @@ def recording_of(source: ExportSource) -> RunRecording:
     recorded = source.recorded
     if recorded is None or source.roads is None:
         raise InputError("this format says what happened in a run: name the folder of one")
-    times = instants(recorded, ExportWindow(*(_seconds(source.options, name) for name in WINDOW)))
+    times = instants(
+        recorded, ExportWindow(*(_seconds_option(source.options, name) for name in WINDOW))
+    )
     elements = map_elements(source.roads, source.sumo_map.graph.lanes)
     return RunRecording(
         name=source.name,
@@ -47,7 +49,7 @@ def recording_of(source: ExportSource) -> RunRecording:
     )
 
 
-def _seconds(options: Mapping[str, str], name: str) -> float | None:
+def _seconds_option(options: Mapping[str, str], name: str) -> float | None:
     given = options.get(name)
     if given is None:
         return None

@@ -27,16 +27,16 @@ def road_edges(lanes: Sequence[LaneElement]) -> Iterator[FloatArray]:
     """Edges of the driving surface, shape ``(n, 3)`` each."""
     for lane in lanes:
         if not lane.junction:
-            yield from _borders(lane)
+            yield from _outer_borders(lane)
     junctions: dict[str, list[int]] = {}
     for row, lane in enumerate(lanes):
         if lane.junction:
             junctions.setdefault(lane.junction, []).append(row)
     for rows in junctions.values():
-        yield from _outline(rows, lanes)
+        yield from _outline_of_lanes(rows, lanes)
 
 
-def _borders(lane: LaneElement) -> Iterator[FloatArray]:
+def _outer_borders(lane: LaneElement) -> Iterator[FloatArray]:
     beyond = lane.opposite >= 0
     if lane.left_lane < 0 and not (beyond and lane.keeps_right):
         yield lane.left
@@ -44,14 +44,16 @@ def _borders(lane: LaneElement) -> Iterator[FloatArray]:
         yield lane.right
 
 
-def _outline(rows: Sequence[int], lanes: Sequence[LaneElement]) -> Iterator[FloatArray]:
+def _outline_of_lanes(rows: Sequence[int], lanes: Sequence[LaneElement]) -> Iterator[FloatArray]:
     import shapely
     from scipy.spatial import cKDTree
 
     inside = [lanes[row] for row in rows]
-    around = {one for lane in inside for one in (*lane.entries, *lane.exits)} - set(rows)
-    ground = shapely.union_all([_polygon(lane).buffer(_SEAM) for lane in inside]).buffer(-_SEAM)
-    roads = shapely.union_all([_polygon(lanes[row]) for row in sorted(around)])
+    around = {entry for lane in inside for entry in (*lane.entries, *lane.exits)} - set(rows)
+    ground = shapely.union_all([_lane_polygon(lane).buffer(_SEAM) for lane in inside]).buffer(
+        -_SEAM
+    )
+    roads = shapely.union_all([_lane_polygon(lanes[row]) for row in sorted(around)])
     outline = ground.boundary.difference(roads.buffer(_OPEN))
     lines = shapely.get_parts(shapely.line_merge(outline) if outline.length else outline)
     border = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in inside])
@@ -62,7 +64,7 @@ def _outline(rows: Sequence[int], lanes: Sequence[LaneElement]) -> Iterator[Floa
             yield np.column_stack([xy, border[tree.query(xy)[1], 2]])
 
 
-def _polygon(lane: LaneElement) -> Any:
+def _lane_polygon(lane: LaneElement) -> Any:
     import shapely
 
     ring = np.concatenate([lane.left[:, :2], lane.right[::-1, :2]])

@@ -190,7 +190,9 @@ class Tracks:
         if self.ego >= 0:
             return self.ego
         moved = np.where(self.valid, self.speed, 0.0).sum(axis=1) + self.valid.any(axis=1)
-        vehicle = np.array([one != "pedestrian" for one in self.categories], dtype=np.bool_)
+        vehicle = np.array(
+            [category != "pedestrian" for category in self.categories], dtype=np.bool_
+        )
         if not vehicle.any():
             return -1
         there = vehicle & self.valid[:, instant]

@@ -46,13 +46,13 @@ def lane_signals(
     times
         Shape ``(T,)``, s.
     """
-    shown = {} if states is None else dict(_letters(states, times))
+    shown = {} if states is None else dict(_letters_by_light(states, times))
     found: dict[tuple[int, int], tuple[str, NDArray[np.uint8]]] = {}
-    for light, link, approach, lane in _links(sumo_map, lanes):
+    for light, link, approach, lane in _light_movements(sumo_map, lanes):
         letters = shown.get(light)
         if letters is None:
             continue
-        color = _colors(letters, link)
+        color = _colors_of_link(letters, link)
         turn = next(one for one in sumo_map.lights if one.id == light).links[link].turn
         known = found.get((approach, lane))
         # Two links over one lane: who may go on either of them has green.
@@ -67,7 +67,7 @@ def lane_signals(
     )
 
 
-def _letters(states: pl.DataFrame, times: FloatArray) -> Iterator[tuple[str, list[str]]]:
+def _letters_by_light(states: pl.DataFrame, times: FloatArray) -> Iterator[tuple[str, list[str]]]:
     """For each light the letters that it shows at each instant."""
     for (light,), rows in states.sort("light", "time").group_by("light", maintain_order=True):
         changes = rows["time"].to_numpy()
@@ -76,14 +76,16 @@ def _letters(states: pl.DataFrame, times: FloatArray) -> Iterator[tuple[str, lis
         yield str(light), [letters[max(k, 0)] for k in at.tolist()]
 
 
-def _colors(letters: Sequence[str], link: int) -> NDArray[np.uint8]:
+def _colors_of_link(letters: Sequence[str], link: int) -> NDArray[np.uint8]:
     return np.array(
-        [_COLORS[letter_state(one[link])] if link < len(one) else 0 for one in letters],
+        [_COLORS[letter_state(letter[link])] if link < len(letter) else 0 for letter in letters],
         dtype=np.uint8,
     )
 
 
-def _links(sumo_map: SumoMap, lanes: Sequence[LaneElement]) -> Iterator[tuple[str, int, int, int]]:
+def _light_movements(
+    sumo_map: SumoMap, lanes: Sequence[LaneElement]
+) -> Iterator[tuple[str, int, int, int]]:
     """Light, link, lane before and lane behind the stop line, of each movement that is found."""
     row_of = {lane.key: row for row, lane in enumerate(lanes)}
     for light in sumo_map.lights:
@@ -92,13 +94,13 @@ def _links(sumo_map: SumoMap, lanes: Sequence[LaneElement]) -> Iterator[tuple[st
             target = row_of.get(sumo_map.lane_names.get(one.target, ""), -1)
             if source < 0 or target < 0:
                 continue
-            path = _path(lanes, source, target)
+            path = _shortest_lane_path(lanes, source, target)
             inside = next((k for k, row in enumerate(path) if lanes[row].junction), None)
             if inside:
                 yield light.id, link, path[inside - 1], path[inside]
 
 
-def _path(lanes: Sequence[LaneElement], source: int, target: int) -> list[int]:
+def _shortest_lane_path(lanes: Sequence[LaneElement], source: int, target: int) -> list[int]:
     """Fewest lanes from one to another, both included; empty if there is no way, or a long one."""
     paths = [[source]]
     for _ in range(_FARTHEST):

@@ -31,7 +31,7 @@ def tfrecord(records: Iterable[bytes]) -> bytes:
     parts = []
     for record in records:
         length = struct.pack("<Q", len(record))
-        parts += [length, _masked(length), record, _masked(record)]
+        parts += [length, _masked_crc(length), record, _masked_crc(record)]
     return b"".join(parts)
 
 
@@ -49,7 +49,7 @@ def read_tfrecord(data: bytes) -> Iterator[bytes]:
         size = int.from_bytes(length, "little")
         record = data[at + 12 : at + 12 + size]
         checks = data[at + 8 : at + 12], data[at + 12 + size : at + 16 + size]
-        if checks != (_masked(length), _masked(record)):
+        if checks != (_masked_crc(length), _masked_crc(record)):
             raise ValueError(f"the record at byte {at} is damaged")
         yield record
         at += 16 + size
@@ -65,11 +65,11 @@ def crc32c(data: bytes) -> int:
     """
     head = bytes(255 - one for one in data[:4].ljust(4, b"\0"))
     if len(data) < 4:
-        return _short(data)
+        return _crc_of_short(data)
     rows = -(-len(data) // _ROW)
     padded = np.frombuffer((head + data[4:]).rjust(rows * _ROW, b"\0"), dtype=np.uint8)
     register = np.zeros(rows, dtype=np.uint32)
-    table = _table()
+    table = _make_crc_table()
     for column in padded.reshape(rows, _ROW).T:
         register = table[(register ^ column) & 255] ^ (register >> 8)
     moved = _moved_by_a_row()
@@ -79,20 +79,20 @@ def crc32c(data: bytes) -> int:
     return joined ^ _ALL
 
 
-def _masked(data: bytes) -> bytes:
+def _masked_crc(data: bytes) -> bytes:
     crc = crc32c(data)
     return struct.pack("<I", ((crc >> 15 | crc << 17) + _MASK_DELTA) & _ALL)
 
 
-def _short(data: bytes) -> int:
-    register, table = _ALL, _table().tolist()
+def _crc_of_short(data: bytes) -> int:
+    register, table = _ALL, _make_crc_table().tolist()
     for byte in data:
         register = table[(register ^ byte) & 255] ^ (register >> 8)
     return int(register ^ _ALL)
 
 
 @lru_cache(maxsize=1)
-def _table() -> NDArray[np.uint32]:
+def _make_crc_table() -> NDArray[np.uint32]:
     """Register after each byte, from an empty one."""
     table = np.arange(256, dtype=np.uint32)
     for _ in range(8):
@@ -104,7 +104,7 @@ def _table() -> NDArray[np.uint32]:
 def _moved_by_a_row() -> list[list[int]]:
     """Register after a row of zeros, for each value of each of its four bytes."""
     register = np.arange(256, dtype=np.uint32)[None] << (8 * np.arange(4, dtype=np.uint32))[:, None]
-    table = _table()
+    table = _make_crc_table()
     for _ in range(_ROW):
         register = table[register & 255] ^ (register >> 8)
     return [[int(one) for one in row] for row in register]

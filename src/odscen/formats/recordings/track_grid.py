@@ -92,7 +92,7 @@ def tracks_of(source: ExportSource, recorded: RecordedRun, times: FloatArray) ->
         ego=next((row for row, user in enumerate(users) if user.ego), -1),
         length=np.array([user.length for user in users]),
         width=np.array([user.width for user in users]),
-        height=np.array([_height(source, user) for user in users]),
+        height=np.array([_body_height(source, user) for user in users]),
         valid=np.stack([one.valid for one in found]),
         x=np.stack([one.x for one in found]),
         y=np.stack([one.y for one in found]),
@@ -102,7 +102,7 @@ def tracks_of(source: ExportSource, recorded: RecordedRun, times: FloatArray) ->
     )
 
 
-def _height(source: ExportSource, user: PlannedActor) -> float:
+def _body_height(source: ExportSource, user: PlannedActor) -> float:
     known = None if user.model is None else source.assets.dimensions(user.model)
     return (known or DEFAULT_BODY[Category(user.category)]).height
 

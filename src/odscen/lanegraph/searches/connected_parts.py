@@ -42,7 +42,7 @@ class ConnectedParts:
         starts, ends = self.of[sources], self.of[targets]
         if not self._directed:
             return np.asarray(starts == ends, dtype=np.bool_)
-        reached, columns = self._reached(ends)
+        reached, columns = self._reached_parts(ends)
         pairs = zip(starts.tolist(), ends.tolist(), strict=True)
         return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
 
@@ -59,7 +59,7 @@ class ConnectedParts:
         row = rows.astype(np.int32)
         if not self._directed:
             return row, np.equal.outer(parts, ends)
-        reached, columns = self._reached(ends)
+        reached, columns = self._reached_parts(ends)
         table = np.zeros((len(parts), len(columns)), dtype=np.bool_)
         for index, part in enumerate(parts.tolist()):
             bits = reached[part]
@@ -69,19 +69,19 @@ class ConnectedParts:
                 bits ^= low
         return row, table[:, [columns[part] for part in ends.tolist()]]
 
-    def _reached(self, parts: Int32Array) -> tuple[dict[int, int], dict[int, int]]:
+    def _reached_parts(self, parts: Int32Array) -> tuple[dict[int, int], dict[int, int]]:
         """For each part a bit for each of ``parts`` that it leads to; and which bit is whose."""
         columns = {part: k for k, part in enumerate(np.unique(parts).tolist())}
         reached: dict[int, int] = {}
-        for part in self._order:
+        for part in self._order_parts:
             bits = 1 << columns[part] if part in columns else 0
-            for after in self._successors[part]:
+            for after in self._part_successors[part]:
                 bits |= reached[after]
             reached[part] = bits
         return reached, columns
 
     @cached_property
-    def _successors(self) -> dict[int, set[int]]:
+    def _part_successors(self) -> dict[int, set[int]]:
         after: dict[int, set[int]] = {part: set() for part in np.unique(self.of).tolist()}
         edges = self._matrix.tocoo()
         parts = np.stack([self.of[edges.row], self.of[edges.col]], axis=1)
@@ -90,14 +90,14 @@ class ConnectedParts:
         return after
 
     @cached_property
-    def _order(self) -> tuple[int, ...]:
+    def _order_parts(self) -> tuple[int, ...]:
         """Parts, each behind those that it leads to."""
-        after = self._successors
+        after = self._part_successors
         order: list[int] = []
         done: set[int] = set()
         todo = list(after)
         while todo:  # parts make no circles
-            ahead = [one for one in after[todo[-1]] if one not in done]
+            ahead = [number for number in after[todo[-1]] if number not in done]
             if ahead:
                 todo += ahead
             elif (part := todo.pop()) not in done:

@@ -56,10 +56,14 @@ class CorridorPaths:
         It is the path that Dijkstra's algorithm finds from ``source`` on in the whole graph.
         """
         start, goal = self._blocks.row[[source, target]].tolist()
-        blocks = self._corridor(start, goal)
-        return self._search(start, goal, blocks) if blocks else Way(math.inf, self._blocks.node[:0])
+        blocks = self._blocks_of_corridor(start, goal)
+        return (
+            self._search_corridor(start, goal, blocks)
+            if blocks
+            else Way(math.inf, self._blocks.node[:0])
+        )
 
-    def _corridor(self, start: int, goal: int) -> set[int]:
+    def _blocks_of_corridor(self, start: int, goal: int) -> set[int]:
         """Blocks that a shortest path can lead through; none if there is no path."""
         blocks = self._blocks
         outset, last = blocks.outset(start), int(blocks.block[goal])
@@ -90,7 +94,7 @@ class CorridorPaths:
         found: list[int] = blocks.block[blocks.gates[list(seen)]].tolist()
         return found
 
-    def _search(self, start: int, goal: int, corridor: set[int]) -> Way | None:
+    def _search_corridor(self, start: int, goal: int, corridor: set[int]) -> Way | None:
         """Search some blocks as Dijkstra does; ``None`` where the heap decides."""
         blocks, every = self._blocks, self._blocks.every
         wanted = np.array(sorted(corridor))
@@ -111,13 +115,13 @@ class CorridorPaths:
         distances, predecessors = csgraph.dijkstra(
             matrix, indices=np.asarray(start), return_predecessors=True
         )
-        path = _path(predecessors, goal)
+        path = _path_from_predecessors(predecessors, goal)
         if _is_tied(path, distances, tails, heads, metres):
             return None
         return Way(float(distances[goal]), blocks.node[rows[path]])
 
 
-def _path(predecessors: Rows, goal: int) -> Rows:
+def _path_from_predecessors(predecessors: Rows, goal: int) -> Rows:
     before = predecessors.item
     steps, step = [goal], before(goal)
     while step >= 0:

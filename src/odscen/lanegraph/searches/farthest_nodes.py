@@ -111,7 +111,7 @@ class FarthestNodes:
 
         Of a lane there are several where rounding decides, and none where no other is reached.
         """
-        outset = self._from(source)
+        outset = self._outset_from(source)
         metres = np.full(len(lanes.nodes), np.inf)
         for gates, within in zip(lanes.gates, lanes.within, strict=True):
             np.minimum(metres, outset.gates[gates] + within, out=metres)
@@ -125,7 +125,7 @@ class FarthestNodes:
         places = np.flatnonzero((away >= least) & (away >= 0.0))
         return lanes.nodes[places], np.searchsorted(lanes.starts, places, side="right") - 1
 
-    def _from(self, source: int) -> Outset:
+    def _outset_from(self, source: int) -> Outset:
         known = self._outset  # other threads may ask for theirs
         if known is None or known[0] != source:
             row = int(self._blocks.row[source])

@@ -45,7 +45,7 @@ class PathsTo:
     def paths(self, sources: Int32Array) -> list[Int32Array]:
         """Nodes of the path from each source, both ends included; empty where there is none."""
         if len(sources) <= FEW:
-            return [self._path(int(start)) for start in self._local[sources]]
+            return [self._path_from(int(start)) for start in self._local[sources]]
         current = self._local[sources]
         steps = [current]
         counts = np.ones(len(sources), dtype=np.intp)
@@ -57,7 +57,7 @@ class PathsTo:
         table = self.nodes[np.stack(steps, axis=1)].astype(np.int32)
         return [row[:count] for row, count in zip(table, counts.tolist(), strict=True)]
 
-    def _path(self, start: int) -> Int32Array:
+    def _path_from(self, start: int) -> Int32Array:
         if not np.isfinite(self.distances[start]):
             return np.empty(0, dtype=np.int32)
         steps, after = [start], self._next.item
@@ -80,7 +80,7 @@ class PathsTo:
         Marks in the order in which they are met, and the first node with each: two arrays of shape
         ``(len(sources), most)``, with -1 behind the end of a path.
         """
-        after = self._after(marks)
+        after = self._first_node_after(marks)
         steps = [self._local[sources]]
         while (steps[-1] >= 0).any():
             steps.append(np.where(steps[-1] >= 0, after[steps[-1]], -1))
@@ -88,7 +88,7 @@ class PathsTo:
         nodes = np.where(table >= 0, self.nodes[table], -1)
         return np.where(table >= 0, marks[nodes], -1), nodes
 
-    def _after(self, marks: Int32Array) -> NDArray[np.integer]:
+    def _first_node_after(self, marks: Int32Array) -> NDArray[np.integer]:
         """First node on the path from each node of the region that has another mark, or -1."""
         mark = marks[self.nodes]
         jump = np.where(self._next == NO_PREDECESSOR, np.arange(len(mark)), self._next)

@@ -114,7 +114,7 @@ class RingGoals:
             Nodes of the map that a goal may be on; the same array for starts that have them in
             common. ``None``: all.
         """
-        lanes = self._lanes(start, allowed)
+        lanes = self._lanes_with_goal(start, allowed)
         if lanes is None:
             return self.by_search(start, allowed)
         return _LaneGoals(self, start, allowed, lanes)
@@ -140,20 +140,20 @@ class RingGoals:
         node = self._farthest.of(start, lane)
         return None if node is None else int(self._nodes[node])
 
-    def _lanes(self, start: int, allowed: BoolArray | None) -> BoolArray | None:
+    def _lanes_with_goal(self, start: int, allowed: BoolArray | None) -> BoolArray | None:
         """Lanes that have a goal, shape ``(L,)``; ``None`` if only a search can say."""
-        ahead, own = self._ahead(start, allowed), self._farthest.lane_of(start)
+        ahead, own = self._lanes_ahead(start, allowed), self._farthest.lane_of(start)
         is_alone = bool(ahead.counts[own]) and int(ahead.reached[own]) == 1
         if is_alone and np.count_nonzero(ahead.counts) == 1:
             return None
         has_goal = ahead.has_goal.copy()
-        if allowed is not None and not self._weighed(start, ahead, allowed, has_goal):
+        if allowed is not None and not self._weigh_mixed_lanes(start, ahead, allowed, has_goal):
             return None
         if is_alone:
             has_goal[own] = False
         return has_goal
 
-    def _weighed(
+    def _weigh_mixed_lanes(
         self, start: int, ahead: _LanesAhead, allowed: BoolArray, has_goal: BoolArray
     ) -> bool:
         """Say of mixed lanes whether their farthest node is allowed; if that is decided."""
@@ -170,16 +170,16 @@ class RingGoals:
                 has_goal[lanes] = some
         return True
 
-    def _ahead(self, start: int, allowed: BoolArray | None) -> _LanesAhead:
+    def _lanes_ahead(self, start: int, allowed: BoolArray | None) -> _LanesAhead:
         key = (int(self._part[start]), id(allowed))
         known = self._known.get(key)
         if known is None or known.allowed is not allowed:
             if len(self._known) >= _KEPT:
                 self._known = {}
-            known = self._known[key] = self._found(start, allowed)
+            known = self._known[key] = self._find_lanes_ahead(start, allowed)
         return known
 
-    def _found(self, start: int, allowed: BoolArray | None) -> _LanesAhead:
+    def _find_lanes_ahead(self, start: int, allowed: BoolArray | None) -> _LanesAhead:
         seen = np.zeros(len(self._part), dtype=np.bool_)
         seen[csgraph.breadth_first_order(self._matrix, start, return_predecessors=False)] = True
         reached = np.add.reduceat(seen, self._starts, dtype=np.int32)
@@ -205,13 +205,18 @@ class _LaneGoals:
     def __init__(
         self, goals: RingGoals, start: int, allowed: BoolArray | None, lanes: BoolArray
     ) -> None:
-        self._goals, self._start, self._allowed, self._lanes = goals, start, allowed, lanes
+        self._goals, self._start, self._allowed, self._lanes_with_goal = (
+            goals,
+            start,
+            allowed,
+            lanes,
+        )
 
     def __len__(self) -> int:
-        return int(np.count_nonzero(self._lanes))
+        return int(np.count_nonzero(self._lanes_with_goal))
 
     def __getitem__(self, place: int, /) -> int:
-        lane = int(np.flatnonzero(self._lanes)[place])
+        lane = int(np.flatnonzero(self._lanes_with_goal)[place])
         node = self._goals.on_lane(self._start, lane)
         if node is None:
             node = int(self._goals.by_search(self._start, self._allowed)[place])

@@ -42,19 +42,19 @@ _WHOLE = ("index", "lane", "leader", "light")
 _YES_NO = ("can_left", "can_right")
 
 
-def _form(name: str) -> tuple[Any, ...]:
+def _column_form(name: str) -> tuple[Any, ...]:
     if name == "ahead":
         return name, "<i4", (AHEAD,)
     return name, "<i4" if name in _WHOLE else "?" if name in _YES_NO else "<f8"
 
 
-_ROWS: Final = np.dtype([_form(one.name) for one in fields(RoadObservation)])
-_ACTIONS: Final = tuple(one.name for one in fields(DrivingAction))
+_ROWS: Final = np.dtype([_column_form(field.name) for field in fields(RoadObservation)])
+_ACTIONS: Final = tuple(field.name for field in fields(DrivingAction))
 
 
 def scene_bytes(scene: BehaviourScene, seed: int) -> bytes:
     """The scene as ``.npz``."""
-    arrays: dict[str, Any] = {one.name: getattr(scene, one.name) for one in fields(scene)}
+    arrays: dict[str, Any] = {field.name: getattr(scene, field.name) for field in fields(scene)}
     stream = io.BytesIO()
     np.savez(stream, seed=np.int64(seed), **arrays)
     return stream.getvalue()
@@ -63,7 +63,7 @@ def scene_bytes(scene: BehaviourScene, seed: int) -> bytes:
 def scene_from_bytes(data: bytes) -> tuple[BehaviourScene, int]:
     """Inverse of :func:`scene_bytes`."""
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        found: dict[str, Any] = {one.name: arrays[one.name] for one in fields(BehaviourScene)}
+        found: dict[str, Any] = {field.name: arrays[field.name] for field in fields(BehaviourScene)}
         for name in ("step_length", "time"):
             found[name] = float(found[name])
         return BehaviourScene(**found), int(arrays["seed"])
@@ -74,7 +74,7 @@ def observation_bytes(seen: RoadObservation) -> bytes:
     rows = np.empty(len(seen), dtype=_ROWS)
     for name in _ROWS.names or ():
         rows[name] = getattr(seen, name)
-    return _npy(rows)
+    return _pack_npy(rows)
 
 
 def observation_from_bytes(data: bytes) -> RoadObservation:
@@ -94,7 +94,7 @@ def action_bytes(action: DrivingAction, controlled: BoolArray) -> bytes:
     rows["controlled"] = controlled
     for name in used:
         rows[name] = getattr(action, name)
-    return _npy(rows)
+    return _pack_npy(rows)
 
 
 def action_from_bytes(data: bytes, count: int) -> tuple[DrivingAction, BoolArray]:
@@ -138,7 +138,7 @@ def serve(
         Where messages come from and go to; stdin and stdout if not given.
     """
     stdin, stdout = given or sys.stdin.buffer, back or sys.stdout.buffer
-    first = _message(stdin)
+    first = _read_message(stdin)
     if first is None:
         return
     scene, seed = scene_from_bytes(first)
@@ -147,18 +147,18 @@ def serve(
     while True:
         stdout.write(framed(answer))
         stdout.flush()
-        data = _message(stdin)
+        data = _read_message(stdin)
         if data is None:
             return
         answer = action_bytes(*model.act(observation_from_bytes(data), state))
 
 
-def _message(stream: IO[bytes]) -> bytes | None:
+def _read_message(stream: IO[bytes]) -> bytes | None:
     head = stream.read(HEAD.size)
     return stream.read(HEAD.unpack(head)[0]) if len(head) == HEAD.size else None
 
 
-def _npy(rows: Array) -> bytes:
+def _pack_npy(rows: Array) -> bytes:
     stream = io.BytesIO()
     np.lib.format.write_array(stream, rows, allow_pickle=False)
     return stream.getvalue()

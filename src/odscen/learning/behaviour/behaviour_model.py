@@ -270,12 +270,12 @@ class CheckedAction:
             raise InputError(f"there is no kind of action {unknown[0]!r}")
         self.kind = kinds
         self.real = {
-            name: self._numbers(action, name, count)
+            name: self._checked_numbers(action, name, count)
             for name in ("speed", "pos", "x", "y", "hdg")
             if getattr(action, name) is not None
         }
         self.whole = {
-            name: self._numbers(action, name, count).astype(np.int64)
+            name: self._checked_numbers(action, name, count).astype(np.int64)
             for name in ("lane", "change")
             if getattr(action, name) is not None
         }
@@ -292,7 +292,7 @@ class CheckedAction:
         self.speed = speed
         self.change = self.whole.get("change")
 
-    def _numbers(self, action: DrivingAction, name: str, count: int) -> Array:
+    def _checked_numbers(self, action: DrivingAction, name: str, count: int) -> Array:
         try:
             values = np.asarray(getattr(action, name), dtype=np.float64)
         except (TypeError, ValueError) as error:

@@ -93,7 +93,7 @@ class IntelligentDriver:
         own = self.follow(seen.speed, wanted, seen.gap, leading)
         free = np.minimum(own, self._at_light(seen, scene, wanted))
         speed = np.maximum(seen.speed + free * scene.step_length, 0.0)
-        change = self._changes(seen, scene, wanted, own) if self.changes_lanes else None
+        change = self._wanted_changes(seen, scene, wanted, own) if self.changes_lanes else None
         return DrivingAction(speed=speed, change=change), controlled
 
     def follow(
@@ -119,7 +119,7 @@ class IntelligentDriver:
         gap = np.where(red & (seen.lane >= 0), rest - _STOP_GAP + self.gap, np.inf)
         return self.follow(seen.speed, wanted, gap, np.zeros(len(seen)))
 
-    def _changes(
+    def _wanted_changes(
         self, seen: RoadObservation, scene: BehaviourScene, wanted: FloatArray, own: FloatArray
     ) -> Int32Array:
         change = np.zeros(len(seen), dtype=np.int32)
@@ -134,13 +134,15 @@ class IntelligentDriver:
         for side, can, beside in (
             (1, seen.can_left, scene.lane_left), (-1, seen.can_right, scene.lane_right),
         ):  # fmt: skip
-            gain = self._gain(seen, order, rows, beside[seen.lane[rows]], wanted, own, length)
+            gain = self._gain_of_change(
+                seen, order, rows, beside[seen.lane[rows]], wanted, own, length
+            )
             better = can[rows] & (gain > best)
             change[rows[better]] = side
             best[better] = gain[better]
         return change
 
-    def _gain(
+    def _gain_of_change(
         self,
         seen: RoadObservation,
         order: LaneOrder,

@@ -36,7 +36,7 @@ class LaneOrder:
     def ahead(self, lane: Array, pos: FloatArray) -> tuple[IntArray, FloatArray]:
         """Nearest front on a lane at or after a place: its row (-1: none), metres to its back."""
         place = np.searchsorted(self._key, lane * _FAR + pos, side="left")
-        return self._taken(place, lane, pos)
+        return self._leader_and_gap(place, lane, pos)
 
     def behind(
         self, lane: Array, pos: FloatArray, length: FloatArray
@@ -74,7 +74,9 @@ class LaneOrder:
         gap += np.where(column > 0, metres[each, column - 1], -self._pos)
         return leader.astype(np.int32), np.where(leader >= 0, gap, np.inf)
 
-    def _taken(self, place: IntArray, lane: Array, pos: FloatArray) -> tuple[IntArray, FloatArray]:
+    def _leader_and_gap(
+        self, place: IntArray, lane: Array, pos: FloatArray
+    ) -> tuple[IntArray, FloatArray]:
         inside = (place < len(self._rows)) & (lane >= 0)
         row = np.full(len(place), -1, dtype=np.int64)
         row[inside] = self._rows[place[inside]]

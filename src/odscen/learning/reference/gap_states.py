@@ -25,7 +25,7 @@ FREE = 150.0
 """Metres; a longer gap counts as none ahead."""
 NEAR, FAR = 30.0, 120.0
 """Metres over which the weight of a vehicle ahead falls to 1/e in the two counts of vehicles."""
-HALF_LENGTHS = np.array([DEFAULT_BODY[one].length / 2.0 for one in Category])
+HALF_LENGTHS = np.array([DEFAULT_BODY[category].length / 2.0 for category in Category])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,13 +178,13 @@ def beyond_columns(ways: Ways, states: GapStates) -> FloatArray:
     columns = [
         *(1.0 - np.minimum(least, bend) / bend for bend in _ROOM),
         1.0 - slowest,
-        *(_mean(ways.root, one, count) for one in means),
+        *(_mean_by_root(ways.root, array, count) for array in means),
     ]
     found: FloatArray = np.column_stack(columns)
     return found
 
 
-def _mean(root: IntArray, values: FloatArray, count: int) -> FloatArray:
+def _mean_by_root(root: IntArray, values: FloatArray, count: int) -> FloatArray:
     total = np.bincount(root, weights=values, minlength=count)
     found: FloatArray = total / np.maximum(np.bincount(root, minlength=count), 1)
     return found

@@ -127,7 +127,7 @@ def train_model(
     rng = np.random.default_rng(settings.seed)
     tell = told or (lambda _: None)
     tell("looking at snapshots")
-    rows = _rows(examples, settings, rng)
+    rows = _collect_rows(examples, settings, rng)
     x = rows.x.copy()
     fixed = examples[0].of.site.columns.shape[1]
     x[:, :fixed] += (NOISE * rng.normal(size=(len(x), fixed))).astype(np.float32)
@@ -157,7 +157,7 @@ def train_model(
         decay=settings.decay,
     )
     said = {"seed": settings.seed, "epochs": settings.epochs, "vehicles": len(rows.speed)}
-    return TrafficModel(occupied, speed, _shares(rows), {**said, **(about or {})})
+    return TrafficModel(occupied, speed, _category_shares(rows), {**said, **(about or {})})
 
 
 class _Rows(NamedTuple):
@@ -182,19 +182,19 @@ class _Look(NamedTuple):
     context: IntArray
 
 
-def _rows(
+def _collect_rows(
     examples: Sequence[Example], settings: TrainingSettings, rng: np.random.Generator
 ) -> _Rows:
     counts: dict[int, int] = {}
     nodes = 0
-    for one in examples:
-        counts[id(one.of)] = counts.get(id(one.of), 0) + int(placed(one).sum())
-        nodes += int(one.of.allowed.any(axis=0).sum())
+    for example in examples:
+        counts[id(example.of)] = counts.get(id(example.of), 0) + int(placed(example).sum())
+        nodes += int(example.of.allowed.any(axis=0).sum())
     vehicles = sum(counts.values())
     if not vehicles:
         raise InputError("there is no vehicle in these snapshots to learn from")
     kept = min(1.0, settings.empty * vehicles / max(nodes - vehicles, 1))
-    looks = [_looked_at(one, kept, rng) for one in examples]
+    looks = [_looked_at(example, kept, rng) for example in examples]
     weight = np.concatenate(
         [
             np.full(len(look.x), float(max(counts[id(one.of)], 1)) ** -settings.balance)
@@ -202,11 +202,11 @@ def _rows(
         ]
     )
     return _Rows(
-        np.concatenate([one.x for one in looks]),
-        np.concatenate([one.taken for one in looks]),
-        np.concatenate([one.category for one in looks]),
-        np.concatenate([one.speed for one in looks]),
-        np.concatenate([one.context for one in looks]),
+        np.concatenate([look.x for look in looks]),
+        np.concatenate([look.taken for look in looks]),
+        np.concatenate([look.category for look in looks]),
+        np.concatenate([look.speed for look in looks]),
+        np.concatenate([look.context for look in looks]),
         weight / weight.mean(),
         kept,
     )
@@ -244,7 +244,7 @@ def _looked_at(example: Example, kept: float, rng: np.random.Generator) -> _Look
     )
 
 
-def _shares(rows: _Rows) -> FloatArray:
+def _category_shares(rows: _Rows) -> FloatArray:
     """Share of each category in each context; rare contexts lean on all of them."""
     counts = np.zeros((6, len(VEHICLES)))
     np.add.at(counts, (rows.context, rows.category), 1.0)

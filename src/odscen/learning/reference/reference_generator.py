@@ -236,16 +236,16 @@ class ReferenceGenerator:
     def fill(self, graph: MapGraph, request: FillRequest, rng: np.random.Generator) -> Fill:
         """Place vehicles and pedestrians; see :class:`~odscen.learning.fill.Generator`."""
         none = np.zeros(len(graph.lanes.x), dtype=np.bool_)
-        allowed = np.stack([request.allowed.get(one, none) for one in VEHICLES])
-        lengths = np.array([request.bodies[one].length for one in VEHICLES])
-        site = _site(graph.lanes, graph.walks)
+        allowed = np.stack([request.allowed.get(category, none) for category in VEHICLES])
+        lengths = np.array([request.bodies[category].length for category in VEHICLES])
+        site = _make_site(graph.lanes, graph.walks)
         traffic = place_traffic(
             self._model, site, request.lights, allowed,
             spacing=graph.lanes.spacing, wanted=request.vehicles, lengths=lengths, rng=rng,
         )  # fmt: skip
-        desired = _desired(traffic, site.limit[traffic.node], rng)
+        desired = _draw_desired_speeds(traffic, site.limit[traffic.node], rng)
         goal = onward_goals(graph, request.roads, node=traffic.node, speed=traffic.speed, rng=rng)
-        walkers = _walkers(request, rng)
+        walkers = _draw_walkers(request, rng)
         rest = np.full(len(walkers), np.nan)
         return Fill(
             node=np.concatenate([traffic.node, walkers]),
@@ -260,7 +260,7 @@ class ReferenceGenerator:
 
 def names_of(category: IntArray) -> Array:
     """Names of categories by their places."""
-    return np.array([str(one) for one in Category])[category]
+    return np.array([str(category) for category in Category])[category]
 
 
 @cache
@@ -303,7 +303,9 @@ def place_traffic(
     states = GapStates.empty(len(site.limit))
     for number in range(PASSES if wanted else 0):
         states, found = draw.traffic(wish, states, rng)
-        if number >= BEFORE and _missing(found, wanted) < _missing(best, wanted):
+        if number >= BEFORE and _distance_from_wanted(found, wanted) < _distance_from_wanted(
+            best, wanted
+        ):
             best = found
         if number >= BEFORE and wanted <= len(found.node) <= MORE * wanted + 1.0:
             break
@@ -317,7 +319,7 @@ def place_traffic(
     return PlacedTraffic(best.node[keep], best.category[keep], best.speed[keep])
 
 
-def _missing(found: PlacedTraffic, wanted: int) -> float:
+def _distance_from_wanted(found: PlacedTraffic, wanted: int) -> float:
     """How far a pass is from the number wanted: too few cannot be mended, too many can."""
     more = len(found.node) - wanted
     return -3.0 * more if more < 0 else more
@@ -363,14 +365,14 @@ class _Draw(NamedTuple):
             chance = logistic(self.model.occupied(x)[:, 0] + bias)
             hit = np.flatnonzero(rng.random(len(free)) < chance)
             if len(hit):
-                placed = self._vehicles(free[hit], x[hit], states, rng)
+                placed = self._draw_vehicles(free[hit], x[hit], states, rng)
                 states.put(placed.node, placed.category, placed.speed)
                 found.append(placed)
         if not found:
             return states, NOBODY
-        return states, PlacedTraffic(*(np.concatenate(one) for one in zip(*found, strict=True)))
+        return states, PlacedTraffic(*(np.concatenate(pair) for pair in zip(*found, strict=True)))
 
-    def _vehicles(
+    def _draw_vehicles(
         self, nodes: IntArray, x: FloatArray, states: GapStates, rng: np.random.Generator
     ) -> PlacedTraffic:
         """Category and speed of vehicles on nodes; without one that fits there is none."""
@@ -380,24 +382,26 @@ class _Draw(NamedTuple):
         shares = shares * (self.allowed[:, nodes].T & fits)
         some = shares.sum(axis=1) > 0
         nodes, x, limit, shares = nodes[some], x[some], limit[some], shares[some]
-        category = _drawn(shares, rng)
-        most = np.minimum(self._stoppable(nodes, category), self._safe(nodes, category, states))
+        category = _draw_columns(shares, rng)
+        most = np.minimum(
+            self._stoppable_speeds(nodes, category), self._safe_speeds(nodes, category, states)
+        )
         logits = self.model.speed(with_category(x, category)).astype(np.float64)
-        odds = _sharpened(softmax(logits))
+        odds = _sharpen_shares(softmax(logits))
         # Those who would be too fast are none of the slower ones at the limit of what is safe.
         odds = np.where(least_speeds(limit) < most[:, None], odds, 0.0)
         odds[:, 0] = np.maximum(odds[:, 0], 1e-9)
-        speed = speed_within(_drawn(odds, rng), limit, rng.random(len(nodes)))
+        speed = speed_within(_draw_columns(odds, rng), limit, rng.random(len(nodes)))
         return PlacedTraffic(nodes, category, np.minimum(speed, most))
 
-    def _safe(self, nodes: IntArray, category: IntArray, states: GapStates) -> FloatArray:
+    def _safe_speeds(self, nodes: IntArray, category: IntArray, states: GapStates) -> FloatArray:
         """Krauss's safe speed behind the leader on the strip, m/s."""
         gap = states.gap[nodes] - self.lengths[category] / 2.0
         leader = states.leader[nodes]
         safe = safe_speed(gap - STANDING_GAP, np.maximum(leader, 0.0))
         return np.where(leader >= 0.0, safe, np.inf)
 
-    def _stoppable(self, nodes: IntArray, category: IntArray) -> FloatArray:
+    def _stoppable_speeds(self, nodes: IntArray, category: IntArray) -> FloatArray:
         """Krauss's safe speed before a red light, m/s: that at which SUMO's drivers approach it."""
         root = self.site.strips.root[nodes]
         red = self.lights.state[self.site.lane[root]] == SignalAhead.RED
@@ -405,7 +409,7 @@ class _Draw(NamedTuple):
         return np.where(red & (metres > -1.0), safe_speed(metres, 0.0), np.inf)
 
 
-def _sharpened(odds: FloatArray) -> FloatArray:
+def _sharpen_shares(odds: FloatArray) -> FloatArray:
     """Raise the shares of speeds to a power, but for the share of those who are stopped."""
     moving = odds[:, 1:] ** SHARPNESS
     total = np.maximum(moving.sum(axis=1, keepdims=True), 1e-12)
@@ -413,7 +417,7 @@ def _sharpened(odds: FloatArray) -> FloatArray:
     return found
 
 
-def _drawn(shares: FloatArray, rng: np.random.Generator) -> IntArray:
+def _draw_columns(shares: FloatArray, rng: np.random.Generator) -> IntArray:
     """Draw a column for each row, by the shares in it."""
     ends = np.cumsum(shares, axis=1)
     at = rng.random(len(shares)) * ends[:, -1]
@@ -421,7 +425,9 @@ def _drawn(shares: FloatArray, rng: np.random.Generator) -> IntArray:
     return found
 
 
-def _desired(traffic: PlacedTraffic, limit: FloatArray, rng: np.random.Generator) -> FloatArray:
+def _draw_desired_speeds(
+    traffic: PlacedTraffic, limit: FloatArray, rng: np.random.Generator
+) -> FloatArray:
     """Desired speeds, m/s: about the limit, never below the speed at departure."""
     count = len(traffic.node)
     mean, spread, low, high = _FACTOR
@@ -430,11 +436,11 @@ def _desired(traffic: PlacedTraffic, limit: FloatArray, rng: np.random.Generator
     cycling = np.clip(rng.normal(mean, spread, count), low, high)
     bicycle = traffic.category == [*Category].index(Category.BICYCLE)
     wanted = np.maximum(np.where(bicycle, cycling, motor), traffic.speed)
-    most = np.array([SPEED_MAX[one] for one in VEHICLES])[traffic.category]
+    most = np.array([SPEED_MAX[category] for category in VEHICLES])[traffic.category]
     return np.clip(wanted, 1.0, most)
 
 
-def _walkers(request: FillRequest, rng: np.random.Generator) -> IntArray:
+def _draw_walkers(request: FillRequest, rng: np.random.Generator) -> IntArray:
     """Nodes of pedestrians: at random, as they are no part of what was learned."""
     allowed = request.allowed.get(Category.PEDESTRIAN)
     if allowed is None:
@@ -443,5 +449,5 @@ def _walkers(request: FillRequest, rng: np.random.Generator) -> IntArray:
 
 
 @lru_cache(maxsize=4)
-def _site(lanes: LaneGraph, walks: PedestrianGraph) -> Site:
+def _make_site(lanes: LaneGraph, walks: PedestrianGraph) -> Site:
     return site_of(lanes, walks)

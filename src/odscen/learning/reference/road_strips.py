@@ -55,11 +55,11 @@ def road_strips(lanes: LaneGraph) -> Strips:
     inside = np.array([name is not None for name in lanes.lanes.junctions], dtype=np.bool_)
     on_road = ~inside[lanes.lane]
     ahead, step = _next_nodes(lanes, on_road)
-    hops, to_end, root = _distances(ahead, step)
+    hops, to_end, root = _distances_to_end(ahead, step)
     while np.any(endless := hops > count):
         cut = int(np.flatnonzero(endless)[0])
         ahead[cut], step[cut] = -1, 0.0
-        hops, to_end, root = _distances(ahead, step)
+        hops, to_end, root = _distances_to_end(ahead, step)
     nodes = np.flatnonzero(on_road)
     nodes = nodes[np.argsort(hops[nodes], kind="stable")]
     starts = np.flatnonzero(np.diff(hops[nodes])) + 1
@@ -89,7 +89,7 @@ def _next_nodes(lanes: LaneGraph, on_road: BoolArray) -> tuple[IntArray, FloatAr
     return ahead, step
 
 
-def _distances(ahead: IntArray, step: FloatArray) -> tuple[IntArray, FloatArray, IntArray]:
+def _distances_to_end(ahead: IntArray, step: FloatArray) -> tuple[IntArray, FloatArray, IntArray]:
     """Nodes and metres to the end, and the last node, by doubling the length of the jumps."""
     count = len(ahead)
     jump, metres = ahead.copy(), step.copy()

@@ -90,19 +90,19 @@ def approaches(
         Shape ``(N,)``: m/s, and relative numbers of trips.
     """
     found = [np.zeros(len(lanes.x)) for _ in range(COLUMNS)]
-    junctions = _movements(lanes, on_road, flow)
+    junctions = _junction_movements(lanes, on_road, flow)
     for movements in junctions.values():
-        _describe(movements, _standings(movements, lanes, limit), found)
-    every = [one for some in junctions.values() for one in some if on_road[one.entry]]
+        _describe_approaches(movements, _approach_standings(movements, lanes, limit), found)
+    every = [through for some in junctions.values() for through in some if on_road[through.entry]]
     ways = Ways(
-        np.array([one.root for one in every], dtype=np.int64),
-        np.array([one.entry for one in every], dtype=np.int64),
-        np.array([one.metres for one in every], dtype=np.float64),
+        np.array([through.root for through in every], dtype=np.int64),
+        np.array([through.entry for through in every], dtype=np.int64),
+        np.array([through.metres for through in every], dtype=np.float64),
     )
     return ways, found
 
 
-def _movements(
+def _junction_movements(
     lanes: LaneGraph, on_road: BoolArray, flow: FloatArray
 ) -> dict[str, list[_WayThrough]]:
     """Ways through each junction."""
@@ -118,8 +118,8 @@ def _movements(
             points = np.column_stack([lanes.x[nodes], lanes.y[nodes]])
             name = str(lanes.lanes.junctions[lanes.lane[nodes[0]]])
             share = float(flow[root]) / len(ways)
-            one = _WayThrough(root, nodes[-1], approach, points, turn, metres, share)
-            found.setdefault(name, []).append(one)
+            through = _WayThrough(root, nodes[-1], approach, points, turn, metres, share)
+            found.setdefault(name, []).append(through)
     return found
 
 
@@ -139,27 +139,29 @@ class _InsideJunctions:
     def ways(self, root: int) -> list[tuple[list[int], float]]:
         """Nodes of each way from the first in the junction to the first behind it, and metres."""
         found: list[tuple[list[int], float]] = []
-        open_ = [([there], far) for there, far in self._next(root) if not self._on_road[there]]
+        open_ = [
+            ([there], far) for there, far in self._nodes_after(root) if not self._on_road[there]
+        ]
         while open_ and len(found) < BRANCHES:
             nodes, metres = open_.pop()
-            onwards = self._next(nodes[-1]) if metres < LONGEST else []
+            onwards = self._nodes_after(nodes[-1]) if metres < LONGEST else []
             if self._on_road[nodes[-1]] or not onwards:
                 found.append((nodes, metres))
             else:
                 open_ += [([*nodes, there], metres + far) for there, far in reversed(onwards)]
         return found
 
-    def _next(self, node: int) -> list[tuple[int, float]]:
+    def _nodes_after(self, node: int) -> list[tuple[int, float]]:
         edges = slice(self._first[node], self._first[node + 1])
         return list(zip(self._target[edges], self._length[edges], strict=True))
 
 
-def _standings(
+def _approach_standings(
     movements: Sequence[_WayThrough], lanes: LaneGraph, limit: FloatArray
 ) -> dict[_Approach, _Standing]:
     roots: dict[_Approach, set[int]] = {}
-    for one in movements:
-        roots.setdefault(one.approach, set()).add(one.root)
+    for movement in movements:
+        roots.setdefault(movement.approach, set()).add(movement.root)
     return {
         approach: _Standing(
             max(float(limit[root]) for root in some),
@@ -182,24 +184,24 @@ def _first_road(standings: dict[_Approach, _Standing]) -> frozenset[_Approach]:
     return best[1] if best else frozenset()
 
 
-def _describe(
+def _describe_approaches(
     movements: Sequence[_WayThrough],
     standings: dict[_Approach, _Standing],
     found: list[FloatArray],
 ) -> None:
     """Write the features of the approaches of one junction."""
     first = _first_road(standings)
-    ahead = np.array([one.approach in first for one in movements])
-    turn = np.array([abs(one.turn) for one in movements])
-    flow = np.array([one.flow for one in movements])
-    meets = _meeting(movements)
+    ahead = np.array([movement.approach in first for movement in movements])
+    turn = np.array([abs(movement.turn) for movement in movements])
+    flow = np.array([movement.flow for movement in movements])
+    meets = _movements_meet(movements)
     more = turn[:, None] > turn[None, :] + _TURNS_MORE
     level = ahead[:, None] == ahead[None, :]
     equal = level & ~more & ~more.T & ~ahead[:, None]
     waits = (~ahead[:, None] & ahead[None, :]) + level * more + 0.5 * equal
     waited = (meets * waits) @ flow
     met = meets @ flow
-    root = np.array([one.root for one in movements])
+    root = np.array([movement.root for movement in movements])
     for node in np.unique(root).tolist():
         own = root == node
         approach = movements[int(np.argmax(own))].approach
@@ -210,24 +212,27 @@ def _describe(
             np.log(0.1 + waited[own].mean()) / 2.0,
             np.log(0.1 + waited[own].max()) / 2.0,
             np.log(0.1 + met[own].mean()) / 2.0,
-            min(max(one.metres for one in movements if one.root == node), 60.0) / 30.0,
+            min(max(movement.metres for movement in movements if movement.root == node), 60.0)
+            / 30.0,
             (standings[approach].limit - max(limits, default=standings[approach].limit)) / 15.0,
         )
         for column, value in zip(found, values, strict=True):
             column[node] = value
 
 
-def _meeting(movements: Sequence[_WayThrough]) -> FloatArray:
+def _movements_meet(movements: Sequence[_WayThrough]) -> FloatArray:
     """Whether the ways of two movements of different approaches cross or merge, ``(M, M)``."""
     from scipy.spatial.distance import cdist
 
-    step = -(-sum(len(one.points) for one in movements) // _MOST_POINTS)
-    points = [one.points[::-step] for one in movements]  # the place behind the junction first
-    first = np.concatenate([[0], np.cumsum([len(one) for one in points])[:-1]])
+    step = -(-sum(len(movement.points) for movement in movements) // _MOST_POINTS)
+    points = [
+        movement.points[::-step] for movement in movements
+    ]  # the place behind the junction first
+    first = np.concatenate([[0], np.cumsum([len(point) for point in points])[:-1]])
     every = np.concatenate(points)
     near = cdist(every, every)
     least = np.minimum.reduceat(np.minimum.reduceat(near, first, axis=0), first, axis=1)
-    approach = [one.approach for one in movements]
+    approach = [movement.approach for movement in movements]
     apart = np.array([[a != b for b in approach] for a in approach], dtype=np.bool_)
     return ((least < MEET * step) & apart).astype(np.float64)
 
@@ -262,7 +267,7 @@ def expected_flows(lanes: LaneGraph) -> Flows:
     follows = (lanes.relation == Relation.SUCCESSOR) & (one != other)
     beside = lanes.relation != Relation.SUCCESSOR
     number = np.abs([key.lane for key in lanes.lanes.keys])
-    directions = _directions(lanes)
+    directions = _road_directions(lanes)
     gone = lengths / (lengths + CHANGE)
     source = np.concatenate([one[follows], one[beside]])
     target = np.concatenate([other[follows], other[beside]])
@@ -272,35 +277,35 @@ def expected_flows(lanes: LaneGraph) -> Flows:
     graph = csr_array((cost[first], (pairs // count, pairs % count)), shape=(count, count))
     on_road = np.array([name is None for name in lanes.lanes.junctions], dtype=np.bool_)
     weight = lengths * on_road
-    origins = _spread(weight)
+    origins = _spread_origins(weight)
     far, before = dijkstra(graph, indices=origins, return_predecessors=True)
     total = np.zeros(count)
     for row, origin in enumerate(origins):
-        trips = _trips(far[row], before[row], weight)
+        trips = _trips_over_lanes(far[row], before[row], weight)
         came = np.flatnonzero(before[row] >= 0)
         changed = came[directions[before[row][came]] == directions[came]]
         left = np.bincount(before[row][changed], weights=trips[changed], minlength=count)
-        total += (trips - gone * left) * _share(weight, origin, origins)
+        total += (trips - gone * left) * _share_of_weight(weight, origin, origins)
     by_road = np.bincount(directions, weights=total) / np.maximum(np.bincount(directions), 1)
-    return Flows(_relative(by_road[directions], on_road), _relative(total, on_road))
+    return Flows(_relative_flow(by_road[directions], on_road), _relative_flow(total, on_road))
 
 
-def _relative(total: FloatArray, on_road: BoolArray) -> FloatArray:
+def _relative_flow(total: FloatArray, on_road: BoolArray) -> FloatArray:
     mean = float(total[on_road].mean()) if on_road.any() else 0.0
     return np.asarray(total / mean) if mean > 0 else np.ones(len(total))
 
 
-def _directions(lanes: LaneGraph) -> IntArray:
+def _road_directions(lanes: LaneGraph) -> IntArray:
     """Row of the direction of its road that each lane is one of, ``(L,)``."""
     ids = [
         (key.road, key.section, forward)
         for key, forward in zip(lanes.lanes.keys, lanes.lanes.forward.tolist(), strict=True)
     ]
     rows = {one: row for row, one in enumerate(dict.fromkeys(ids))}
-    return np.array([rows[one] for one in ids], dtype=np.int64)
+    return np.array([rows[pair] for pair in ids], dtype=np.int64)
 
 
-def _spread(weight: FloatArray) -> list[int]:
+def _spread_origins(weight: FloatArray) -> list[int]:
     """Lanes at equal steps of the total length of roads: no chance is needed."""
     ends = np.cumsum(weight)
     wanted = (np.arange(ORIGINS) + 0.5) / ORIGINS * ends[-1]
@@ -310,11 +315,11 @@ def _spread(weight: FloatArray) -> list[int]:
     return found
 
 
-def _share(weight: FloatArray, origin: int, origins: list[int]) -> float:
-    return float(weight[origin] / sum(weight[one] for one in origins))
+def _share_of_weight(weight: FloatArray, origin: int, origins: list[int]) -> float:
+    return float(weight[origin] / sum(weight[origin] for origin in origins))
 
 
-def _trips(far: FloatArray, before: FloatArray, weight: FloatArray) -> FloatArray:
+def _trips_over_lanes(far: FloatArray, before: FloatArray, weight: FloatArray) -> FloatArray:
     """Trips over each lane from one origin, if they end on lanes by ``weight``."""
     found: list[float] = np.where(np.isfinite(far), weight, 0.0).tolist()
     came = before.tolist()
@@ -417,15 +422,15 @@ def site_of(lanes: LaneGraph, walks: PedestrianGraph | None = None) -> Site:
     flows = expected_flows(lanes)
     flow = flows.lane[lanes.lane]
     rights, lefts = _lanes_beside(lanes)
-    ends = _ends(lanes, strips, flow)
+    ends = _strip_end_features(lanes, strips, flow)
     ways, more = approaches(lanes, strips.on_road, limit=limit, flow=flow)
     bend = _bend_ahead(lanes, strips)
     columns = np.column_stack(
         [
-            *_hinges(to_line, _TO_END),
+            *_hinge_features(to_line, _TO_END),
             np.minimum(setback, 8.0) / 8.0,
             (setback > 0.0) & (strips.to_end < setback),
-            *_hinges(strips.from_start, _FROM_START),
+            *_hinge_features(strips.from_start, _FROM_START),
             limit / 15.0,
             np.isnan(lanes.speed_limit),
             rights / 3.0,
@@ -434,8 +439,8 @@ def site_of(lanes: LaneGraph, walks: PedestrianGraph | None = None) -> Site:
             lefts == 0,
             np.minimum(np.abs(lanes.curvature) * 30.0, 1.0),
             np.minimum(bend * 30.0, 1.0),
-            *(np.log(0.1 + one) / 2.0 for one in (flows.road[lanes.lane], flow)),
-            *(one[strips.root] for one in (*ends, *more, _flow_behind(ways, flow))),
+            *(np.log(0.1 + array) / 2.0 for array in (flows.road[lanes.lane], flow)),
+            *(end[strips.root] for end in (*ends, *more, _flow_behind(ways, flow))),
         ]
     ).astype(np.float64)
     beside = np.column_stack(
@@ -451,14 +456,14 @@ def light_columns(site: Site, lights: LightView) -> FloatArray:
     state, since = lights.state[lane], lights.since[lane]
     green, red = state == SignalAhead.GREEN, state == SignalAhead.RED
     shown = [green, state == SignalAhead.YELLOW, red]
-    times = [on * column for on in (green, red) for column in _hinges(since, _SINCE)]
-    line = [red * column for column in _hinges(site.to_line, _TO_LINE)]
+    times = [on * column for on in (green, red) for column in _hinge_features(since, _SINCE)]
+    line = [red * column for column in _hinge_features(site.to_line, _TO_LINE)]
     return np.column_stack([*shown, *times, *line]).astype(np.float64)
 
 
 def traffic_columns(site: Site, states: GapStates, nodes: IntArray) -> FloatArray:
     """Features of the traffic ahead of nodes, on their lanes and those beside; one row for each."""
-    own = _ahead(states, nodes)
+    own = _features_ahead(states, nodes)
     columns = [*own]
     for side in (0, 1):
         beside = site.beside_ahead[nodes, side]
@@ -482,14 +487,14 @@ def junction_columns(site: Site, states: GapStates) -> FloatArray:
     return beyond_columns(site.ways, states)[site.strips.root]
 
 
-def _ahead(states: GapStates, nodes: IntArray) -> list[FloatArray]:
+def _features_ahead(states: GapStates, nodes: IntArray) -> list[FloatArray]:
     gap, leader = states.gap[nodes], states.leader[nodes]
     seen = leader >= 0
     close = np.exp(-gap / 25.0) * seen
     speed = np.where(seen, leader, 0.0)
     queue = states.queue[nodes]
     return [
-        *_hinges(np.maximum(gap, 0.0), _GAPS),
+        *_hinge_features(np.maximum(gap, 0.0), _GAPS),
         seen,
         speed / 15.0,
         (speed < 0.5) & seen,
@@ -503,7 +508,7 @@ def _ahead(states: GapStates, nodes: IntArray) -> list[FloatArray]:
     ]
 
 
-def _hinges(values: FloatArray, bends: tuple[float, ...]) -> list[FloatArray]:
+def _hinge_features(values: FloatArray, bends: tuple[float, ...]) -> list[FloatArray]:
     return [np.minimum(values, bend) / bend for bend in bends]
 
 
@@ -549,7 +554,7 @@ def _placed_before(strips: Strips, beside: IntArray) -> IntArray:
     return found
 
 
-def _ends(lanes: LaneGraph, strips: Strips, flow: FloatArray) -> list[FloatArray]:
+def _strip_end_features(lanes: LaneGraph, strips: Strips, flow: FloatArray) -> list[FloatArray]:
     """What comes at the last node of each strip, for all nodes; shapes ``(N,)``.
 
     Whether a junction follows, the sharpest and least turns there, whether several ways lead on,
@@ -568,7 +573,10 @@ def _ends(lanes: LaneGraph, strips: Strips, flow: FloatArray) -> list[FloatArray
     np.minimum.at(least, source, turn)
     np.add.at(ways, source, 1.0)
     junction = np.array(
-        [-1 if name is None else hash_row for name, hash_row in _numbered(lanes.lanes.junctions)]
+        [
+            -1 if name is None else hash_row
+            for name, hash_row in _number_names(lanes.lanes.junctions)
+        ]
     )
     at = np.full(count, -1, dtype=np.int64)
     at[source] = junction[lanes.lane[target]]
@@ -600,7 +608,7 @@ def _flow_behind(ways: Ways, flow: FloatArray) -> FloatArray:
     return found
 
 
-def _numbered(names: tuple[str | None, ...]) -> list[tuple[str | None, int]]:
+def _number_names(names: tuple[str | None, ...]) -> list[tuple[str | None, int]]:
     rows = {name: row for row, name in enumerate(dict.fromkeys(names))}
     return [(name, rows[name]) for name in names]
 

@@ -105,14 +105,14 @@ def trained(
     decay
         Of the matrices, for each step and unit of the rate (Loshchilov and Hutter, 2019).
     """
-    weights = [one.copy() for one in network.weights]
-    first = [np.zeros_like(one) for one in weights]
-    second = [np.zeros_like(one) for one in weights]
+    weights = [weight.copy() for weight in network.weights]
+    first = [np.zeros_like(weight) for weight in weights]
+    second = [np.zeros_like(weight) for weight in weights]
     steps = epochs * -(-len(x) // _BATCH)
-    for step, rows in enumerate(_batches(len(x), epochs, rng), start=1):
+    for step, rows in enumerate(_draw_batches(len(x), epochs, rng), start=1):
         current = SmallNetwork(tuple(weights))
         layers = current.layers(np.asarray(x[rows], dtype=np.float32))
-        error = _error(layers[-1], target[rows]) / np.float32(len(rows))
+        error = _output_gradient(layers[-1], target[rows]) / np.float32(len(rows))
         if weight is not None:
             error *= weight[rows, None].astype(np.float32)
         now = rate * 0.5 * (1.0 + np.cos(np.pi * step / steps)) + 1e-5
@@ -139,7 +139,7 @@ def softmax(values: Array) -> Array:
     return found
 
 
-def _error(outputs: Array, target: IntArray) -> Array:
+def _output_gradient(outputs: Array, target: IntArray) -> Array:
     """Gradient of the cross-entropy of each row."""
     if outputs.shape[1] == 1:
         return (logistic(outputs) - target[:, None]).astype(np.float32)
@@ -148,7 +148,7 @@ def _error(outputs: Array, target: IntArray) -> Array:
     return error.astype(np.float32)
 
 
-def _batches(count: int, epochs: int, rng: np.random.Generator) -> Iterator[IntArray]:
+def _draw_batches(count: int, epochs: int, rng: np.random.Generator) -> Iterator[IntArray]:
     for _ in range(epochs):
         order = rng.permutation(count)
         for start in range(0, count, _BATCH):

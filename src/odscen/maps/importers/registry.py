@@ -93,10 +93,14 @@ def importer_for(content: bytes, file: str) -> MapImporter:
         If none does, with what the file seems to be and what to do; or if several do.
     """
     for kind in SHIPPED:
-        if _detects(importer := kind(), content, file):
+        if _importer_detects(importer := kind(), content, file):
             return importer
     importers = map_importers()
-    found = [one for one in importers.usable.values() if _detects(one, content, file)]
+    found = [
+        importer
+        for importer in importers.usable.values()
+        if _importer_detects(importer, content, file)
+    ]
     if len(found) == 1:
         return found[0]
     if found:
@@ -141,7 +145,7 @@ def import_map(
     progress("converting the file to OpenDRIVE", 0.0)
     try:
         imported = importer.to_opendrive(content, options)
-        xodr, entries = _checked(imported)
+        xodr, entries = _check_imported(imported)
     except (OdscenError, MemoryError, OSError):
         raise
     except Exception as error:  # whatever code from outside may raise
@@ -156,7 +160,7 @@ def import_map(
     return xodr, record
 
 
-def _detects(importer: MapImporter, content: bytes, file: str) -> bool:
+def _importer_detects(importer: MapImporter, content: bytes, file: str) -> bool:
     """Whether an importer takes a file; one that fails at that does not, and hides no other."""
     try:
         return bool(importer.detect(content, file))
@@ -166,7 +170,7 @@ def _detects(importer: MapImporter, content: bytes, file: str) -> bool:
         return False
 
 
-def _checked(imported: ImportedMap) -> tuple[bytes, tuple[ReportEntry, ...]]:
+def _check_imported(imported: ImportedMap) -> tuple[bytes, tuple[ReportEntry, ...]]:
     """The parts of an imported map, of the types that everything else relies on."""
     xodr, rows = imported
     entries = tuple(

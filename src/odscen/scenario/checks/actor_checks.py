@@ -195,15 +195,15 @@ def spawn_problems(subject: Subject) -> tuple[NodePlace | None, tuple[Problem, .
     return (None if found else place), tuple(found)
 
 
-def vias(one: Actor | Flow) -> tuple[str, ...]:
+def vias(actor: Actor | Flow) -> tuple[str, ...]:
     """Nodes that a route leads through; those of flows lead through none."""
-    found: tuple[str, ...] = getattr(one, "via", ())
+    found: tuple[str, ...] = getattr(actor, "via", ())
     return found
 
 
-def legs(one: Actor | Flow) -> Iterator[tuple[str, str | None]]:
+def legs(actor: Actor | Flow) -> Iterator[tuple[str, str | None]]:
     """Yield the pairs of nodes between which a route leads; an open goal is ``None``."""
-    return zip((one.spawn, *vias(one)), (*vias(one), one.goal), strict=True)
+    return zip((actor.spawn, *vias(actor)), (*vias(actor), actor.goal), strict=True)
 
 
 def via_problems(

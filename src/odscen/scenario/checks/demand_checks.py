@@ -80,9 +80,9 @@ def _route_problems(
     if line.goal is not None:
         goal, found = _road_place(region, line.goal, f"{where}.goal", f"line {line.id!r}")
         yield from found
-    if start is None or any(one.stop not in places for one in line.stops):
+    if start is None or any(stop.stop not in places for stop in line.stops):
         return
-    named = [(line.start, start), *((one.stop, places[one.stop]) for one in line.stops)]
+    named = [(line.start, start), *((stop.stop, places[stop.stop]) for stop in line.stops)]
     if goal is not None:
         named.append((str(line.goal), goal))
     for (one, place), (other, further) in pairwise(named):
@@ -162,7 +162,7 @@ def route_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
         where = f"demand.routes.shares[{index}]"
         yield from _end_problems(demand, one, region, where)
         yield from _via_problems(one, region, where)
-    generated = any(one.use == "generate" for one in demand.counts)
+    generated = any(count.use == "generate" for count in demand.counts)
     if demand.routes.by == "travel_time" and generated:
         message = (
             "traffic generated from counts is made beside trips on their quickest routes in free "
@@ -172,12 +172,15 @@ def route_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
 
 
 def _end_problems(
-    demand: Demand, one: SharedRoutes, region: Region, where: str
+    demand: Demand, shared_routes: SharedRoutes, region: Region, where: str
 ) -> Iterator[Problem]:
     known = {str(name) for name in region.graph.segments.ids}
     inside = {str(name) for name in region.segments}
     zones = {zone.id for zone in demand.zones}
-    for field, name in (("origin", one.origin), ("destination", one.destination)):
+    for field, name in (
+        ("origin", shared_routes.origin),
+        ("destination", shared_routes.destination),
+    ):
         if name not in zones and name not in known:
             message = f"{name!r} is neither a zone nor a segment of the map"
             yield error("unknown_zone", f"{where}.{field}", message)
@@ -186,10 +189,10 @@ def _end_problems(
             yield error("zone_outside_roi", f"{where}.{field}", message)
 
 
-def _via_problems(one: SharedRoutes, region: Region, where: str) -> Iterator[Problem]:
+def _via_problems(shared_routes: SharedRoutes, region: Region, where: str) -> Iterator[Problem]:
     known = {str(name) for name in region.graph.segments.ids}
     inside = {str(name) for name in region.segments}
-    for row, (via, _) in enumerate(one.routes):
+    for row, (via, _) in enumerate(shared_routes.routes):
         here = f"{where}.routes[{row}]"
         for name in via:
             if name not in known:
@@ -277,7 +280,7 @@ def _entry_problems(
         message = f"vehicles can enter {part.segment!r} both ways; give its direction"
         yield error("entry_ambiguous", here, message, segments=[part.segment])
     else:
-        known = [one.lane for one in mine[0].lanes]
+        known = [lane.lane for lane in mine[0].lanes]
         for row, lane in enumerate(part.lanes):
             if lane not in known:
                 message = f"lane {lane} is not among those that enter on {part.segment!r}: {known}"
@@ -310,14 +313,14 @@ def _reached_segments(part: VehicleInput, region: Region) -> set[str]:
     rows = {
         int(row)
         for entry in entries_of(part, entries(region))
-        for one in entry_lanes(part, entry)
-        for row in set(lanes.segment[region.router.reachable(one.node)].tolist())
+        for entry_lane in entry_lanes(part, entry)
+        for row in set(lanes.segment[region.router.reachable(entry_lane.node)].tolist())
     }
     return {str(ids[row]) for row in rows}
 
 
 def _list_entries(every: Sequence[Entry]) -> str:
-    names = [f"{one.segment} ({one.direction})" for one in every[:NAMED]]
+    names = [f"{entry.segment} ({entry.direction})" for entry in every[:NAMED]]
     more = len(every) - len(names)
     return ", ".join(names) + (f" and {more} more" if more else "") or "no segment"
 
@@ -333,10 +336,10 @@ def demand_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
     for index, matrix in enumerate(demand.matrices):
         where = f"demand.matrices[{index}]"
         yield from window_problems(scenario, matrix, where)
-        yield from _limited(matrix_problems(demand, matrix, region, where), where)
+        yield from _limit_problems(matrix_problems(demand, matrix, region, where), where)
     for index, counts in enumerate(demand.counts):
         where = f"demand.counts[{index}]"
-        yield from _limited(counts_problems(counts, region, where), where)
+        yield from _limit_problems(counts_problems(counts, region, where), where)
     for index, background in enumerate(demand.background):
         where = f"demand.background[{index}]"
         yield from window_problems(scenario, background, where)
@@ -378,9 +381,11 @@ def counts_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
     found = [*_place_problems(counts, region, where), *_slice_problems(counts, where)]
     yield from found
     if not found:
-        for one in contradictions(counts, region.graph):
-            message = f"{one.begin:g} to {one.end:g} s: {one.message}; not all can be met"
-            segments = dict.fromkeys(n for place in one.places for n in place_segments(place))
+        for contradiction in contradictions(counts, region.graph):
+            message = f"{contradiction.begin:g} to {contradiction.end:g} s: {contradiction.message}; not all can be met"
+            segments = dict.fromkeys(
+                n for place in contradiction.places for n in place_segments(place)
+            )
             yield warning("counts_contradict", where, message, segments=segments)
 
 
@@ -433,7 +438,7 @@ def _place_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
         here, names = f"{where}.rows[{index}][0]", place_segments(place)
         unknown = [name for name in names if name not in known]
         outside = [name for name in names if name not in inside]
-        broken = [pair for pair in pairwise(names) if not _leads(onwards, pair)]
+        broken = [pair for pair in pairwise(names) if not _leads_on(onwards, pair)]
         if unknown:
             message = f"place {place!r} has segment {unknown[0]!r}, which the map does not have"
             yield error("unknown_segment", here, message, segments=unknown)
@@ -446,7 +451,7 @@ def _place_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
             yield error("place_broken", here, message, segments=broken[0])
 
 
-def _leads(onwards: dict[str, set[str]], pair: tuple[str, str]) -> bool:
+def _leads_on(onwards: dict[str, set[str]], pair: tuple[str, str]) -> bool:
     return pair[1] in onwards.get(pair[0], ())
 
 
@@ -474,7 +479,7 @@ def _slice_problems(counts: Counts, where: str) -> Iterator[Problem]:
             yield error("counted_twice", here, message, segments=place_segments(place))
 
 
-def _limited(problems: Iterable[Problem], where: str) -> Iterator[Problem]:
+def _limit_problems(problems: Iterable[Problem], where: str) -> Iterator[Problem]:
     """Yield the first problems of each kind, and how many more there are."""
     seen: Counter[tuple[str, str]] = Counter()
     for problem in problems:

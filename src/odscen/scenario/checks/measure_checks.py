@@ -74,7 +74,7 @@ class PlaceNames:
     def find(self, name: str) -> MeasurePlace | UnknownPlace:
         """Find the nodes of a segment, lane or turn."""
         if PLACE_SEPARATOR in name:
-            return self._turn(name)
+            return self._read_turn(name)
         lanes = self._graph.lanes
         none = np.zeros(len(lanes.x), dtype=np.bool_)
         if name in self._segments:
@@ -93,37 +93,37 @@ class PlaceNames:
         )
         return found
 
-    def _turn(self, name: str) -> MeasurePlace | UnknownPlace:
+    def _read_turn(self, name: str) -> MeasurePlace | UnknownPlace:
         segments = place_segments(name)
-        unknown = tuple(one for one in segments if one not in self._segments)
+        unknown = tuple(segment for segment in segments if segment not in self._segments)
         if unknown:
             message = f"place {name!r} has segment {unknown[0]!r}, which the map does not have"
             return UnknownPlace("unknown_segment", message, unknown)
         own = self._graph.lanes.segment
-        masks = [own == self._segments[one] for one in segments]
-        junctions = [self._graph.segments.kinds[self._segments[one]] for one in segments]
+        masks = [own == self._segments[segment] for segment in segments]
+        junctions = [self._graph.segments.kinds[self._segments[segment]] for segment in segments]
         if junctions[0] == "junction" or junctions[-1] == "junction":
             message = f"turn {name!r} has to begin and end with a road"
             return UnknownPlace("place_broken", message, segments)
-        inside = self._inside(masks)
+        inside = self._nodes_between(masks)
         if inside is None:
             message = f"place {name!r}: no lane leads from {segments[0]!r} into {segments[-1]!r}"
             return UnknownPlace("place_broken", message, segments)
         return MeasurePlace(inside, True, masks[0], masks[-1])
 
-    def _inside(self, masks: list[BoolArray]) -> BoolArray | None:
+    def _nodes_between(self, masks: list[BoolArray]) -> BoolArray | None:
         """Nodes between the first segment and the last; ``None`` if nothing leads there."""
         kinds = np.array([kind == "junction" for kind in self._graph.segments.kinds])
         junction: BoolArray = kinds[self._graph.lanes.segment]
         between = junction if len(masks) == 2 else np.logical_or.reduce(masks[1:-1])
-        ahead = self._spread(masks[0], between, self._source, self._target)
-        behind = self._spread(masks[-1], between, self._target, self._source)
+        ahead = self._spread_within(masks[0], between, self._source, self._target)
+        behind = self._spread_within(masks[-1], between, self._target, self._source)
         found: BoolArray = ahead & behind
         direct = bool((masks[0][self._source] & masks[-1][self._target]).any())
         passed = all(bool(found[mask].any()) for mask in masks[1:-1])
         return found if passed and (found.any() or direct) else None
 
-    def _spread(
+    def _spread_within(
         self, start: BoolArray, inside: BoolArray, source: Int32Array, target: Int32Array
     ) -> BoolArray:
         """Nodes of ``inside`` that are reached from ``start`` without leaving it."""
@@ -153,7 +153,7 @@ def measure_problems(
     if not scenario.measures:
         return
     places = PlaceNames(region.graph)
-    yield from _twice(scenario)
+    yield from _find_repeated_ids(scenario)
     for index, measure in enumerate(scenario.measures):
         where = f"measures[{index}]"
         yield from _time_problems(scenario, measure, where)
@@ -165,10 +165,10 @@ def measure_problems(
     yield from _cut_off(scenario, region, places)
 
 
-def _twice(scenario: Scenario) -> Iterator[Problem]:
+def _find_repeated_ids(scenario: Scenario) -> Iterator[Problem]:
     """Yield ids that two measures have, or a measure and an actor: events name both alike."""
     others = [*scenario.actors, *scenario.flows, *(part for _, part in scenario.demand.parts)]
-    taken = Counter([*(one.id for one in others), *(one.id for one in scenario.measures)])
+    taken = Counter([*(one.id for one in others), *(measure.id for measure in scenario.measures)])
     for index, measure in enumerate(scenario.measures):
         if taken[measure.id] > 1:
             message = f"id {measure.id!r} is taken {taken[measure.id]} times; give each its own"
@@ -223,7 +223,7 @@ def _outage_problems(
     here = f"{where}.junction"
     light = find_light(lights, measure.junction)
     if light is None:
-        names = ", ".join(sorted(one.names[0] for one in lights)[:10]) or "none"
+        names = ", ".join(sorted(light.names[0] for light in lights)[:10]) or "none"
         message = f"there is no traffic light in junction {measure.junction!r}; there are {names}"
         yield error("unknown_light", here, message)
         return
@@ -232,17 +232,17 @@ def _outage_problems(
             message = f"the light of {measure.junction!r} has plans of the day; take them out first"
             yield error("outage_with_plans", here, message)
     same = [
-        one
-        for one in scenario.measures
-        if isinstance(one, SignalOutage) and one.junction in light.names
+        measure
+        for measure in scenario.measures
+        if isinstance(measure, SignalOutage) and measure.junction in light.names
     ]
     for other in same[: same.index(measure)]:
-        if _overlap(measure, other):
+        if _times_overlap(measure, other):
             message = f"{measure.id!r} and {other.id!r} switch one light at the same time"
             yield error("light_twice", here, message)
 
 
-def _overlap(one: Measure, other: Measure) -> bool:
+def _times_overlap(one: Measure, other: Measure) -> bool:
     ends = (float("inf") if each.end is None else each.end for each in (one, other))
     return max(one.begin, other.begin) < min(ends)
 
@@ -252,10 +252,10 @@ def _cut_off(scenario: Scenario, region: Region, places: PlaceNames) -> Iterator
     asked = _routes_when_closed(scenario, region, places)
     stranded: dict[int, tuple[Measure, ...]] = {}
     for mask, routes in asked.values():
-        stranded |= {one.actor: one.closing for one in _without_way(region, mask, routes)}
+        stranded |= {route.actor: route.closing for route in _without_way(region, mask, routes)}
     for index, closing in sorted(stranded.items()):
         actor = scenario.actors[index]
-        names = ", ".join(repr(one.id) for one in closing)
+        names = ", ".join(repr(measure.id) for measure in closing)
         message = (
             f"{actor.id!r} departs at {actor.depart:g} s, when {names} has closed every route "
             "to its goal; it will be stranded"
@@ -283,7 +283,7 @@ def _routes_when_closed(
         rows = tuple(
             row
             for row, one in enumerate(scenario.measures)
-            if _stops(one, actor.category, actor.depart)
+            if _stops_category(one, actor.category, actor.depart)
         )
         spawn = region.place(actor.spawn)
         goal = None if actor.goal is None else region.place(actor.goal)
@@ -299,25 +299,33 @@ def _routes_when_closed(
             mask = region.lanes & (~closed | (segments == own if own is not None else False))
             open_to[rows, own] = mask.tobytes(), mask
         name, mask = open_to[rows, own]
-        nodes = (spawn.node, *(p.node for one in actor.via if (p := region.place(one))), goal.node)
+        nodes = (
+            spawn.node,
+            *(p.node for name in actor.via if (p := region.place(name))),
+            goal.node,
+        )
         found.setdefault(name, (mask, []))[1].append(_Route(index, nodes, closing))
     return found
 
 
 def _without_way(region: Region, mask: BoolArray, routes: Sequence[_Route]) -> Iterator[_Route]:
     """Yield the routes of which a part does not lead on over the nodes of the mask."""
-    open_routes = [one for one in routes if mask[list(one.nodes)].all()]
-    pairs = [(pair, one.actor) for one in open_routes for pair in pairwise(one.nodes)]
+    open_routes = [route for route in routes if mask[list(route.nodes)].all()]
+    pairs = [
+        (pair, open_route.actor)
+        for open_route in open_routes
+        for pair in pairwise(open_route.nodes)
+    ]
     broken: set[int] = set()
     if pairs:
         nodes = np.array([pair for pair, _ in pairs], dtype=np.int32)
         leads = Router(region.graph, mask).leads(nodes[:, 0], nodes[:, 1])
         broken = {index for (_, index), way in zip(pairs, leads, strict=True) if not way}
-    whole = {one.actor for one in open_routes} - broken
-    yield from (one for one in routes if one.actor not in whole)
+    whole = {open_route.actor for open_route in open_routes} - broken
+    yield from (route for route in routes if route.actor not in whole)
 
 
-def _stops(measure: Measure, category: Category, time: float) -> bool:
+def _stops_category(measure: Measure, category: Category, time: float) -> bool:
     if not closed_places(measure) or not measure.begin <= time:
         return False
     return (measure.end is None or time < measure.end) and category in banned_by(measure)

@@ -46,14 +46,14 @@ def rule_problems(
             first = ids.index(rule.id)
             message = f"id {rule.id!r} is taken by rules[{first}].id; give one of them another"
             yield error("duplicate_id", f"{where}.id", message)
-        yield from _actor(rule.actor, f"{where}.actor", known, flows)
+        yield from _check_actor_name(rule.actor, f"{where}.actor", known, flows)
         for part in rule_parts(rule, where):
-            yield from _part(part, rule, known, flows, ids, region)
-            yield from _signal(part, lights)
+            yield from _check_part(part, rule, known, flows, ids, region)
+            yield from _check_signal(part, lights)
     yield from _at_once(scenario)
 
 
-def _part(
+def _check_part(
     found: RulePart,
     rule: StoryRule,
     known: Mapping[str, Category],
@@ -63,15 +63,15 @@ def _part(
 ) -> Iterator[Problem]:
     where, kind, part = found
     for name, actor in actors_of(part):
-        yield from _actor(actor, f"{where}.{name}", known, flows)
+        yield from _check_actor_name(actor, f"{where}.{name}", known, flows)
     for name, place in places_of(part):
         if isinstance(place, str) and region.place(place) is None:
             message = f"the map has no node {place!r}; pick one"
             yield error("unknown_place", f"{where}.{name}", message, nodes=[place])
     if kind == "own":
-        yield from _own(found)
+        yield from _check_package_kind(found)
     if kind == "rule" and (other := getattr(part, "id", None)) not in ids:
-        message = f"there is no rule {other!r}; there are {_listed(ids)}"
+        message = f"there is no rule {other!r}; there are {_list_names(ids)}"
         yield error("unknown_rule", f"{where}.id", message)
     category, action = known.get(rule.actor), ACTIONS.get(kind)
     if ".then[" in where and action is not None and category is not None:
@@ -80,13 +80,13 @@ def _part(
             who = "pedestrians" if action.persons_only else "vehicles"
             message = f"{kind!r} is for {who}; {rule.actor!r} is a {category}"
             yield error("action_not_possible", where, message)
-        yield from _goal(found, rule.actor, region, on_foot=on_foot)
+        yield from _check_goal(found, rule.actor, region, on_foot=on_foot)
     if kind == "appear" and ".then[" in where and rule.actor not in known:
         message = f"{rule.actor!r} is of a flow, which says when it departs; let an actor appear"
         yield error("action_not_possible", where, message)
 
 
-def _own(found: RulePart) -> Iterator[Problem]:
+def _check_package_kind(found: RulePart) -> Iterator[Problem]:
     """Yield that no installed package gives a kind, or what it finds wrong with its values."""
     name = str(getattr(found.part, "kind", ""))
     acts = ".then[" in found.where
@@ -98,13 +98,13 @@ def _own(found: RulePart) -> Iterator[Problem]:
         return
     if kind is None:
         names = own_actions() if acts else own_conditions()
-        message = f"no installed package gives {name!r}; there are {_listed(names)}"
+        message = f"no installed package gives {name!r}; there are {_list_names(names)}"
         yield error("own_kind", f"{found.where}.kind", message)
     elif wrong is not None:
         yield error("own_kind", found.where, f"{name!r}: {wrong}")
 
 
-def _goal(found: RulePart, actor: str, region: Region, *, on_foot: bool) -> Iterator[Problem]:
+def _check_goal(found: RulePart, actor: str, region: Region, *, on_foot: bool) -> Iterator[Problem]:
     """Yield that a new goal is not where the actor can go."""
     node = getattr(found.part, "to", None)
     place = region.place(node) if found.kind == "goal" and isinstance(node, str) else None
@@ -114,29 +114,29 @@ def _goal(found: RulePart, actor: str, region: Region, *, on_foot: bool) -> Iter
         yield error("action_not_possible", f"{found.where}.to", message, nodes=[str(node)])
 
 
-def _actor(
+def _check_actor_name(
     name: str, where: str, known: Mapping[str, Category], flows: set[str]
 ) -> Iterator[Problem]:
     flow, _, number = name.rpartition(".")
     if name in known or (flow in flows and number.isdigit()):
         return
-    message = f"there is no actor {name!r}; there are {_listed(sorted(known))}"
+    message = f"there is no actor {name!r}; there are {_list_names(sorted(known))}"
     yield error("unknown_actor", where, message)
 
 
-def _signal(found: RulePart, lights: Sequence[Light] | None) -> Iterator[Problem]:
+def _check_signal(found: RulePart, lights: Sequence[Light] | None) -> Iterator[Problem]:
     where, kind, part = found
     if kind != "signal" or lights is None:
         return
     name, movement = getattr(part, "light", ""), getattr(part, "movement", "")
     light = find_light(lights, name)
     if light is None:
-        names = [one.names[0] for one in lights if one.names]
-        message = f"the map has no traffic light {name!r}; there are {_listed(names)}"
+        names = [light.names[0] for light in lights if light.names]
+        message = f"the map has no traffic light {name!r}; there are {_list_names(names)}"
         yield error("unknown_light", f"{where}.light", message)
     elif movement is not None and not find_movements(movement, light.movements):
         names = list(known_names(light.movements))
-        message = f"light {name!r} has no movement {movement!r}; there are {_listed(names)}"
+        message = f"light {name!r} has no movement {movement!r}; there are {_list_names(names)}"
         yield error("unknown_movement", f"{where}.movement", message)
 
 
@@ -147,9 +147,9 @@ def _at_once(scenario: Scenario) -> Iterator[Problem]:
         of_actor[rule.actor].append((index, rule))
     for rules in of_actor.values():
         for (_, one), (index, other) in combinations(rules, 2):
-            if _waits(other, one) or _waits(one, other):
+            if _waits_for_rule(other, one) or _waits_for_rule(one, other):
                 continue
-            first, second = _takes(one), _takes(other)
+            first, second = _kinds_taken(one), _kinds_taken(other)
             if any(first & these and second & these for these in (_SPEED, _PLACE)):
                 message = (
                     f"rules {one.id!r} and {other.id!r} both move {one.actor!r}; if they do so at "
@@ -159,15 +159,15 @@ def _at_once(scenario: Scenario) -> Iterator[Problem]:
                 yield warning("rules_at_once", f"rules[{index}]", message)
 
 
-def _takes(rule: StoryRule) -> set[str]:
-    return {one.kind for item in rule.then for one in item.parts}
+def _kinds_taken(rule: StoryRule) -> set[str]:
+    return {part.kind for item in rule.then for part in item.parts}
 
 
-def _waits(rule: StoryRule, other: StoryRule) -> bool:
+def _waits_for_rule(rule: StoryRule, other: StoryRule) -> bool:
     parts = (part for _, kind, part in rule_parts(rule, "") if kind == "rule")
     return any(getattr(part, "id", None) == other.id for part in parts)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     shown = ", ".join(names[:_LISTED]) or "none"
     return shown if len(names) <= _LISTED else f"{shown}, ..."

@@ -97,9 +97,9 @@ def start_overlaps(
     Takes time in proportion to the actors and to what is found, however many start at one place.
     """
     found = 0
-    for index, others in _overlapping(scenario, region, assets):
+    for index, others in _find_overlapping(scenario, region, assets):
         actor = scenario.actors[index]
-        for other in (scenario.actors[one] for one in others[: MOST - found]):
+        for other in (scenario.actors[number] for number in others[: MOST - found]):
             yield error(
                 "bodies_overlap",
                 f"actors[{index}].spawn",
@@ -112,7 +112,7 @@ def start_overlaps(
             return
 
 
-def _overlapping(
+def _find_overlapping(
     scenario: Scenario, region: Region, assets: AssetLookup | None
 ) -> Iterator[tuple[int, list[int]]]:
     """Each actor with those before it in the document that it overlaps."""
@@ -134,13 +134,13 @@ def _overlapping(
             for window in (own - 1, own, own + 1)
             if window in windows
             for other in windows[window].beside(actor.spawn, boxes[start])
-            if _together(actor, scenario.actors[other])
+            if _depart_together(actor, scenario.actors[other])
         ]
         yield index, sorted(near)
         windows.setdefault(own, _Window(Crowd(reach), {}, [], [])).add(start, boxes[start], index)
 
 
-def _together(one: Actor, other: Actor) -> bool:
+def _depart_together(one: Actor, other: Actor) -> bool:
     return abs(one.depart - other.depart) < SAME_TIME
 
 

@@ -71,12 +71,12 @@ def _name_problems(timing: JunctionTiming, light: Light, where: str) -> Iterator
     groups = {group.id for group in timing.groups}
     stages = {stage.id for stage in timing.stages}
     for index, stage in enumerate(timing.stages):
-        yield from _unknown("group", stage.groups, groups, f"{where}.stages[{index}]")
+        yield from _find_unknown("group", stage.groups, groups, f"{where}.stages[{index}]")
     for index, row in enumerate(timing.intergreens):
-        yield from _unknown("group", row[:2], groups, f"{where}.intergreens[{index}]")
+        yield from _find_unknown("group", row[:2], groups, f"{where}.intergreens[{index}]")
     for index, plan in enumerate(timing.plans):
         named = (*plan.stages, *plan.green, *plan.min_green, *plan.max_green)
-        yield from _unknown("stage", dict.fromkeys(named), stages, f"{where}.plans[{index}]")
+        yield from _find_unknown("stage", dict.fromkeys(named), stages, f"{where}.plans[{index}]")
         shown = [s for s in timing.stages if s.id in (plan.stages or stages)]
         yield from _without_green(groups, shown, f"{where}.plans[{index}].stages")
     if not timing.plans and timing.stages:
@@ -92,7 +92,7 @@ def _without_green(
         yield error("movement_without_green", where, message)
 
 
-def _unknown(
+def _find_unknown(
     kind: str, names: Iterable[str], known: Iterable[str], where: str
 ) -> Iterator[Problem]:
     for name in names:
@@ -123,7 +123,7 @@ def _movement_problems(timing: JunctionTiming, light: Light, where: str) -> Iter
                     yield error("movement_twice", place, message)
     missing = [one for n, one in enumerate(light.movements) if one.turn and n not in owner]
     if missing:
-        listed = ", ".join(dict.fromkeys(one.exact_name for one in missing))
+        listed = ", ".join(dict.fromkeys(movement.exact_name for movement in missing))
         message = f"no group has {listed}; they would never have green"
         yield error("movement_without_green", f"{where}.groups", message)
 
@@ -137,14 +137,14 @@ def _conflict_problems(
         for meeting in program.light.meetings:
             pair = program.group_of[meeting.one], program.group_of[meeting.other]
             if set(pair) <= stage.groups and pair not in told:
-                message = _conflict(program, stage, meeting)
+                message = _find_conflict(program, stage, meeting)
                 if message:
                     told.add(pair)
                     place = f"{where}.stages[{order[stage.id]}]"
                     yield error("conflicting_greens", place, message)
 
 
-def _conflict(program: DesignedProgram, stage: PlannedStage, meeting: Meeting) -> str | None:
+def _find_conflict(program: DesignedProgram, stage: PlannedStage, meeting: Meeting) -> str | None:
     """Why two movements that meet may not both have green in a stage, if they may not."""
     one, other = (
         f"{program.light.movements[n].name} (group {program.group_of[n]!r})"
@@ -164,11 +164,11 @@ def _conflict(program: DesignedProgram, stage: PlannedStage, meeting: Meeting) -
 
 def _intergreen_problems(program: DesignedProgram, where: str) -> Iterator[Problem]:
     follows = {
-        (one, other)
+        (group, other)
         for stages in (plan.stages for plan in program.plans())
         for stage in stages
         for following in stages
-        for one in stage.groups - following.groups
+        for group in stage.groups - following.groups
         for other in beginning_groups(stage, following)
     }
     rows = {row[:2]: n for n, row in enumerate(program.timing.intergreens)}
@@ -238,20 +238,20 @@ def _shortest_green(
 
     Stages on call may be left out, but those in which it has no other green.
     """
-    if all(group in one.groups for one in stages):
+    if all(group in stage.groups for stage in stages):
         return None
     begin = next((n for n, one in enumerate(stages) if group not in one.groups), 0)
     turned = (*stages[begin:], *stages[:begin])
     actuated = program.control == "actuated"
     found: list[tuple[float, tuple[str, ...]]] = []
-    for has, same in groupby(turned, lambda one: group in one.groups):
+    for has, same in groupby(turned, lambda stage: group in stage.groups):
         if not has:
             continue
         run = list(same)
-        sure = [one for one in run if not one.on_call]
-        for chain in [sure] if sure else [[one] for one in run]:
-            seconds = sum(one.least if actuated else one.green for one in chain)
-            found.append((seconds, tuple(one.id for one in chain)))
+        sure = [stage for stage in run if not stage.on_call]
+        for chain in [sure] if sure else [[stage] for stage in run]:
+            seconds = sum(stage.least if actuated else stage.green for stage in chain)
+            found.append((seconds, tuple(stage.id for stage in chain)))
     return min(found, default=None)
 
 
@@ -276,9 +276,11 @@ def _detector_problems(
 ) -> Iterator[Problem]:
     for index, detector in enumerate(timing.detectors):
         place = f"{where}.detectors[{index}]"
-        yield from _unknown("stage", detector.stages, stages, f"{place}.stages")
+        yield from _find_unknown("stage", detector.stages, stages, f"{place}.stages")
         if light.movements and not detector_movements(detector.at, light.movements):
-            ends = dict.fromkeys(one.approach for one in light.movements if one.drive)
+            ends = dict.fromkeys(
+                movement.approach for movement in light.movements if movement.drive
+            )
             message = (
                 f"no approach or lane before this light is called {detector.at!r}; approaches are "
                 f"{', '.join(ends)}"
@@ -310,7 +312,7 @@ def signal_problems(
         where = f"signals.junctions[{index}]"
         light = find_light(lights, timing.junction)
         if light is None:
-            message = f"there is no traffic light in junction {timing.junction!r}; {_known(lights)}"
+            message = f"there is no traffic light in junction {timing.junction!r}; {_describe_known_lights(lights)}"
             yield error("unknown_light", f"{where}.junction", message)
             continue
         if light.names in timed:
@@ -387,7 +389,7 @@ def _coordination_problems(signals: Signals) -> Iterator[Problem]:
                 yield error("cycles_of_coordination", f"{where}.cycle", message)
 
 
-def _known(lights: Sequence[Light]) -> str:
+def _describe_known_lights(lights: Sequence[Light]) -> str:
     names = [name for light in lights for name in light.names]
     if not names:
         return "the map has no traffic lights"

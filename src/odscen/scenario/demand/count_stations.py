@@ -163,7 +163,10 @@ def contradictions(counts: Counts, graph: MapGraph) -> Iterator[Contradiction]:
     for place, begin, end, number in counts.rows:
         slices[begin, end][place_segments(place)] = number
     for (begin, end), counted in sorted(slices.items()):
-        found = [*_flows(counted, onwards, before), *_balances(counted, graph, onwards, before)]
+        found = [
+            *_compare_flows(counted, onwards, before),
+            *_compare_balances(counted, graph, onwards, before),
+        ]
         for places, message in found:
             yield Contradiction(counts.id, places, begin, end, message)
 
@@ -171,7 +174,7 @@ def contradictions(counts: Counts, graph: MapGraph) -> Iterator[Contradiction]:
 _Found = tuple[tuple[str, ...], str]
 
 
-def _flows(
+def _compare_flows(
     counted: Mapping[tuple[str, ...], float],
     onwards: Mapping[str, set[str]],
     before: Mapping[str, set[str]],
@@ -186,17 +189,17 @@ def _flows(
         every_in = before.get(flow[0], set()) <= {turn[0] for turn in into} | {flow[1]}
         for some, every, word in ((out, every_out, "continue"), (into, every_in, "come")):
             total = sum(counted[turn] for turn in some)
-            apart = _apart(total, number)
+            apart = _counts_differ(total, number)
             if some and apart and (total > number or every):
-                name = _name(flow)
+                name = _name_flow(flow)
                 yield (
-                    (name, *map(_name, some)),
+                    (name, *map(_name_flow, some)),
                     f"{number:g} were counted at {name}, but the turns by which they {word} add "
                     f"up to {total:g}",
                 )
 
 
-def _balances(
+def _compare_balances(
     counted: Mapping[tuple[str, ...], float],
     graph: MapGraph,
     onwards: Mapping[str, set[str]],
@@ -206,21 +209,21 @@ def _balances(
         if kind != "junction":
             continue
         entries = [(one, str(name)) for one in sorted(before.get(name, ()))]
-        exits = [(str(name), one) for one in sorted(onwards.get(name, ()))]
+        exits = [(str(name), onward) for onward in sorted(onwards.get(name, ()))]
         if not entries or not exits or not all(pair in counted for pair in (*entries, *exits)):
             continue
         coming = sum(counted[pair] for pair in entries)
         leaving = sum(counted[pair] for pair in exits)
-        if _apart(coming, leaving):
+        if _counts_differ(coming, leaving):
             yield (
-                tuple(map(_name, (*entries, *exits))),
+                tuple(map(_name_flow, (*entries, *exits))),
                 f"{coming:g} were counted on all entries of {name}, but {leaving:g} on all exits",
             )
 
 
-def _name(segments: Sequence[str]) -> str:
+def _name_flow(segments: Sequence[str]) -> str:
     return ">".join(segments)
 
 
-def _apart(one: float, other: float) -> bool:
+def _counts_differ(one: float, other: float) -> bool:
     return abs(one - other) > SLACK_VEHICLES and geh(one, other, 3600.0) > SLACK_GEH

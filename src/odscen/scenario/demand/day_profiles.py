@@ -50,11 +50,11 @@ class Curve:
         held = [share if share > sum(shares) * _LEAST_SHARE else 0.0 for share in shares]
         self._sums = np.concatenate([[0.0], np.cumsum(held)]) * (DAY / sum(held))
         self._clock = clock
-        self._before = float(self._integral(np.array(clock)))
+        self._before = float(self._integrate_to(np.array(clock)))
 
     def amount(self, time: float) -> float:
         """Integral of the factor from the start of the run to ``time``, seconds."""
-        return float(self._integral(np.array(self._clock + time))) - self._before
+        return float(self._integrate_to(np.array(self._clock + time))) - self._before
 
     def times(self, amounts: FloatArray) -> FloatArray:
         """Inverse of :meth:`amount`, for many at once."""
@@ -77,7 +77,7 @@ class Curve:
             return begin + uniform * (end - begin)
         return np.clip(self.times(low + uniform * (high - low)), begin, end)
 
-    def _integral(self, time_of_day: FloatArray) -> FloatArray:
+    def _integrate_to(self, time_of_day: FloatArray) -> FloatArray:
         days, rest = np.divmod(time_of_day, DAY)
         integral: FloatArray = days * DAY + np.interp(rest, self._times, self._sums)
         return integral

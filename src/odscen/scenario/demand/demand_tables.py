@@ -85,14 +85,14 @@ def read_matrix(text: str, *, clock: float = 0.0) -> dict[TimeSlice | None, Rows
     InputError
         With the line and the value that cannot be used.
     """
-    if square := _square(text):
-        return {None: _rows(square)}
+    if square := _read_square_matrix(text):
+        return {None: _split_rows(square)}
     found: dict[TimeSlice | None, list[tuple[MatrixTrip, int]]] = {}
-    for line in _lines(text, COLUMNS["od"], ("begin", "end")):
+    for line in _read_lines(text, COLUMNS["od"], ("begin", "end")):
         slice_ = line.slice(clock) if line.has("begin") else None
         trip = line["from"], line["to"], line.number("trips")
         found.setdefault(slice_, []).append((trip, line.line))
-    return {slice_: _rows(pairs) for slice_, pairs in found.items()}
+    return {slice_: _split_rows(pairs) for slice_, pairs in found.items()}
 
 
 def read_counts(text: str, *, clock: float = 0.0) -> Rows[CountRow]:
@@ -106,15 +106,15 @@ def read_counts(text: str, *, clock: float = 0.0) -> Rows[CountRow]:
     InputError
         With the line and the value that cannot be used.
     """
-    if wide := _wide(text, ("place",), clock):
-        return _rows(
+    if wide := _read_wide_table(text, ("place",), clock):
+        return _split_rows(
             ((line["place"].replace(" ", ""), *slice_, line.number(column)), line.line)
             for line in wide.lines
             for column, slice_ in wide.slices
         )
-    return _rows(
+    return _split_rows(
         ((line["place"].replace(" ", ""), *line.slice(clock), line.number("count")), line.line)
-        for line in _lines(text, COLUMNS["counts"])
+        for line in _read_lines(text, COLUMNS["counts"])
     )
 
 
@@ -129,7 +129,7 @@ def read_inputs(text: str, *, clock: float = 0.0) -> tuple[InputRow, ...]:
         With the line and the value that cannot be used.
     """
     names = ("segment", "direction")
-    wide = _wide(text, names, clock) or _wide(text, names[:1], clock)
+    wide = _read_wide_table(text, names, clock) or _read_wide_table(text, names[:1], clock)
     if wide is None:
         raise InputError(
             "the columns needed are segment [, direction] and the begins of slices of time",
@@ -159,7 +159,7 @@ def read_profile(text: str) -> tuple[float, ...]:
     InputError
         With the line and the value that cannot be used.
     """
-    lines = list(_lines(text, COLUMNS["profile"], ("time",)))
+    lines = list(_read_lines(text, COLUMNS["profile"], ("time",)))
     for index, line in enumerate(lines):
         due = index * DAY / len(lines)
         if line.has("time") and abs(line.time("time", 0.0) - due) > 1.0:
@@ -180,19 +180,19 @@ def read_zones(text: str) -> dict[str, Rows[str]]:
         With the line and the value that cannot be used.
     """
     found: dict[str, list[tuple[str, int]]] = {}
-    for line in _lines(text, ("zone", *COLUMNS["zones"])):
+    for line in _read_lines(text, ("zone", *COLUMNS["zones"])):
         found.setdefault(line.name("zone"), []).append((line["segment"], line.line))
-    return {zone: _rows(pairs) for zone, pairs in found.items()}
+    return {zone: _split_rows(pairs) for zone, pairs in found.items()}
 
 
-def _rows(pairs: Iterable[tuple[_Row, int]]) -> Rows[_Row]:
+def _split_rows(pairs: Iterable[tuple[_Row, int]]) -> Rows[_Row]:
     values, lines = zip(*pairs, strict=True)
     return Rows(values, lines)
 
 
-def _square(text: str) -> list[tuple[MatrixTrip, int]]:
+def _read_square_matrix(text: str) -> list[tuple[MatrixTrip, int]]:
     """Rows of a square origin-destination table with their lines; empty if it is none."""
-    columns, lines = _table(text, exact=True)
+    columns, lines = _read_csv_table(text, exact=True)
     if not columns:
         return []
     corner, *ends = columns
@@ -207,9 +207,9 @@ def _square(text: str) -> list[tuple[MatrixTrip, int]]:
     return [row for row in rows if row[0][2] > 0]
 
 
-def _wide(text: str, names: Sequence[str], clock: float) -> _WideTable | None:
+def _read_wide_table(text: str, names: Sequence[str], clock: float) -> _WideTable | None:
     """Read a table with these columns, and times as titles of all others; ``None`` if it is not."""
-    columns, lines = _table(text)
+    columns, lines = _read_csv_table(text)
     titles = columns[len(names) :]
     if tuple(columns[: len(names)]) != tuple(names) or len(titles) < 2:
         return None
@@ -297,9 +297,11 @@ def _csv_rows(reader: _csv.Reader) -> Iterator[list[str]]:
         ) from error
 
 
-def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_TableLine]:
+def _read_lines(
+    text: str, needed: Sequence[str], optional: Sequence[str] = ()
+) -> Iterator[_TableLine]:
     """Yield the lines of a table with these columns."""
-    columns, rows = _table(text)
+    columns, rows = _read_csv_table(text)
     missing = [name for name in needed if name not in columns]
     unknown = [name for name in columns if name not in (*needed, *optional)]
     given = [name for name in optional if name in columns]
@@ -310,7 +312,7 @@ def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> It
     yield from rows
 
 
-def _table(text: str, *, exact: bool = False) -> tuple[list[str], Iterator[_TableLine]]:
+def _read_csv_table(text: str, *, exact: bool = False) -> tuple[list[str], Iterator[_TableLine]]:
     """Columns and lines of a CSV file; comma, semicolon or tab, as its first line shows.
 
     Names of columns are in small letters, unless they are to be ``exact``.

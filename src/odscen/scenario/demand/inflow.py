@@ -68,7 +68,7 @@ def entries(region: Region) -> tuple[Entry, ...]:
     found: dict[tuple[int, bool], list[EntryLane]] = defaultdict(list)
     for group in _first_nodes(region).values():
         for node in group:
-            if _alone(region, node, group):
+            if _begin_alone(region, node, group):
                 row = int(lanes.lane[node])
                 key = int(lanes.segment[node]), bool(lanes.lanes.forward[row])
                 found[key].append(EntryLane(lanes.lanes.keys[row].lane, node))
@@ -76,7 +76,7 @@ def entries(region: Region) -> tuple[Entry, ...]:
         Entry(
             str(ids[segment]),
             "forward" if forward else "backward",
-            tuple(sorted(found[segment, forward], key=lambda one: -abs(one.lane))),
+            tuple(sorted(found[segment, forward], key=lambda lane: -abs(lane.lane))),
         )
         for segment, forward in sorted(found, key=lambda key: (key[0], not key[1]))
     )
@@ -95,7 +95,7 @@ def entry_lanes(part: VehicleInput, entry: Entry) -> tuple[EntryLane, ...]:
     """Lanes of an entry that an input uses, from the outer edge of the road inwards."""
     if not part.lanes:
         return entry.lanes
-    return tuple(one for one in entry.lanes if one.lane in part.lanes)
+    return tuple(lane for lane in entry.lanes if lane.lane in part.lanes)
 
 
 def _first_nodes(region: Region) -> dict[tuple[int, bool], list[int]]:
@@ -119,18 +119,18 @@ def _first_nodes(region: Region) -> dict[tuple[int, bool], list[int]]:
     return found
 
 
-def _alone(region: Region, node: int, firsts: Sequence[int]) -> bool:
+def _begin_alone(region: Region, node: int, firsts: Sequence[int]) -> bool:
     """Whether all lanes beside a first node begin there, too."""
     lanes = region.graph.lanes
     near = 1.5 * lanes.spacing
     begin = {int(lanes.lane[n]) for n in firsts if abs(lanes.s[n] - lanes.s[node]) <= near}
     return all(
-        row in begin or not _passes(region, row, float(lanes.s[node]), near)
-        for row in _beside(region, int(lanes.lane[node]))
+        row in begin or not _lane_passes(region, row, float(lanes.s[node]), near)
+        for row in _lanes_beside(region, int(lanes.lane[node]))
     )
 
 
-def _beside(region: Region, row: int) -> Iterable[int]:
+def _lanes_beside(region: Region, row: int) -> Iterable[int]:
     """Rows of the lanes of the same section and direction."""
     lanes = region.graph.lanes.lanes
     own = lanes.keys[row]
@@ -142,7 +142,7 @@ def _beside(region: Region, row: int) -> Iterable[int]:
             other += step
 
 
-def _passes(region: Region, row: int, s: float, near: float) -> bool:
+def _lane_passes(region: Region, row: int, s: float, near: float) -> bool:
     """Whether a lane has a node of the region near ``s``."""
     lanes = region.graph.lanes
     nodes = slice(int(lanes.lanes.first_node[row]), int(lanes.lanes.first_node[row + 1]))
@@ -183,12 +183,12 @@ def input_trips(scenario: Scenario, ground: TripEnds, part: VehicleInput) -> Ite
     :data:`LEAST_HEADWAY`.
     """
     lanes = _depart_lanes(ground, part)
-    for number, piece in enumerate(_slices(scenario, part)):
+    for number, piece in enumerate(_slice_input(scenario, part)):
         rng = stream(scenario.seed, "input", part.id, str(number))
-        yield _drawn(scenario, ground, part, piece, lanes, rng, name=f"{part.id}.{number}")
+        yield _draw_trips(scenario, ground, part, piece, lanes, rng, name=f"{part.id}.{number}")
 
 
-def _slices(scenario: Scenario, part: VehicleInput) -> Iterator[_Slice]:
+def _slice_input(scenario: Scenario, part: VehicleInput) -> Iterator[_Slice]:
     """Whole slices, whenever the run ends: a shorter one has the same vehicles up to its end."""
     begin, end = window(scenario, part)
     day = curve(scenario.demand, part.profile)
@@ -210,15 +210,17 @@ def _depart_lanes(ground: TripEnds, part: VehicleInput) -> dict[Category, Int32A
     for category in part.mix:
         starts = ground.starts(category)
         nodes: list[int] = []
-        for one in entry_lanes(part, mine[0]) if mine else ():
-            here = starts[(lanes.lane[starts] == lanes.lane[one.node]) & (starts >= one.node)]
+        for entry_lane in entry_lanes(part, mine[0]) if mine else ():
+            here = starts[
+                (lanes.lane[starts] == lanes.lane[entry_lane.node]) & (starts >= entry_lane.node)
+            ]
             nodes += here[:1].tolist()
         outermost = nodes[:1] if category in SLOW else nodes
         found[category] = np.array(outermost, dtype=np.int32)
     return found
 
 
-def _drawn(
+def _draw_trips(
     scenario: Scenario,
     ground: TripEnds,
     part: VehicleInput,
@@ -230,9 +232,9 @@ def _drawn(
 ) -> Trips:
     count = int(piece.number) + int(rng.random() < piece.number % 1.0)
     categories = drawn_categories(part.mix, rng.random(count))
-    starts = _dealt(categories, lanes, rng)
-    departs = _spread(starts, piece, rng)
-    goals = _goals(scenario, ground, part, categories, starts, rng.random(count))
+    starts = _deal_starts(categories, lanes, rng)
+    departs = _spread_departures(starts, piece, rng)
+    goals = _draw_goals(scenario, ground, part, categories, starts, rng.random(count))
     in_time = departs < window(scenario, part)[1]
     met = np.flatnonzero((goals >= 0) & in_time)
     order = met[np.lexsort((met, departs[met]))]
@@ -250,7 +252,7 @@ def _drawn(
     )
 
 
-def _dealt(
+def _deal_starts(
     categories: Sequence[Category],
     lanes: dict[Category, Int32Array],
     rng: np.random.Generator,
@@ -270,7 +272,7 @@ def _dealt(
     return starts
 
 
-def _spread(starts: Int32Array, piece: _Slice, rng: np.random.Generator) -> FloatArray:
+def _spread_departures(starts: Int32Array, piece: _Slice, rng: np.random.Generator) -> FloatArray:
     """Departures in a slice, lane by lane: random, with a least headway."""
     departs = np.zeros(len(starts))
     length = piece.end - piece.begin
@@ -282,7 +284,7 @@ def _spread(starts: Int32Array, piece: _Slice, rng: np.random.Generator) -> Floa
     return np.maximum(np.round(departs, 2), FIRST)
 
 
-def _goals(
+def _draw_goals(
     scenario: Scenario,
     ground: TripEnds,
     part: VehicleInput,
@@ -292,12 +294,12 @@ def _goals(
 ) -> Int32Array:
     """Goal of each vehicle: an end of the region, or of the input's destinations; else -1."""
     goals = np.full(len(starts), -1, dtype=np.int32)
-    kinds = np.array([list(Category).index(one) for one in categories], dtype=np.intp)
+    kinds = np.array([list(Category).index(category) for category in categories], dtype=np.intp)
     for start in np.unique(starts[starts >= 0]).tolist():
         reached = ground.router.reachable(start)
         for kind in np.unique(kinds[starts == start]).tolist():
             mine = (starts == start) & (kinds == kind)
-            ends = _ends(scenario, ground, part, list(Category)[kind], start)
+            ends = _possible_ends(scenario, ground, part, list(Category)[kind], start)
             shares = np.where(reached[ends.nodes] & (ends.nodes != start), ends.shares, 0.0)
             sums = np.cumsum(shares)
             if len(sums) and sums[-1] > 0:
@@ -306,7 +308,7 @@ def _goals(
     return goals
 
 
-def _ends(
+def _possible_ends(
     scenario: Scenario, ground: TripEnds, part: VehicleInput, category: Category, start: int
 ) -> _Ends:
     if not part.to:

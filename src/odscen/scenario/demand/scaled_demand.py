@@ -25,7 +25,7 @@ _MINUTE = 60.0
 
 def scalable(demand: Demand) -> list[str]:
     """Names of the demand whose amount is a choice: matrices and background traffic."""
-    return [part.id for part in _parts(demand)]
+    return [part.id for part in _demand_parts(demand)]
 
 
 def scaled(demand: Demand, factor: float, *, only: str | None = None) -> Demand:
@@ -37,14 +37,16 @@ def scaled(demand: Demand, factor: float, *, only: str | None = None) -> Demand:
     def wanted(part: Matrix | Background) -> bool:
         return only in (None, part.id)
 
-    matrices = (_with_trips(one, factor) if wanted(one) else one for one in demand.matrices)
+    matrices = (
+        _with_trips(matrix, factor) if wanted(matrix) else matrix for matrix in demand.matrices
+    )
     background = (_with_amount(one, factor) if wanted(one) else one for one in demand.background)
     return demand.model_copy(update={"matrices": tuple(matrices), "background": tuple(background)})
 
 
 def trips_of(demand: Demand) -> float:
     """Trips of the matrices and of the background traffic that is a number of trips."""
-    return sum(_number(part) for part in _parts(demand))
+    return sum(_number_of_trips(part) for part in _demand_parts(demand))
 
 
 def busiest_hour(scenario: Scenario) -> tuple[float, float]:
@@ -52,16 +54,16 @@ def busiest_hour(scenario: Scenario) -> tuple[float, float]:
 
     Background traffic that is an amount on the road counts where there is nothing else.
     """
-    parts = _parts(scenario.demand)
-    numbers = [_number(part) or float(not trips_of(scenario.demand)) for part in parts]
+    parts = _demand_parts(scenario.demand)
+    numbers = [_number_of_trips(part) or float(not trips_of(scenario.demand)) for part in parts]
     last = max(scenario.simulation.duration - HOUR, 0.0)
 
     def departures(begin: float) -> float:
         each = zip(parts, numbers, strict=True)
-        return sum(n * _share(scenario, part, begin, begin + HOUR) for part, n in each)
+        return sum(n * _share_between(scenario, part, begin, begin + HOUR) for part, n in each)
 
     begins = [_MINUTE * minute for minute in range(int(last / _MINUTE) + 1)]
-    begin = max(begins, key=lambda one: (round(departures(one), 6), -one))
+    begin = max(begins, key=lambda begin: (round(departures(begin), 6), -begin))
     return begin, min(begin + HOUR, scenario.simulation.duration)
 
 
@@ -69,7 +71,7 @@ def part_trips(scenario: Scenario, part: Background, *, per_hour: float) -> floa
     """Trips of background traffic of which ``per_hour`` come in its busiest hour."""
     demand = scenario.demand.model_copy(update={"matrices": (), "background": (part,)})
     begin, end = busiest_hour(scenario.model_copy(update={"demand": demand}))
-    share = _share(scenario, part, begin, end)
+    share = _share_between(scenario, part, begin, end)
     return per_hour * (end - begin) / HOUR / share if share else 0.0
 
 
@@ -93,8 +95,8 @@ def excerpt(scenario: Scenario) -> Scenario:
         return scenario
     begin, end = busiest_hour(scenario)
     begin = max(begin - BEFORE, 0.0)
-    matrices = (_cut(scenario, one, begin, end) for one in demand.matrices)
-    background = (_cut(scenario, one, begin, end) for one in demand.background)
+    matrices = (_cut_part(scenario, matrix, begin, end) for matrix in demand.matrices)
+    background = (_cut_part(scenario, one, begin, end) for one in demand.background)
     length = end - begin + CALM
     return scenario.model_copy(
         update={
@@ -102,7 +104,7 @@ def excerpt(scenario: Scenario) -> Scenario:
             "demand": demand.model_copy(
                 update={
                     "clock": (demand.clock + begin) % DAY,
-                    "matrices": tuple(one for one in matrices if one is not None),
+                    "matrices": tuple(matrix for matrix in matrices if matrix is not None),
                     "background": tuple(one for one in background if one is not None),
                 }
             ),
@@ -110,17 +112,19 @@ def excerpt(scenario: Scenario) -> Scenario:
     )
 
 
-def _cut(scenario: Scenario, part: _Part, begin: float, end: float) -> _Part | None:
+def _cut_part(scenario: Scenario, part: _Part, begin: float, end: float) -> _Part | None:
     """What of a part of the demand comes between two times, as of a run that begins then."""
     own = window(scenario, part)
     first, last = max(own[0], begin), min(own[1], end)
     if first >= last:
         return None
-    fewer = _with_trips(part, _share(scenario, part, first, last))
+    fewer = _with_trips(part, _share_between(scenario, part, first, last))
     return fewer.model_copy(update={"begin": first - begin, "end": last - begin})
 
 
-def _share(scenario: Scenario, part: Matrix | Background, begin: float, end: float) -> float:
+def _share_between(
+    scenario: Scenario, part: Matrix | Background, begin: float, end: float
+) -> float:
     """Share of a part of the demand that comes between two times."""
     first, last = window(scenario, part)
     passed = curve(scenario.demand, part.profile).amount
@@ -131,11 +135,11 @@ def _share(scenario: Scenario, part: Matrix | Background, begin: float, end: flo
     return (high - low) / (last - first) if last > first else 0.0  # evenly, see Curve.draw
 
 
-def _parts(demand: Demand) -> list[Matrix | Background]:
+def _demand_parts(demand: Demand) -> list[Matrix | Background]:
     return [*demand.matrices, *demand.background]
 
 
-def _number(part: Matrix | Background) -> float:
+def _number_of_trips(part: Matrix | Background) -> float:
     """Trips of a part; 0 of background traffic that is an amount on the road."""
     if isinstance(part, Matrix):
         return sum(row[2] for row in part.trips)

@@ -136,12 +136,14 @@ class ParkingChoice:
         between = table[rows]
         found: dict[str, ParkedTrip] = {}
         for at in sorted(range(len(trips)), key=lambda at: (trips[at].depart, trips[at].id)):
-            one = self._one(trips[at], from_starts[onto[at]], to_goals[:, columns[at]], between)
-            if one != ParkedTrip():
-                found[trips[at].id] = one
+            parked_trip = self._choose_for_trip(
+                trips[at], from_starts[onto[at]], to_goals[:, columns[at]], between
+            )
+            if parked_trip != ParkedTrip():
+                found[trips[at].id] = parked_trip
         return found
 
-    def _one(
+    def _choose_for_trip(
         self, trip: ParkableTrip, reached: BoolArray, leads: BoolArray, between: BoolArray
     ) -> ParkedTrip:
         rng = stream(self._scenario.seed, "parking", trip.id)
@@ -150,18 +152,18 @@ class ParkingChoice:
         first = last = None
         missed = 0
         if trip.begins and uniform[0] < self._how.begin:
-            near = self._near(trip.start) if trip.near_start else True
+            near = self._areas_near(trip.start) if trip.near_start else True
             free = np.array([self._has_room(k, trip.depart - stays[0]) for k in range(len(leads))])
-            first = self._drawn(leads & near & free, uniform[1], self._first)
+            first = self._draw_area(leads & near & free, uniform[1], self._first)
             missed += first is None
             if first is not None:
                 insort(self._left[first], trip.depart)
         if trip.ends and uniform[2] < self._how.end:
             good = reached.copy() if first is None else between[first].copy()
-            good &= self._near(trip.goal) if trip.near_goal else True
+            good &= self._areas_near(trip.goal) if trip.near_goal else True
             if first is not None:
                 good[first] = False
-            last = self._drawn(good, uniform[3], self._last)
+            last = self._draw_area(good, uniform[3], self._last)
             missed += last is None
         return ParkedTrip(
             None if first is None else Parked(self.areas[first], stays[0]),
@@ -174,14 +176,14 @@ class ParkingChoice:
         there = self._left[row]
         return len(there) - bisect_right(there, since) < int(self._first[row])
 
-    def _near(self, node: int) -> BoolArray:
+    def _areas_near(self, node: int) -> BoolArray:
         lanes = self._lanes
         away = np.hypot(lanes.x[self._nodes] - lanes.x[node], lanes.y[self._nodes] - lanes.y[node])
         near: BoolArray = np.less_equal(away, self._how.within)
         return near
 
     @staticmethod
-    def _drawn(good: BoolArray, uniform: float, places: Int32Array) -> int | None:
+    def _draw_area(good: BoolArray, uniform: float, places: Int32Array) -> int | None:
         """Draw one of the areas, by the number of their places."""
         sums = np.cumsum(np.where(good, places, 0))
         if sums[-1] <= 0:
@@ -242,15 +244,15 @@ class EvenShares:
         """Return numbers for the starts and the goals of the first trips, shapes ``(count,)``."""
         trips = np.arange(count, dtype=np.float64)
         return (
-            (self._at(0, STARTS) + trips * STARTS[0]) % 1.0,
-            (self._at(1, GOALS) + trips * GOALS[0]) % 1.0,
+            (self._share_at(0, STARTS) + trips * STARTS[0]) % 1.0,
+            (self._share_at(1, GOALS) + trips * GOALS[0]) % 1.0,
         )
 
     def whole(self, number: float) -> int:
         """Trips of a row: whole, and on average over rows the number asked for."""
-        return int(number) + int(self._at(2, PARTS) % 1.0 < number % 1.0)
+        return int(number) + int(self._share_at(2, PARTS) % 1.0 < number % 1.0)
 
-    def _at(self, which: int, steps: Sequence[float]) -> float:
+    def _share_at(self, which: int, steps: Sequence[float]) -> float:
         far = sum(step * times for step, times in zip(steps[1:], self.row, strict=True))
         return self.first[which] + far
 
@@ -300,7 +302,7 @@ def matrix_trips(scenario: Scenario, ground: TripEnds, matrix: Matrix) -> Iterab
         start = stream(scenario.seed, "starts", mix, origin).random()
         goal = stream(scenario.seed, "goals", mix, destination).random()
         row = (order.get(origin, 0), order.get(destination, 0), matrix.begin / QUARTER)
-        yield _drawn(
+        yield _draw_trips(
             scenario,
             ground,
             matrix,
@@ -323,7 +325,7 @@ def background_trips(
     if background.trips is not None:
         number = background.trips
     else:
-        standing = _standing(ground, background, usable)
+        standing = _standing_number(ground, background, usable)
         if background.begin == 0:
             yield _first_crowd(scenario, ground, background, usable, standing)
         begin, end = window(scenario, background)
@@ -332,7 +334,7 @@ def background_trips(
         number = standing * passed / usual_duration(ground, background.mix)
     first = tuple(stream(scenario.seed, "places", background.id).random(3).tolist())
     even = EvenShares(first)
-    yield _drawn(scenario, ground, background, rng, even, name=background.id, number=number)
+    yield _draw_trips(scenario, ground, background, rng, even, name=background.id, number=number)
 
 
 def window(scenario: Scenario, part: Window) -> tuple[float, float]:
@@ -347,7 +349,7 @@ def usual_duration(ground: TripEnds, mix: Mapping[Category, float]) -> float:
     The mean path between random places at the mean limit, times :data:`SLOWER`.
     """
     rng = np.random.default_rng(0)
-    category = max(mix, key=lambda one: mix[one])
+    category = max(mix, key=lambda category: mix[category])
     starts, ends = ground.starts(category), ground.ends(category)
     router = ground.router_of(category)
     found: list[float] = []
@@ -368,7 +370,7 @@ def drawn_categories(mix: Mapping[Category, float], uniform: FloatArray) -> list
     return [categories[min(row, len(categories) - 1)] for row in rows.tolist()]
 
 
-def _drawn(
+def _draw_trips(
     scenario: Scenario,
     ground: TripEnds,
     part: Window,
@@ -407,13 +409,15 @@ def _drawn(
     )
 
 
-def _standing(ground: TripEnds, background: Background, usable: Usable) -> float:
+def _standing_number(ground: TripEnds, background: Background, usable: Usable) -> float:
     """Vehicles that background traffic is to keep on the road, on average."""
     if background.fill is not None:
         supply = vehicle_supply(ground.region, PlacingRules(), background.mix, usable)
         return background.fill * len(supply.fit)
     lanes = ground.region.graph.lanes
-    kilometres = len(ground.starts(max(background.mix, key=lambda one: background.mix[one])))
+    kilometres = len(
+        ground.starts(max(background.mix, key=lambda category: background.mix[category]))
+    )
     return (background.per_km or 0.0) * kilometres * lanes.spacing / 1000.0
 
 

@@ -124,11 +124,11 @@ class TripEnds:
 
     def starts(self, category: Category, segments: tuple[str, ...] | None = None) -> Int32Array:
         """Nodes on which a road user can start, ascending; of the whole region without segments."""
-        return self._nodes("start", category, segments)
+        return self._nodes_in_segments("start", category, segments)
 
     def ends(self, category: Category, segments: tuple[str, ...] | None = None) -> Int32Array:
         """Nodes at which a path can end, ascending; of the whole region without segments."""
-        return self._nodes("end", category, segments)
+        return self._nodes_in_segments("end", category, segments)
 
     def reachable_ends(
         self,
@@ -146,43 +146,51 @@ class TripEnds:
         table = table[:, np.searchsorted(every_end, ends)]
         some = np.asarray(table.any(axis=1))[row]
         starts, row = starts[some], row[some]
-        segment = self._segments(category)
+        segment = self._segment_of_nodes(category)
         return ReachableEnds(starts, ends, row, table, segment[starts], segment[ends])
 
-    def _nodes(self, what: str, category: Category, segments: tuple[str, ...] | None) -> Int32Array:
+    def _nodes_in_segments(
+        self, what: str, category: Category, segments: tuple[str, ...] | None
+    ) -> Int32Array:
         key = what, category, segments
         if key not in self._known:
             if segments is not None:
-                every = self._nodes(what, category, None)
-                self._known[key] = every[self._inside(segments)[self._segments(category)[every]]]
+                every = self._nodes_in_segments(what, category, None)
+                self._known[key] = every[
+                    self._mask_of_segments(segments)[self._segment_of_nodes(category)[every]]
+                ]
             else:
-                mask = self._room(category) if what == "start" else self._end(category)
+                mask = (
+                    self._mask_with_room(category)
+                    if what == "start"
+                    else self._mask_of_ends(category)
+                )
                 self._known[key] = np.flatnonzero(mask).astype(np.int32)
         return self._known[key]
 
-    def _end(self, category: Category) -> BoolArray:
-        return self._walkable if category is Category.PEDESTRIAN else self._stretch_ends
+    def _mask_of_ends(self, category: Category) -> BoolArray:
+        return self._mask_of_walkable if category is Category.PEDESTRIAN else self._stretch_ends
 
-    def _segments(self, category: Category) -> Int32Array:
+    def _segment_of_nodes(self, category: Category) -> Int32Array:
         graph = self.region.graph
         return (graph.walks if category is Category.PEDESTRIAN else graph.lanes).segment
 
-    def _inside(self, segments: tuple[str, ...]) -> BoolArray:
+    def _mask_of_segments(self, segments: tuple[str, ...]) -> BoolArray:
         wanted = set(segments)
         return np.array([name in wanted for name in self.region.graph.segments.ids], dtype=np.bool_)
 
-    def _room(self, category: Category) -> BoolArray:
+    def _mask_with_room(self, category: Category) -> BoolArray:
         walk = category is Category.PEDESTRIAN
-        room = self._walkable.copy() if walk else self._vehicle_room(category)
+        room = self._mask_of_walkable.copy() if walk else self._vehicle_room(category)
         room[[place.node for place in self._taken if place.walk == walk]] = False
         return room
 
     def _vehicle_room(self, category: Category) -> BoolArray:
         lanes = self.region.graph.lanes
         body = self._usable.bodies[category]
-        room = self._on_roads & standing_room(lanes, body, allowed=self._spawnable)
+        room = self._on_roads & standing_room(lanes, body, allowed=self._mask_of_spawnable)
         # Inside a junction SUMO lets vehicles appear across others that drive beside their lane.
-        clear = room & standing_room(lanes, body, allowed=self._outside)
+        clear = room & standing_room(lanes, body, allowed=self._mask_outside_junctions)
         timely = ~late_for_changes(lanes, body)
         starts = np.zeros(len(room), dtype=np.bool_)
         settled = np.zeros(len(self.region.graph.segments.ids), dtype=np.bool_)
@@ -192,13 +200,13 @@ class TripEnds:
         return starts
 
     @cached_property
-    def _outside(self) -> BoolArray:
+    def _mask_outside_junctions(self) -> BoolArray:
         """Nodes outside junctions, of the map and of the simulator."""
         inside = self._usable.in_junction
         return self._on_roads if inside is None else self._on_roads & ~inside
 
     @cached_property
-    def _spawnable(self) -> BoolArray:
+    def _mask_of_spawnable(self) -> BoolArray:
         usable = self._usable.spawnable
         lanes = self.region.graph.lanes
         return np.ones(len(lanes.x), dtype=np.bool_) if usable is None else usable
@@ -211,7 +219,7 @@ class TripEnds:
         return on_roads
 
     @cached_property
-    def _walkable(self) -> BoolArray:
+    def _mask_of_walkable(self) -> BoolArray:
         usable = self._usable.walkable
         mask = self.region.walks if usable is None else self.region.walks & usable
         router = self.walk_router
@@ -224,7 +232,7 @@ class TripEnds:
     def _stretch_ends(self) -> BoolArray:
         """Last node of each lane in each segment on which a body fits."""
         lanes = self.region.graph.lanes
-        good = np.flatnonzero(self._on_roads & self._spawnable)
+        good = np.flatnonzero(self._on_roads & self._mask_of_spawnable)
         last = np.ones(len(good), dtype=np.bool_)
         last[:-1] = (np.diff(lanes.lane[good]) != 0) | (np.diff(lanes.segment[good]) != 0)
         ends = np.zeros(len(lanes.x), dtype=np.bool_)

@@ -52,7 +52,7 @@ class Uniform(Part):
     high: Drawn
 
     @model_validator(mode="after")
-    def _ordered(self) -> Uniform:
+    def _check_bounds(self) -> Uniform:
         _check_order(self.low, self.high)
         return self
 
@@ -71,7 +71,7 @@ class Normal(Part):
     high: Drawn
 
     @model_validator(mode="after")
-    def _ordered(self) -> Normal:
+    def _check_bounds(self) -> Normal:
         _check_order(self.low, self.high)
         return self
 
@@ -123,12 +123,12 @@ DistributionTable = dict[str, str | float | list[float]]
 
 
 def as_written(
-    one: Constant | Uniform | Normal | Choice,
+    constant: Constant | Uniform | Normal | Choice,
 ) -> float | DistributionTable:
     """Give a constant as the number that it is, and of others the kind, default or not."""
-    if isinstance(one, Constant):
-        return one.value
-    return one.model_dump(mode="json", exclude_none=True)
+    if isinstance(constant, Constant):
+        return constant.value
+    return constant.model_dump(mode="json", exclude_none=True)
 
 
 WrittenDistribution = Annotated[Distribution, PlainSerializer(as_written)]

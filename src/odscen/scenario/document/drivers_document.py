@@ -33,7 +33,7 @@ class DriverSet(Part):
     car_following: Literal["Krauss", "IDM"] = "Krauss"
 
     @model_validator(mode="after")
-    def _known(self) -> Self:
+    def _check_names(self) -> Self:
         if self.id in DRIVING_STYLES:
             raise ValueError(f"{self.id!r} is a driving style; give the set another id")
         for name, value in self.parameters.items():
@@ -82,8 +82,8 @@ class Drivers(Part):
 
     @model_validator(mode="after")
     def _known_styles(self) -> Self:
-        ids = [one.id for one in self.sets]
-        twice = sorted({one for one in ids if ids.count(one) > 1})
+        ids = [driver_set.id for driver_set in self.sets]
+        twice = sorted({name for name in ids if ids.count(name) > 1})
         if twice:
             raise ValueError(f"several driver sets have the id {twice[0]!r}")
         for style in self.shares:
@@ -98,4 +98,4 @@ class Drivers(Part):
     @property
     def styles(self) -> tuple[str, ...]:
         """Driving styles and ids of driver sets."""
-        return (*DRIVING_STYLES, *(one.id for one in self.sets))
+        return (*DRIVING_STYLES, *(driver_set.id for driver_set in self.sets))

@@ -41,7 +41,7 @@ _OPERATORS: Final[dict[type[ast.AST], Callable[..., float]]] = {
 }
 
 
-def _rounded(value: float) -> float:
+def _round_half_away(value: float) -> float:
     """Half away from zero, as OpenSCENARIO rounds; Python rounds it to the even number."""
     return math.copysign(math.floor(abs(value) + 0.5), value)
 
@@ -49,7 +49,7 @@ def _rounded(value: float) -> float:
 _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., float]]]] = {
     "pow": (2, math.pow),
     "sqrt": (1, math.sqrt),
-    "round": (1, _rounded),
+    "round": (1, _round_half_away),
     "floor": (1, math.floor),
     "ceil": (1, math.ceil),
     "abs": (1, abs),
@@ -88,13 +88,13 @@ def evaluate(text: str, values: Mapping[str, float]) -> float:
     shown = text if len(text) <= LONGEST else text[:LONGEST] + "..."
     for name in sorted(names_in(text)):
         if name not in values:
-            known = ", ".join(f"${one}" for one in values) or "none"
+            known = ", ".join(f"${value}" for value in values) or "none"
             raise InputError(f"{shown!r} names ${name}, which is no parameter; there are {known}")
     if len(text) > LONGEST:
         raise InputError(f"the expression {shown!r} is longer than {LONGEST} characters")
     try:
         tree = ast.parse(_NAME.sub(r" _\1 ", text).strip(), mode="eval")
-        value = float(_value(tree.body, values))
+        value = float(_evaluate_node(tree.body, values))
     except (SyntaxError, RecursionError, MemoryError) as error:
         raise InputError(
             f"{shown!r} is no expression: numbers, $names, + - * / % and brackets make one"
@@ -106,7 +106,7 @@ def evaluate(text: str, values: Mapping[str, float]) -> float:
     return value
 
 
-def _value(node: ast.expr, values: Mapping[str, float]) -> float:
+def _evaluate_node(node: ast.expr, values: Mapping[str, float]) -> float:
     if isinstance(node, ast.Constant) and isinstance(node.value, bool):
         raise SyntaxError(ast.unparse(node))
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
@@ -116,16 +116,18 @@ def _value(node: ast.expr, values: Mapping[str, float]) -> float:
     if isinstance(node, ast.Name) and node.id.startswith("_") and node.id[1:] in values:
         return float(values[node.id[1:]])
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
-        return _OPERATORS[type(node.op)](_value(node.left, values), _value(node.right, values))
+        return _OPERATORS[type(node.op)](
+            _evaluate_node(node.left, values), _evaluate_node(node.right, values)
+        )
     if isinstance(node, ast.BoolOp):
         all_or_any = all if isinstance(node.op, ast.And) else any
-        return float(all_or_any([_value(one, values) for one in node.values]))
+        return float(all_or_any([_evaluate_node(value, values) for value in node.values]))
     if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
-        return _OPERATORS[type(node.op)](_value(node.operand, values))
+        return _OPERATORS[type(node.op)](_evaluate_node(node.operand, values))
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
         count, function = _FUNCTIONS.get(node.func.id, (None, None))
         if function is not None and count == len(node.args):
-            return function(*(_value(one, values) for one in node.args))
+            return function(*(_evaluate_node(argument, values) for argument in node.args))
     raise SyntaxError(ast.unparse(node))
 
 
@@ -154,12 +156,12 @@ def computed(data: dict[str, Any], *, file: str | None = None) -> dict[str, Any]
     reading = _Reading({}, {}, [])
     parameters: dict[str, Any] = {}
     for name, said in data["parameters"].items():
-        parameters[name] = reading.walked(said, f"parameters/{_escaped(name)}", name)
+        parameters[name] = reading.walked(said, f"parameters/{_escape_key(name)}", name)
         number = parameters[name].get("value") if isinstance(parameters[name], dict) else None
         if isinstance(number, int | float):
             reading.values[name] = float(number)
     result = {
-        key: parameters if key == "parameters" else reading.walked(node, _escaped(key), key)
+        key: parameters if key == "parameters" else reading.walked(node, _escape_key(key), key)
         for key, node in data.items()
     }
     if reading.problems:
@@ -186,14 +188,20 @@ class _Reading:
     def walked(self, node: Any, place: str, key: str) -> Any:
         """Copy a part of the document with numbers in place of formulas."""
         if isinstance(node, str):
-            return self._value(node, place) if _is_formula(node, key, self.values) else node
+            return self._read_value(node, place) if _is_formula(node, key, self.values) else node
         if isinstance(node, dict):
-            return {name: self.walked(one, _at(place, name), name) for name, one in node.items()}
+            return {
+                name: self.walked(one, _extend_pointer(place, name), name)
+                for name, one in node.items()
+            }
         if isinstance(node, list):
-            return [self.walked(one, _at(place, part), key) for part, one in _parts(node)]
+            return [
+                self.walked(one, _extend_pointer(place, part), key)
+                for part, one in _list_parts(node)
+            ]
         return node
 
-    def _value(self, text: str, place: str) -> float:
+    def _read_value(self, text: str, place: str) -> float:
         try:
             value = evaluate(text, self.values)
         except InputError as error:
@@ -220,10 +228,10 @@ def put_back(
     """
     values = {name: float(one["value"]) for name, one in whole["parameters"].items()}
     for place, text in formulas.items():
-        keys = [_unescaped(key) for key in place.split("/")]
+        keys = [_unescape_key(key) for key in place.split("/")]
         try:
             if _looked_up(whole, keys) == evaluate(text, values):
-                _set(written, keys, text)
+                _set_value(written, keys, text)
         except (LookupError, TypeError, InputError):
             continue
 
@@ -247,7 +255,7 @@ def put_formula(written: dict[str, Any], whole: Mapping[str, Any], place: str, t
     ScenarioError
         If it holds something else than a number.
     """
-    keys = [_unescaped(key) for key in place.split("/")]
+    keys = [_unescape_key(key) for key in place.split("/")]
     try:
         there = _looked_up(whole, keys)
     except (LookupError, TypeError) as error:
@@ -256,7 +264,7 @@ def put_formula(written: dict[str, Any], whole: Mapping[str, Any], place: str, t
         raise ScenarioError(
             f"{place}: only a number can be computed, and this is {json.dumps(there):.60}"
         )
-    _set(written, keys, text)
+    _set_value(written, keys, text)
 
 
 def _is_formula(text: str, key: str, values: Mapping[str, float]) -> bool:
@@ -265,9 +273,9 @@ def _is_formula(text: str, key: str, values: Mapping[str, float]) -> bool:
     return text.startswith("$") or not names_in(text).isdisjoint(values)
 
 
-def _parts(node: list[Any]) -> Iterator[tuple[str, Any]]:
+def _list_parts(node: list[Any]) -> Iterator[tuple[str, Any]]:
     """Each part of a list with its id, or its index if it has none of its own."""
-    ids = [one.get("id") if isinstance(one, dict) else None for one in node]
+    ids = [row.get("id") if isinstance(row, dict) else None for row in node]
     for index, (name, one) in enumerate(zip(ids, node, strict=True)):
         own = isinstance(name, str) and ids.count(name) == 1
         yield name if own and name is not None else str(index), one
@@ -275,26 +283,26 @@ def _parts(node: list[Any]) -> Iterator[tuple[str, Any]]:
 
 def _looked_up(node: Any, keys: list[str]) -> Any:
     for key in keys:
-        node = node[key] if isinstance(node, dict) else dict(_parts(node))[key]
+        node = node[key] if isinstance(node, dict) else dict(_list_parts(node))[key]
     return node
 
 
-def _set(node: Any, keys: list[str], text: str) -> None:
+def _set_value(node: Any, keys: list[str], text: str) -> None:
     for key in keys[:-1]:
-        node = node.setdefault(key, {}) if isinstance(node, dict) else dict(_parts(node))[key]
+        node = node.setdefault(key, {}) if isinstance(node, dict) else dict(_list_parts(node))[key]
     if isinstance(node, dict):
         node[keys[-1]] = text
     else:
-        node[[part for part, _ in _parts(node)].index(keys[-1])] = text
+        node[[part for part, _ in _list_parts(node)].index(keys[-1])] = text
 
 
-def _at(place: str, key: str) -> str:
-    return f"{place}/{_escaped(key)}"
+def _extend_pointer(place: str, key: str) -> str:
+    return f"{place}/{_escape_key(key)}"
 
 
-def _escaped(key: str) -> str:
+def _escape_key(key: str) -> str:
     return key.replace("~", "~0").replace("/", "~1")
 
 
-def _unescaped(key: str) -> str:
+def _unescape_key(key: str) -> str:
     return key.replace("~1", "/").replace("~0", "~")

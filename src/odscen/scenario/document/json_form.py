@@ -44,7 +44,7 @@ def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
     try:
         return Scenario.model_validate_json(_with_numbers(text, file), strict=True)
     except ValidationError as error:
-        if foreign := _foreign(text):
+        if foreign := _explain_foreign(text):
             raise ScenarioError(foreign, file=file) from error
         problems = validation_problems(error)
         count = "a problem" if len(problems) == 1 else f"{error.error_count()} problems"
@@ -89,7 +89,7 @@ def dumps(scenario: Scenario) -> str:
     if scenario.formulas:
         put_back(data, scenario.model_dump(mode="json"), scenario.formulas)
     fields = [
-        f"  {json.dumps(key)}: {_layout(key, data[key])}"
+        f"  {json.dumps(key)}: {_lay_out_field(key, data[key])}"
         for key in type(scenario).model_fields
         if key != "formulas" and (key not in OPTIONAL or data[key])
     ]
@@ -157,7 +157,7 @@ def _with_numbers(text: str | bytes, file: str | None) -> str | bytes:
     return json.dumps(computed(data, file=file))
 
 
-def _layout(key: str, value: object) -> str:
+def _lay_out_field(key: str, value: object) -> str:
     if key == "parameters" and isinstance(value, dict):
         fields = (
             f"    {json.dumps(name)}: {json.dumps(one, ensure_ascii=False)}"
@@ -165,10 +165,12 @@ def _layout(key: str, value: object) -> str:
         )
         return "{\n" + ",\n".join(fields) + "\n  }"
     if key in ("demand", "transit", "study", "variant") and isinstance(value, dict):
-        fields = (f"    {json.dumps(name)}: {_parts(part)}" for name, part in value.items())
+        fields = (f"    {json.dumps(name)}: {_lay_out_parts(part)}" for name, part in value.items())
         return "{\n" + ",\n".join(fields) + "\n  }"
     if key == "signals" and isinstance(value, dict) and _has_programs(value):
-        fields = (f"    {json.dumps(name)}: {_lights(part)}" for name, part in value.items())
+        fields = (
+            f"    {json.dumps(name)}: {_lay_out_lights(part)}" for name, part in value.items()
+        )
         return "{\n" + ",\n".join(fields) + "\n  }"
     if isinstance(value, list) and value:
         lines = [json.dumps(part, ensure_ascii=False) for part in value]
@@ -178,7 +180,7 @@ def _layout(key: str, value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _parts(value: object) -> str:
+def _lay_out_parts(value: object) -> str:
     """Lay out parts of the demand: each on a line, and each row of a table on one of its own."""
     if not isinstance(value, list) or not value:
         return json.dumps(value, ensure_ascii=False)
@@ -198,7 +200,7 @@ def _has_programs(signals: dict[str, Any]) -> bool:
     return any("groups" in light for light in signals.get("junctions", ()))
 
 
-def _lights(value: object) -> str:
+def _lay_out_lights(value: object) -> str:
     """Lay out lights: one on a line, or each group, stage, ... of its program on one of its own."""
     if not isinstance(value, list) or not value:
         return json.dumps(value, ensure_ascii=False)
@@ -214,7 +216,7 @@ def _lights(value: object) -> str:
     return "[\n      " + ",\n      ".join(lights) + "\n    ]"
 
 
-def _foreign(text: str | bytes) -> str | None:
+def _explain_foreign(text: str | bytes) -> str | None:
     """Say why JSON is not a scenario of this version at all, or ``None``."""
     try:
         data = from_json(text)

@@ -119,12 +119,12 @@ Measure = Annotated[
 
 def banned_by(measure: TimedMeasure) -> tuple[Category, ...]:
     """Categories of vehicles that may not enter the places that a measure closes."""
-    vehicles = [one for one in Category if one is not Category.PEDESTRIAN]
+    vehicles = [category for category in Category if category is not Category.PEDESTRIAN]
     if not isinstance(measure, ChangedPermission):
         return tuple(vehicles)
     if measure.banned:
-        return tuple(one for one in vehicles if one in measure.banned)
-    return tuple(one for one in vehicles if one not in measure.allowed)
+        return tuple(vehicle for vehicle in vehicles if vehicle in measure.banned)
+    return tuple(vehicle for vehicle in vehicles if vehicle not in measure.allowed)
 
 
 def closed_places(measure: TimedMeasure) -> tuple[str, ...]:
@@ -166,7 +166,7 @@ def measure_words(measure: TimedMeasure) -> str:
         case SpeedLimit():
             return f"speed limit {measure.speed * 3.6:.0f} km/h: {where}"
         case ChangedPermission():
-            who = ", ".join(one.value for one in measure.allowed or measure.banned)
+            who = ", ".join(category.value for category in measure.allowed or measure.banned)
             return f"{'only' if measure.allowed else 'no'} {who}: {where}"
         case SignalOutage():
             return f"traffic light {measure.junction} {measure.shows}"

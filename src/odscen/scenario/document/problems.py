@@ -29,7 +29,7 @@ def validation_problems(error: ValidationError) -> tuple[str, ...]:
     Of very many the first thousand, and a line with how many more there are.
     """
     found = error.errors(include_url=False)
-    listed = tuple(_problem(details) for details in found[:_LISTED])
+    listed = tuple(_describe_problem(details) for details in found[:_LISTED])
     return listed if len(found) <= _LISTED else (*listed, f"and {len(found) - _LISTED} more")
 
 
@@ -44,8 +44,8 @@ def validated(model: type[_Model], fields: Mapping[str, Any]) -> _Model:
         ) from error
 
 
-def _problem(details: ErrorDetails) -> str:
-    place = _place(details["loc"])
+def _describe_problem(details: ErrorDetails) -> str:
+    place = _format_location(details["loc"])
     message = details["msg"]
     value = details["input"]
     if details["type"] == "missing" or isinstance(value, (dict, list, bytes)):
@@ -58,7 +58,7 @@ def _problem(details: ErrorDetails) -> str:
     return f"{place}: {message}{shown}" if place else f"{message}{shown}"
 
 
-def _place(location: Iterable[str | int]) -> str:
+def _format_location(location: Iterable[str | int]) -> str:
     place = ""
     for step in location:
         place += f"[{step}]" if isinstance(step, int) else f".{step}" if place else step

@@ -376,7 +376,7 @@ class Replaying(Part):
     rows: Annotated[tuple[TrajectoryRow, ...], Field(min_length=2, max_length=100_000)]
 
     @model_validator(mode="after")
-    def _growing(self) -> Self:
+    def _check_growing_times(self) -> Self:
         for index, (one, other) in enumerate(itertools.pairwise(self.rows)):
             if one[0] >= other[0]:
                 raise ValueError(f"rows[{index + 1}] is at {other[0]:g} s, not after {one[0]:g} s")
@@ -502,8 +502,8 @@ class Action(Part):
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         one_of(self, tuple(type(self).model_fields), "action")
-        for one in self.together or ():
-            if one.together is not None:
+        for action in self.together or ():
+            if action.together is not None:
                 raise ValueError("what runs together cannot itself be together")
         return self
 
@@ -543,7 +543,7 @@ class RulePart(NamedTuple):
 
 def rule_parts(rule: StoryRule, where: str) -> Iterator[RulePart]:
     """All conditions and actions of a rule that are not combinations, in order."""
-    yield from _conditions(rule.when, f"{where}.when")
+    yield from _condition_parts(rule.when, f"{where}.when")
     for index, item in enumerate(rule.then):
         for number, one in enumerate(item.parts):
             inside = f".together[{number}]" if item.together else ""
@@ -551,13 +551,13 @@ def rule_parts(rule: StoryRule, where: str) -> Iterator[RulePart]:
             yield RulePart(place, one.kind, getattr(one, one.kind))
 
 
-def _conditions(condition: Condition, where: str) -> Iterator[RulePart]:
+def _condition_parts(condition: Condition, where: str) -> Iterator[RulePart]:
     kind = condition.kind
     if kind == "not_" and condition.not_ is not None:
-        yield from _conditions(condition.not_, f"{where}.not")
+        yield from _condition_parts(condition.not_, f"{where}.not")
     elif kind in ("all", "any"):
         for index, one in enumerate(getattr(condition, kind)):
-            yield from _conditions(one, f"{where}.{kind}[{index}]")
+            yield from _condition_parts(one, f"{where}.{kind}[{index}]")
     else:
         yield RulePart(f"{where}.{kind}", kind, getattr(condition, kind))
 
@@ -591,7 +591,7 @@ def appearing_actors(rules: Iterable[StoryRule]) -> frozenset[str]:
         rule.actor
         for rule in rules
         for item in rule.then
-        if any(one.appear is not None for one in item.parts)
+        if any(part.appear is not None for part in item.parts)
     )
 
 

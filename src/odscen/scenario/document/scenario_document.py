@@ -87,7 +87,7 @@ class TransitLine(Part):
             raise ValueError(
                 f"give one of headway and departures, not {'both' if self.headway else 'none'}"
             )
-        given = [one.after for one in self.stops if one.after is not None]
+        given = [stop.after for stop in self.stops if stop.after is not None]
         if any(later <= earlier for earlier, later in pairwise(given)):
             raise ValueError("scheduled departures (after) must grow from stop to stop")
         if list(self.departures) != sorted(set(self.departures)):

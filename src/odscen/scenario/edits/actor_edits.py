@@ -138,7 +138,9 @@ def change_actor(scenario: Scenario, actor: str, **fields: Annotated[Any, Actor]
 def remove_actors(scenario: Scenario, actors: Iterable[str]) -> Scenario:
     """Remove actors by id."""
     gone = {scenario.actors[index_of(scenario.actors, actor)].id for actor in actors}
-    return with_fields(scenario, actors=tuple(one for one in scenario.actors if one.id not in gone))
+    return with_fields(
+        scenario, actors=tuple(actor for actor in scenario.actors if actor.id not in gone)
+    )
 
 
 @edit("Copy road users")
@@ -219,7 +221,7 @@ def fill_roi(
     ).actors
     nodes = {flow.spawn for flow in scenario.flows}
     ids = {flow.id for flow in scenario.flows}
-    free = tuple(one for one in crowd if one.spawn not in nodes and one.id not in ids)
+    free = tuple(actor for actor in crowd if actor.spawn not in nodes and actor.id not in ids)
     return with_fields(scenario, actors=free)
 
 

@@ -48,7 +48,7 @@ _Part = TypeVar("_Part", bound=Zone | Profile | VehicleInput | Matrix | Counts |
 @edit("Change the time of day at the start")
 def set_clock(scenario: Scenario, *, clock: float) -> Scenario:
     """Set the time of day at the start of the run, seconds after midnight."""
-    return _changed(scenario, clock=clock)
+    return _change_demand(scenario, clock=clock)
 
 
 @edit("Routes of trips")
@@ -70,7 +70,9 @@ def set_routes(
     """
     old = scenario.demand.routes
     kept = {name: getattr(old, name) for name in RouteChoice.model_fields}
-    return _checked(_changed(scenario, routes=validated(RouteChoice, {**kept, **fields})), graph)
+    return _check_demand(
+        _change_demand(scenario, routes=validated(RouteChoice, {**kept, **fields})), graph
+    )
 
 
 @edit("Parking of trips")
@@ -85,7 +87,7 @@ def set_parking(scenario: Scenario, **fields: Annotated[Any, TripParking]) -> Sc
     """
     old = scenario.demand.parking
     kept = {name: getattr(old, name) for name in TripParking.model_fields}
-    return _changed(scenario, parking=validated(TripParking, {**kept, **fields}))
+    return _change_demand(scenario, parking=validated(TripParking, {**kept, **fields}))
 
 
 @edit("Zone {zone}")
@@ -94,7 +96,9 @@ def set_zone(
 ) -> Scenario:
     """Give segments a name that matrices can use; a zone of that name is replaced."""
     part = validated(Zone, {"id": zone, "segments": tuple(segments)})
-    return _checked(_changed(scenario, zones=_put(scenario.demand.zones, part)), graph)
+    return _check_demand(
+        _change_demand(scenario, zones=_put_part(scenario.demand.zones, part)), graph
+    )
 
 
 @edit("Day profile {profile}")
@@ -103,7 +107,9 @@ def set_profile(
 ) -> Scenario:
     """Give the scenario a day profile of its own; one of that name is replaced."""
     part = validated(Profile, {"id": profile, "shares": tuple(shares)})
-    return _checked(_changed(scenario, profiles=_put(scenario.demand.profiles, part)), graph)
+    return _check_demand(
+        _change_demand(scenario, profiles=_put_part(scenario.demand.profiles, part)), graph
+    )
 
 
 @edit("Vehicle input {inflow}")
@@ -131,8 +137,8 @@ def set_input(
     old = scenario.demand.inputs
     if {"per_hour", "volumes"} & fields.keys():
         fields = {"per_hour": None, "volumes": (), **fields}
-    part = _part(VehicleInput, old, inflow, fields)
-    return _checked(_changed(scenario, inputs=_put(old, part)), graph)
+    part = _change_or_make_part(VehicleInput, old, inflow, fields)
+    return _check_demand(_change_demand(scenario, inputs=_put_part(old, part)), graph)
 
 
 @edit("Trips {matrix}")
@@ -153,8 +159,8 @@ def set_matrix(
         If an origin or destination is unknown or outside the region, or the name is taken.
     """
     old = scenario.demand.matrices
-    part = _part(Matrix, old, matrix, fields)
-    return _checked(_changed(scenario, matrices=_put(old, part)), graph)
+    part = _change_or_make_part(Matrix, old, matrix, fields)
+    return _check_demand(_change_demand(scenario, matrices=_put_part(old, part)), graph)
 
 
 @edit("Counts {counts}")
@@ -178,8 +184,8 @@ def set_counts(
         If a place is unknown or outside the region, or was counted twice.
     """
     old = scenario.demand.counts
-    part = _part(Counts, old, counts, fields)
-    return _checked(_changed(scenario, counts=_put(old, part)), graph)
+    part = _change_or_make_part(Counts, old, counts, fields)
+    return _check_demand(_change_demand(scenario, counts=_put_part(old, part)), graph)
 
 
 @edit("Background traffic {background}")
@@ -203,8 +209,8 @@ def set_background(
     amounts = {"fill", "per_km", "trips"}
     if amounts & fields.keys():
         fields = {**dict.fromkeys(amounts), **fields}
-    part = _part(Background, old, background, fields)
-    return _checked(_changed(scenario, background=_put(old, part)), graph)
+    part = _change_or_make_part(Background, old, background, fields)
+    return _check_demand(_change_demand(scenario, background=_put_part(old, part)), graph)
 
 
 @edit("Remove {part}")
@@ -223,7 +229,7 @@ def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario
         ones = getattr(scenario.demand, kind)
         left = tuple(one for one in ones if one.id != part)
         if len(left) < len(ones):
-            return _checked(_changed(scenario, **{kind: left}), graph)
+            return _check_demand(_change_demand(scenario, **{kind: left}), graph)
     raise NotFoundError(
         "part of the demand",
         part,
@@ -231,27 +237,29 @@ def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario
     )
 
 
-def _part(model: type[_Part], ones: tuple[_Part, ...], name: str, fields: dict[str, Any]) -> _Part:
+def _change_or_make_part(
+    model: type[_Part], ones: tuple[_Part, ...], name: str, fields: dict[str, Any]
+) -> _Part:
     """Part of that name with some fields changed, or a new one."""
     old = next((one for one in ones if one.id == name), None)
     kept = {} if old is None else {field: getattr(old, field) for field in model.model_fields}
     return validated(model, {**kept, **fields, "id": name})
 
 
-def _put(ones: tuple[_Part, ...], part: _Part) -> tuple[_Part, ...]:
+def _put_part(ones: tuple[_Part, ...], part: _Part) -> tuple[_Part, ...]:
     """Put a part in the place of that with its name, or at the end."""
     if all(one.id != part.id for one in ones):
         return (*ones, part)
     return tuple(part if one.id == part.id else one for one in ones)
 
 
-def _changed(scenario: Scenario, **changes: Any) -> Scenario:
+def _change_demand(scenario: Scenario, **changes: Any) -> Scenario:
     fields = {name: getattr(scenario.demand, name) for name in Demand.model_fields}
     demand = validated(Demand, {**fields, **changes})
     return scenario.model_copy(update={"demand": demand})
 
 
-def _checked(scenario: Scenario, graph: MapGraph) -> Scenario:
+def _check_demand(scenario: Scenario, graph: MapGraph) -> Scenario:
     """Return the scenario if its demand can be right; what is only unusual passes."""
     region = Region.of(graph, scenario.roi)
     refuse_errors([*demand_problems(scenario, region), *duplicate_ids(scenario)])

@@ -77,7 +77,7 @@ class EditBase(BaseModel):
         return EDIT_ENTRIES[self.kind].label.format(**self.arguments)
 
 
-def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
+def _message_model(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
     documents = (document_parts, signals_document, scenario_document)
     known = {name: one for document in documents for name, one in vars(document).items()}
     names = {**known, **dict.fromkeys(_KNOWN.values(), object), **_JSON}
@@ -111,9 +111,9 @@ def _optional_fields(part: type[Part]) -> dict[str, Any]:
     fields: dict[str, Any] = {}
     for name, field in part.model_fields.items():
         read: Any = field.annotation
-        for one in field.metadata:
-            if isinstance(one, BeforeValidator):
-                read = Annotated[read, one]
+        for validator in field.metadata:
+            if isinstance(validator, BeforeValidator):
+                read = Annotated[read, validator]
         fields[name] = (read, left_out)
     return fields
 
@@ -123,7 +123,7 @@ def _without_default(schema: dict[str, Any]) -> None:
     schema.pop("default", None)
 
 
-EDIT_MESSAGES = {name: _message(name, entry.function) for name, entry in EDIT_ENTRIES.items()}
+EDIT_MESSAGES = {name: _message_model(name, entry.function) for name, entry in EDIT_ENTRIES.items()}
 """Messages of all edits, by the name of the edit."""
 
 if TYPE_CHECKING:

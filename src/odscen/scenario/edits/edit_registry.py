@@ -83,9 +83,11 @@ def with_actor(scenario: Scenario, index: int, **changes: Any) -> Scenario:
     return with_fields(scenario, actors=replaced_at(scenario.actors, index, actor))
 
 
-def replaced_at(ones: tuple[PlacedOne, ...], index: int, one: PlacedOne) -> tuple[PlacedOne, ...]:
+def replaced_at(
+    ones: tuple[PlacedOne, ...], index: int, placed_one: PlacedOne
+) -> tuple[PlacedOne, ...]:
     """Copy of a tuple with another element at ``index``."""
-    return (*ones[:index], one, *ones[index + 1 :])
+    return (*ones[:index], placed_one, *ones[index + 1 :])
 
 
 def put_part(
@@ -100,7 +102,7 @@ def put_part(
     NotFoundError
         If no part has the id ``instead_of``.
     """
-    ids = [one.id for one in parts]
+    ids = [part.id for part in parts]
     if instead_of is not None and instead_of not in ids:
         raise NotFoundError(what, instead_of, ids)
     name = part.id if instead_of is None else instead_of
@@ -116,9 +118,9 @@ def drop_part(parts: tuple[NamedPart, ...], what: str, name: str) -> tuple[Named
     NotFoundError
         If there is none.
     """
-    left = tuple(one for one in parts if one.id != name)
+    left = tuple(part for part in parts if part.id != name)
     if len(left) == len(parts):
-        raise NotFoundError(what, name, [one.id for one in parts])
+        raise NotFoundError(what, name, [part.id for part in parts])
     return left
 
 
@@ -149,7 +151,7 @@ def free_id(scenario: Scenario, stem: str) -> str:
 
 def with_only_ego(scenario: Scenario, ego: str | None) -> Scenario:
     """Copy of a scenario in which this actor alone is the ego, or none."""
-    actors = tuple(changed_part(one, {"ego": one.id == ego}) for one in scenario.actors)
+    actors = tuple(changed_part(actor, {"ego": actor.id == ego}) for actor in scenario.actors)
     return with_fields(scenario, actors=actors)
 
 

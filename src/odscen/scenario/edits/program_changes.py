@@ -30,7 +30,7 @@ def timing_of_light(
     """The light in a junction, and what the scenario says of it."""
     light = find_light(lights, junction)
     names = () if light is None else light.names
-    known = (one for one in scenario.signals.junctions if one.junction in names)
+    known = (junction for junction in scenario.signals.junctions if junction.junction in names)
     return light, next(known, JunctionTiming(junction=junction))
 
 
@@ -62,14 +62,16 @@ def with_timing(
     them now gives one for each stage.
     """
     timings = scenario.signals.junctions
-    names = [one.junction for one in timings]
+    names = [timing.junction for timing in timings]
     index = names.index(new.junction) if new.junction in names else len(names)
     changed = (*timings[:index], new, *timings[index + 1 :])
     signals = changed_part(scenario.signals, {"junctions": changed})
     place = f"signals.junctions[{index}].green"
     refuse_errors(
-        replace(one, severity="error") if strict and one.where == place else one
-        for one in signal_problems(signals, lights)
+        replace(signal_problem, severity="error")
+        if strict and signal_problem.where == place
+        else signal_problem
+        for signal_problem in signal_problems(signals, lights)
     )
     return with_fields(scenario, signals=signals)
 
@@ -103,8 +105,8 @@ def with_green(
     ScenarioError
         If the green of this stage, or of the next one, becomes too short.
     """
-    stages = _stages(timing, light, plan)
-    old = {one.id: one.green for one in stages}
+    stages = _stages_in_plan(timing, light, plan)
+    old = {stage.id: stage.green for stage in stages}
     if stage not in old:
         raise NotFoundError(f"stage of the light of junction {timing.junction!r}", stage, list(old))
     greens = {stage: green}
@@ -115,17 +117,17 @@ def with_green(
         _refuse_short(timing, name, seconds, old[name], given=name == stage)
     if not timing.stages:
         return changed_part(
-            timing, {"green": tuple(greens.get(one.id, one.green) for one in stages)}
+            timing, {"green": tuple(greens.get(stage.id, stage.green) for stage in stages)}
         )
     return _with_greens(timing, light, greens, plan)
 
 
 def _next_stage(stages: Sequence[PlannedStage], stage: str) -> str:
     """The stage that gives or takes seconds: the next one that is not on call."""
-    ids = [one.id for one in stages]
+    ids = [stage.id for stage in stages]
     at = ids.index(stage)
     turned = (*stages[at + 1 :], *stages[:at])
-    found = next((one.id for one in turned if not one.on_call), None)
+    found = next((stage.id for stage in turned if not stage.on_call), None)
     if found is None:
         raise ScenarioError(
             f"stage {stage!r} has no stage beside it that could give or take its seconds"
@@ -150,13 +152,15 @@ def _refuse_short(
     raise ScenarioError(msg)
 
 
-def _stages(timing: JunctionTiming, light: Light, plan: str | None) -> tuple[PlannedStage, ...]:
+def _stages_in_plan(
+    timing: JunctionTiming, light: Light, plan: str | None
+) -> tuple[PlannedStage, ...]:
     """Stages with their greens in one plan; of a light with the map's stages those."""
     if timing.stages:
         designed = DesignedProgram(timing, light, "fixed").plans()
         if timing.plans:
-            plan = _plan(timing, plan).id
-            return next(one.stages for one in designed if one.id == plan)
+            plan = _plan_named(timing, plan).id
+            return next(timed_plan.stages for timed_plan in designed if timed_plan.id == plan)
         return designed[0].stages
     greens = timing.green if len(timing.green) == len(light.green) else light.green
     none: frozenset[str] = frozenset()
@@ -166,8 +170,8 @@ def _stages(timing: JunctionTiming, light: Light, plan: str | None) -> tuple[Pla
     )
 
 
-def _plan(timing: JunctionTiming, name: str | None) -> DayPlan:
-    ids = [one.id for one in timing.plans]
+def _plan_named(timing: JunctionTiming, name: str | None) -> DayPlan:
+    ids = [plan.id for plan in timing.plans]
     if name is None:
         raise InputError(
             f"the light of junction {timing.junction!r} has plans of the day: name one of "
@@ -183,11 +187,11 @@ def _with_greens(
 ) -> JunctionTiming:
     if not timing.plans:
         stages = tuple(
-            changed_part(one, {"green": greens[one.id]}) if one.id in greens else one
-            for one in timing.stages
+            changed_part(stage, {"green": greens[stage.id]}) if stage.id in greens else stage
+            for stage in timing.stages
         )
         return fitted_cycles(changed_part(timing, {"stages": stages}), light)
-    own = _plan(timing, plan)
+    own = _plan_named(timing, plan)
     new = changed_part(own, {"green": {**own.green, **greens}})
     return fitted_cycles(_with_plan(timing, new), light)
 
@@ -195,9 +199,9 @@ def _with_greens(
 def fitted_cycles(timing: JunctionTiming, light: Light) -> JunctionTiming:
     """Let the cycles that a program says be what its greens and intergreens add up to."""
     lengths = {
-        one.id: cycle_length(DesignedProgram(timing, light, "fixed"), one.stages)
-        for one in DesignedProgram(timing, light, "fixed").plans()
-        if one.cycle is not None
+        plan.id: cycle_length(DesignedProgram(timing, light, "fixed"), plan.stages)
+        for plan in DesignedProgram(timing, light, "fixed").plans()
+        if plan.cycle is not None
     }
     if not lengths:
         return timing
@@ -210,7 +214,7 @@ def fitted_cycles(timing: JunctionTiming, light: Light) -> JunctionTiming:
 
 
 def _with_plan(timing: JunctionTiming, new: DayPlan) -> JunctionTiming:
-    plans = tuple(new if one.id == new.id else one for one in timing.plans)
+    plans = tuple(new if plan.id == new.id else plan for plan in timing.plans)
     return changed_part(timing, {"plans": plans})
 
 
@@ -224,7 +228,7 @@ def with_offset(timing: JunctionTiming, offset: float, *, plan: str | None) -> J
     """
     if not timing.plans:
         return changed_part(timing, {"offset": offset})
-    return _with_plan(timing, changed_part(_plan(timing, plan), {"offset": offset}))
+    return _with_plan(timing, changed_part(_plan_named(timing, plan), {"offset": offset}))
 
 
 def with_stage(timing: JunctionTiming, stage: str, fields: Mapping[str, Any]) -> JunctionTiming:
@@ -235,8 +239,11 @@ def with_stage(timing: JunctionTiming, stage: str, fields: Mapping[str, Any]) ->
     NotFoundError
         If there is no such stage.
     """
-    ids = [one.id for one in timing.stages]
+    ids = [stage.id for stage in timing.stages]
     if stage not in ids:
         raise NotFoundError(f"stage of the light of junction {timing.junction!r}", stage, ids)
-    stages = tuple(changed_part(one, fields) if one.id == stage else one for one in timing.stages)
+    stages = tuple(
+        changed_part(program_stage, fields) if program_stage.id == stage else program_stage
+        for program_stage in timing.stages
+    )
     return changed_part(timing, {"stages": stages})

@@ -50,10 +50,10 @@ def with_group(
     InputError
         If a new group has no movements.
     """
-    ids = [one.id for one in timing.groups]
+    ids = [group.id for group in timing.groups]
     if name in ids:
         old = timing.groups[ids.index(name)]
-        timing = _replaced(timing, old, changed_part(old, fields))
+        timing = _replace_group(timing, old, changed_part(old, fields))
         name = fields.get("id", name)
     elif not fields.get("movements"):
         raise InputError(
@@ -62,22 +62,26 @@ def with_group(
         )
     else:
         new = validated(ProgramGroup, {**fields, "id": name})
-        timing = _joined(timing, light, new)
+        timing = _join_group(timing, light, new)
     return _moved_here(timing, light, name) if "movements" in fields else timing
 
 
-def _replaced(timing: JunctionTiming, old: ProgramGroup, new: ProgramGroup) -> JunctionTiming:
+def _replace_group(timing: JunctionTiming, old: ProgramGroup, new: ProgramGroup) -> JunctionTiming:
     timing = changed_part(
-        timing, {"groups": tuple(new if one is old else one for one in timing.groups)}
+        timing, {"groups": tuple(new if group is old else group for group in timing.groups)}
     )
-    return _renamed(timing, lambda name: new.id if name == old.id else name)
+    return _rename_groups(timing, lambda name: new.id if name == old.id else name)
 
 
-def _joined(timing: JunctionTiming, light: Light, new: ProgramGroup) -> JunctionTiming:
+def _join_group(timing: JunctionTiming, light: Light, new: ProgramGroup) -> JunctionTiming:
     """A program with a new group behind that of its first movement, and with what that shows."""
     movements = set(designed_group(new, light).movements)
     from_group = next(
-        (one.id for one in timing.groups if movements & set(designed_group(one, light).movements)),
+        (
+            group.id
+            for group in timing.groups
+            if movements & set(designed_group(group, light).movements)
+        ),
         None,
     )
     beside = [
@@ -107,26 +111,26 @@ def _joined(timing: JunctionTiming, light: Light, new: ProgramGroup) -> Junction
 
 def _moved_here(timing: JunctionTiming, light: Light, name: str) -> JunctionTiming:
     """A program in which no other group has the movements of this one."""
-    groups = {one.id: set(designed_group(one, light).movements) for one in timing.groups}
+    groups = {group.id: set(designed_group(group, light).movements) for group in timing.groups}
     own = groups[name]
     left: list[ProgramGroup] = []
-    for one in timing.groups:
-        if one.id == name or not groups[one.id] & own:
-            left.append(one)
-        elif groups[one.id] - own:
-            names = shortest_names(groups[one.id] - own, light.movements)
-            left.append(changed_part(one, {"movements": names}))
-    gone = set(groups) - {one.id for one in left}
+    for program_group in timing.groups:
+        if program_group.id == name or not groups[program_group.id] & own:
+            left.append(program_group)
+        elif groups[program_group.id] - own:
+            names = shortest_names(groups[program_group.id] - own, light.movements)
+            left.append(changed_part(program_group, {"movements": names}))
+    gone = set(groups) - {group.id for group in left}
     timing = changed_part(timing, {"groups": tuple(left)})
-    return _renamed(timing, lambda group: None if group in gone else group)
+    return _rename_groups(timing, lambda group: None if group in gone else group)
 
 
-def _renamed(timing: JunctionTiming, name_of: Callable[[str], str | None]) -> JunctionTiming:
+def _rename_groups(timing: JunctionTiming, name_of: Callable[[str], str | None]) -> JunctionTiming:
     """What refers to groups by other names of them; none takes the reference out."""
 
     def names(of: Iterable[str]) -> tuple[str, ...]:
-        found = (name_of(one) for one in of)
-        return tuple(dict.fromkeys(one for one in found if one is not None))
+        found = (name_of(name) for name in of)
+        return tuple(dict.fromkeys(name for name in found if name is not None))
 
     stages = tuple(
         changed_part(stage, {kind: names(getattr(stage, kind)) for kind in _KINDS})
@@ -189,7 +193,7 @@ def without_group(timing: JunctionTiming, light: Light, name: str, into: str) ->
     NotFoundError
         If there is no such group.
     """
-    groups = {one.id: one for one in timing.groups}
+    groups = {group.id: group for group in timing.groups}
     for one in (name, into):
         if one not in groups:
             raise NotFoundError(
@@ -209,7 +213,7 @@ def stage_of(timing: JunctionTiming, name: str) -> ProgramStage:
     NotFoundError
         If there is none.
     """
-    found = {one.id: one for one in timing.stages}
+    found = {stage.id: stage for stage in timing.stages}
     if name not in found:
         raise NotFoundError(
             f"stage of the light of junction {timing.junction!r}", name, list(found)
@@ -229,7 +233,7 @@ def with_new_stage(
     NotFoundError
         If there is no stage ``after``.
     """
-    ids = [one.id for one in timing.stages]
+    ids = [stage.id for stage in timing.stages]
     if new.id in ids:
         raise InputError(
             f"the light of junction {timing.junction!r} has a stage {new.id!r} already"
@@ -265,12 +269,12 @@ def without_stage(timing: JunctionTiming, name: str) -> JunctionTiming:
             f"stage {name!r} is the only one of the light of junction {timing.junction!r}"
         )
     detectors = tuple(
-        changed_part(one, {"stages": tuple(s for s in one.stages if s != name)})
-        for one in timing.detectors
-        if set(one.stages) != {name}
+        changed_part(detector, {"stages": tuple(s for s in detector.stages if s != name)})
+        for detector in timing.detectors
+        if set(detector.stages) != {name}
     )
     changes = {
-        "stages": tuple(one for one in timing.stages if one.id != name),
+        "stages": tuple(stage for stage in timing.stages if stage.id != name),
         "detectors": detectors,
         "plans": tuple(_plan_without(plan, name) for plan in timing.plans),
     }
@@ -429,7 +433,7 @@ def set_intergreen(
     else:
         rows[(ending, beginning)] = seconds
     new = changed_part(old, {"intergreens": tuple((*pair, s) for pair, s in rows.items())})
-    known = {one.id for one in old.groups}
+    known = {group.id for group in old.groups}
     if known.issuperset((ending, beginning)):
         new = fitted_cycles(new, light)
     return with_timing(scenario, lights, new)
@@ -460,7 +464,10 @@ def set_detector(
         a field.
     """
     _, old = timing_of_light(scenario, lights, junction)
-    known = next((one for one in old.detectors if one.id == detector), None)
+    known = next(
+        (signal_detector for signal_detector in old.detectors if signal_detector.id == detector),
+        None,
+    )
     new = (
         validated(SignalDetector, {"id": detector, **fields})
         if known is None
@@ -518,7 +525,7 @@ def set_plan(
     """
     light, old = own_program(scenario, lights, junction)
     first = {} if old.plans else {"times": ("00:00",), "offset": old.offset}
-    known = next((one for one in old.plans if one.id == plan), None)
+    known = next((day_plan for day_plan in old.plans if day_plan.id == plan), None)
     new = (
         validated(DayPlan, {"id": plan, **first, **fields})
         if known is None
@@ -537,8 +544,8 @@ def set_plan(
         for index, one in enumerate(plans)
     )
     made = changed_part(old, {"plans": left, "offset": 0.0})
-    orders = {name for one in left for name in (*one.stages, *one.green)}
-    unknown = orders - {one.id for one in old.stages}
+    orders = {name for day_plan in left for name in (*day_plan.stages, *day_plan.green)}
+    unknown = orders - {stage.id for stage in old.stages}
     return with_timing(
         scenario, lights, made if unknown or "cycle" in fields else fitted_cycles(made, light)
     )
@@ -560,10 +567,10 @@ def remove_plan(
         If a plan that is left would never begin.
     """
     light, old = own_program(scenario, lights, junction)
-    gone = next((one for one in old.plans if one.id == plan), None)
+    gone = next((day_plan for day_plan in old.plans if day_plan.id == plan), None)
     if gone is None:
-        raise NotFoundError("plan of the day", plan, [one.id for one in old.plans])
-    left = tuple(one for one in old.plans if one is not gone)
+        raise NotFoundError("plan of the day", plan, [plan.id for plan in old.plans])
+    left = tuple(plan for plan in old.plans if plan is not gone)
     changes: dict[str, Any] = {"plans": left}
     if not left:
         changes["offset"] = gone.offset

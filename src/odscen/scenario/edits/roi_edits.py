@@ -114,17 +114,17 @@ def shrink_roi(
             f"without segment {segment!r} the region of interest would be in several pieces"
         )
     region = Region.of(graph, [segment])
-    users = [one for one in all_placed(scenario) if _uses(region, one)]
+    users = [one for one in all_placed(scenario) if _uses_region(region, one)]
     if users and not with_actors:
-        names = ", ".join(repr(one.id) for one in users)
+        names = ", ".join(repr(user.id) for user in users)
         raise ScenarioError(
             f"segment {segment!r} is where {names} start or go; remove or move them first"
         )
     return with_fields(
         scenario,
         roi=tuple(name for name in scenario.roi if name != segment),
-        actors=_clear(region, scenario.actors),
-        flows=_clear(region, scenario.flows),
+        actors=_clear_from_region(region, scenario.actors),
+        flows=_clear_from_region(region, scenario.flows),
     )
 
 
@@ -133,25 +133,25 @@ def _known_segment(graph: MapGraph, segment: str) -> None:
         raise NotFoundError("segment", segment, graph.segments.ids)
 
 
-def _inside(region: Region, node: str | None) -> bool:
+def _node_inside(region: Region, node: str | None) -> bool:
     place = None if node is None else region.place(node)
     return place is not None and region.holds(place)
 
 
-def _uses(region: Region, one: Actor | Flow) -> bool:
-    return any(_inside(region, node) for node in (one.spawn, one.goal, *vias(one)))
+def _uses_region(region: Region, actor: Actor | Flow) -> bool:
+    return any(_node_inside(region, node) for node in (actor.spawn, actor.goal, *vias(actor)))
 
 
-def _clear(region: Region, ones: tuple[PlacedOne, ...]) -> tuple[PlacedOne, ...]:
+def _clear_from_region(region: Region, ones: tuple[PlacedOne, ...]) -> tuple[PlacedOne, ...]:
     """Those that do not start in the region, without goals and places to pass in it."""
     return tuple(
-        changed_part(one, _without(region, one)) if _uses(region, one) else one
+        changed_part(one, _fields_without_region(region, one)) if _uses_region(region, one) else one
         for one in ones
-        if not _inside(region, one.spawn)
+        if not _node_inside(region, one.spawn)
     )
 
 
-def _without(region: Region, one: Actor | Flow) -> dict[str, Any]:
-    changes: dict[str, Any] = {"goal": None} if _inside(region, one.goal) else {}
-    kept = tuple(node for node in vias(one) if not _inside(region, node))
-    return changes if kept == vias(one) else changes | {"via": kept}
+def _fields_without_region(region: Region, actor: Actor | Flow) -> dict[str, Any]:
+    changes: dict[str, Any] = {"goal": None} if _node_inside(region, actor.goal) else {}
+    kept = tuple(node for node in vias(actor) if not _node_inside(region, node))
+    return changes if kept == vias(actor) else changes | {"via": kept}

@@ -56,14 +56,17 @@ def set_rule(
     rules, index = put_part(scenario.rules, rule, what=_RULE, instead_of=instead_of)
     if instead_of is not None:
         rules = tuple(
-            changed_part(one, {"when": _waiting(one.when, instead_of, rule.id)}) for one in rules
+            changed_part(
+                story_rule, {"when": _rename_awaited_rule(story_rule.when, instead_of, rule.id)}
+            )
+            for story_rule in rules
         )
     scenario = with_fields(scenario, rules=rules)
     problems = rule_problems(scenario, Region.of(graph, scenario.roi), lights)
     refuse_errors(
-        one
-        for one in problems
-        if one.where.startswith(f"rules[{index}]") or one.code == "duplicate_id"
+        problem
+        for problem in problems
+        if problem.where.startswith(f"rules[{index}]") or problem.code == "duplicate_id"
     )
     return scenario
 
@@ -80,16 +83,16 @@ def remove_rule(scenario: Scenario, *, rule: str) -> Scenario:
     return with_fields(scenario, rules=drop_part(scenario.rules, _RULE, rule))
 
 
-def _waiting(condition: Condition, old: str, new: str) -> Condition:
+def _rename_awaited_rule(condition: Condition, old: str, new: str) -> Condition:
     """Copy of a condition that waits for the rule ``new`` wherever it waited for ``old``."""
     changes: dict[str, object] = {}
     if condition.rule is not None and condition.rule.id == old:
         changes["rule"] = changed_part(condition.rule, {"id": new})
     if condition.not_ is not None:
-        changes["not_"] = _waiting(condition.not_, old, new)
+        changes["not_"] = _rename_awaited_rule(condition.not_, old, new)
     for join in ("all", "any"):
         if (parts := getattr(condition, join)) is not None:
-            changes[join] = tuple(_waiting(one, old, new) for one in parts)
+            changes[join] = tuple(_rename_awaited_rule(part, old, new) for part in parts)
     return changed_part(condition, changes)
 
 

@@ -62,7 +62,7 @@ def set_parameter(
         possible; names each place.
     """
     if instead_of is not None and instead_of != parameter:
-        scenario = _renamed(scenario, instead_of, parameter)
+        scenario = _rename_parameter_uses(scenario, instead_of, parameter)
     data = from_json(dumps(scenario))
     one = data.setdefault("parameters", {}).setdefault(parameter, {})
     one |= {name: value for name, value in fields.items() if value is not None}
@@ -125,7 +125,7 @@ def set_formula(scenario: Scenario, *, place: str, formula: str | None) -> Scena
     return loads(json.dumps(data))
 
 
-def _renamed(scenario: Scenario, old: str, new: str) -> Scenario:
+def _rename_parameter_uses(scenario: Scenario, old: str, new: str) -> Scenario:
     _refuse_unknown(scenario, old)
     if new in scenario.parameters:
         raise ScenarioError(f"there is a parameter {new!r} already")

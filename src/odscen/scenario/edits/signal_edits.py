@@ -67,10 +67,10 @@ def clear_timing(scenario: Scenario, junction: str) -> Scenario:
         If the scenario has no timing for it.
     """
     timings = scenario.signals.junctions
-    names = [one.junction for one in timings]
+    names = [timing.junction for timing in timings]
     if junction not in names:
         raise NotFoundError("timing of junction", junction, names)
-    left = tuple(one for one in timings if one.junction != junction)
+    left = tuple(timing for timing in timings if timing.junction != junction)
     return with_fields(scenario, signals=changed_part(scenario.signals, {"junctions": left}))
 
 

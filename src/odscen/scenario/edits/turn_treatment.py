@@ -51,7 +51,7 @@ def crossing_turns(light: Light) -> tuple[CrossingTurn, ...]:
         if one.turn in ("left", "right") and first.drive and first.approach != one.approach:
             found.setdefault((one.approach, one.turn), set())
     result = []
-    for approach, turn in sorted(found, key=lambda key: _place(light, *key)):
+    for approach, turn in sorted(found, key=lambda key: _place_of_turn(light, *key)):
         own = [n for n, m in enumerate(movements) if (m.approach, m.turn) == (approach, turn)]
         lanes = {movements[n].lanes[0] for n in own}
         others = {m.lanes[0] for n, m in enumerate(movements) if m.drive and n not in own}
@@ -59,7 +59,7 @@ def crossing_turns(light: Light) -> tuple[CrossingTurn, ...]:
     return tuple(result)
 
 
-def _place(light: Light, approach: str, turn: str) -> int:
+def _place_of_turn(light: Light, approach: str, turn: str) -> int:
     return next(
         n for n, m in enumerate(light.movements) if (m.approach, m.turn) == (approach, turn)
     )
@@ -77,9 +77,16 @@ def with_turn(
         approach goes, or nothing else of its approach ever has green.
     """
     known = crossing_turns(light)
-    asked = next((one for one in known if (one.approach, one.turn) == (approach, turn)), None)
+    asked = next(
+        (
+            crossing_turn
+            for crossing_turn in known
+            if (crossing_turn.approach, crossing_turn.turn) == (approach, turn)
+        ),
+        None,
+    )
     if asked is None:
-        names = ", ".join(f"{one.approach} {one.turn}" for one in known) or "none"
+        names = ", ".join(f"{turn.approach} {turn.turn}" for turn in known) or "none"
         raise InputError(
             f"{approach} {turn} is no turn across oncoming traffic of the light of junction "
             f"{timing.junction!r}; there are {names}"
@@ -100,7 +107,7 @@ class _Treatment:
         self, timing: JunctionTiming, light: Light, turn: CrossingTurn, treatment: TurnTreatment
     ) -> None:
         self._light, self._turn, self._treatment = light, turn, treatment
-        self._timing = self._apart(timing)
+        self._timing = self._give_own_group(timing)
         program = DesignedProgram(self._timing, light, "fixed")
         self._movements = {name: group.movements for name, group in program.groups.items()}
         self._own = {program.group_of[n] for n in turn.movements}
@@ -121,47 +128,49 @@ class _Treatment:
             If nothing else of the approach ever has green.
         """
         stages = list(self._timing.stages)
-        with_approach = [one.id for one in stages if self._mates & set(one.groups)]
+        with_approach = [stage.id for stage in stages if self._mates & set(stage.groups)]
         if not with_approach:
             raise InputError(
                 f"nothing but the {self._turn.turn} turn comes from {self._turn.approach} with "
                 "green of its own: there is no stage beside which it could be treated otherwise"
             )
-        cleared = [_without(one, self._own) for one in stages]
+        cleared = [_remove_groups(stage, self._own) for stage in stages]
         if self._treatment != "protected":
             cleared = [
-                _with(one, self._own, "permissive") if one.id in with_approach else one
-                for one in cleared
+                _add_groups(stage, self._own, "permissive") if stage.id in with_approach else stage
+                for stage in cleared
             ]
         plans = self._timing.plans
         if self._treatment != "permissive":
-            arrow = self._arrow(cleared, stages, with_approach)
+            arrow = self._find_arrow_stage(cleared, stages, with_approach)
             if arrow is None:
                 new = ProgramStage(
-                    id=_free({one.id for one in stages}), protected=tuple(sorted(self._own)),
+                    id=_choose_free_id({stage.id for stage in stages}), protected=tuple(sorted(self._own)),
                     green=ARROW_GREEN,
                 )  # fmt: skip
-                at = [one.id for one in cleared].index(with_approach[-1]) + 1
+                at = [stage.id for stage in cleared].index(with_approach[-1]) + 1
                 cleared.insert(at, new)
-                plans = tuple(_after(plan, with_approach, new.id) for plan in plans)
+                plans = tuple(_insert_stage_after(plan, with_approach, new.id) for plan in plans)
             else:
                 cleared = [
-                    _with(one, self._own, "protected") if one.id == arrow else one
-                    for one in cleared
+                    _add_groups(stage, self._own, "protected") if stage.id == arrow else stage
+                    for stage in cleared
                 ]
-        empty = {one.id for one in cleared if not one.groups}
+        empty = {stage.id for stage in cleared if not stage.groups}
         changes = {
-            "stages": tuple(one for one in cleared if one.id not in empty),
+            "stages": tuple(stage for stage in cleared if stage.id not in empty),
             "plans": tuple(_without_stages(plan, empty) for plan in plans),
             "detectors": tuple(
-                changed_part(one, {"stages": tuple(s for s in one.stages if s not in empty)})
-                for one in self._timing.detectors
-                if set(one.stages) - empty
+                changed_part(
+                    detector, {"stages": tuple(s for s in detector.stages if s not in empty)}
+                )
+                for detector in self._timing.detectors
+                if set(detector.stages) - empty
             ),
         }
         return fitted_cycles(changed_part(self._timing, changes), self._light)
 
-    def _arrow(
+    def _find_arrow_stage(
         self,
         cleared: Sequence[ProgramStage],
         stages: Sequence[ProgramStage],
@@ -169,17 +178,21 @@ class _Treatment:
     ) -> str | None:
         """A stage without the approach in which nobody meets the turn; where it was, if it may."""
         fits = [
-            one.id
-            for one in cleared
-            if one.id not in with_approach and one.groups and not self._met(one.groups)
+            stage.id
+            for stage in cleared
+            if stage.id not in with_approach
+            and stage.groups
+            and not self._turn_is_met(stage.groups)
         ]
-        before = {one.id for one in stages if self._own & set(one.protected)}
-        alone = {one.id for one in cleared if not one.groups}
+        before = {stage.id for stage in stages if self._own & set(stage.protected)}
+        alone = {stage.id for stage in cleared if not stage.groups}
         kept = [name for name in (*fits, *sorted(alone)) if name in before]
-        turns = [one.id for one in cleared if one.id in fits and self._only_turns(one.groups)]
+        turns = [
+            stage.id for stage in cleared if stage.id in fits and self._only_turns(stage.groups)
+        ]
         return next(iter((*kept, *turns)), None)
 
-    def _met(self, groups: Iterable[str]) -> bool:
+    def _turn_is_met(self, groups: Iterable[str]) -> bool:
         return any(
             (min(i, j), max(i, j)) in self._light.met
             for name in groups
@@ -188,10 +201,12 @@ class _Treatment:
         )
 
     def _only_turns(self, groups: Iterable[str]) -> bool:
-        turns = {n for one in crossing_turns(self._light) for n in one.movements}
+        turns = {
+            n for crossing_turn in crossing_turns(self._light) for n in crossing_turn.movements
+        }
         return all(turns.issuperset(self._movements[name]) for name in groups)
 
-    def _apart(self, timing: JunctionTiming) -> JunctionTiming:
+    def _give_own_group(self, timing: JunctionTiming) -> JunctionTiming:
         """Give the turn a group of its own where it shares one, which shows the same as before."""
         program = DesignedProgram(timing, self._light, "fixed")
         own = set(self._turn.movements)
@@ -199,21 +214,21 @@ class _Treatment:
             members = program.groups[name].movements
             if set(members) <= own:
                 continue
-            new = _free({one.id for one in timing.groups}, f"{name}L")
-            timing = self._divided(timing, name, new, set(members) & own, set(members) - own)
+            new = _choose_free_id({group.id for group in timing.groups}, f"{name}L")
+            timing = self._divide_group(timing, name, new, set(members) & own, set(members) - own)
         return timing
 
-    def _divided(
+    def _divide_group(
         self, timing: JunctionTiming, name: str, new: str, turns: set[int], others: set[int]
     ) -> JunctionTiming:
         groups: list[ProgramGroup] = []
-        for one in timing.groups:
-            if one.id != name:
-                groups.append(one)
+        for group in timing.groups:
+            if group.id != name:
+                groups.append(group)
                 continue
             for key, members in ((name, others), (new, turns)):
                 names = shortest_names(members, self._light.movements)
-                groups.append(changed_part(one, {"id": key, "movements": names}))
+                groups.append(changed_part(group, {"id": key, "movements": names}))
         rows = [
             (first, second, seconds)
             for a, b, seconds in timing.intergreens
@@ -223,17 +238,17 @@ class _Treatment:
         stages = []
         for stage in timing.stages:
             kind = "permissive" if name in stage.permissive else "protected"
-            stages.append(_with(stage, {new}, kind) if name in stage.groups else stage)
+            stages.append(_add_groups(stage, {new}, kind) if name in stage.groups else stage)
         changes = {"groups": tuple(groups), "stages": tuple(stages), "intergreens": tuple(rows)}
         return changed_part(timing, changes)
 
 
-def _with(stage: ProgramStage, groups: set[str], kind: str) -> ProgramStage:
+def _add_groups(stage: ProgramStage, groups: set[str], kind: str) -> ProgramStage:
     listed = getattr(stage, kind)
     return changed_part(stage, {kind: (*listed, *sorted(groups - set(listed)))})
 
 
-def _without(stage: ProgramStage, groups: set[str]) -> ProgramStage:
+def _remove_groups(stage: ProgramStage, groups: set[str]) -> ProgramStage:
     return changed_part(
         stage,
         {
@@ -243,7 +258,7 @@ def _without(stage: ProgramStage, groups: set[str]) -> ProgramStage:
     )
 
 
-def _after(plan: DayPlan, stages: Sequence[str], new: str) -> DayPlan:
+def _insert_stage_after(plan: DayPlan, stages: Sequence[str], new: str) -> DayPlan:
     """A plan with its own order of stages, in which a new one follows the last of these."""
     there = [n for n, name in enumerate(plan.stages) if name in stages]
     if not there:
@@ -263,7 +278,7 @@ def _without_stages(plan: DayPlan, gone: set[str]) -> DayPlan:
     return changed_part(plan, {**times, "stages": left})
 
 
-def _free(taken: set[str], wish: str | None = None) -> str:
+def _choose_free_id(taken: set[str], wish: str | None = None) -> str:
     """An id that nobody has: the one wished for, or a number."""
     if wish is not None and wish not in taken:
         return wish

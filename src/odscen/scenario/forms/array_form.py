@@ -60,15 +60,15 @@ def to_arrays(scenario: Scenario, graph: MapGraph) -> dict[str, Array]:
     """
     refuse_errors([*map_problems(scenario, graph)])
     about = {"format": FORMAT, "version": VERSION, "scenario": scenario.name}
-    document = _document(scenario)
+    document = _remaining_document(scenario)
     return {
         "about": np.array(json.dumps(about, ensure_ascii=False)),
         "seed": np.array(scenario.seed, dtype=np.int64),
         **{name: np.array(getattr(scenario.simulation, name)) for name in RUN_NUMBERS},
-        **_environment(scenario.environment),
-        **_region(scenario, graph, document),
-        **_actors(scenario.actors, graph, document),
-        **_flows(scenario.flows, graph, document),
+        **_environment_arrays(scenario.environment),
+        **_region_arrays(scenario, graph, document),
+        **_actor_arrays(scenario.actors, graph, document),
+        **_flow_arrays(scenario.flows, graph, document),
         "document": np.frombuffer(
             json.dumps(document, ensure_ascii=False).encode(), dtype=np.uint8
         ),
@@ -76,7 +76,7 @@ def to_arrays(scenario: Scenario, graph: MapGraph) -> dict[str, Array]:
     }
 
 
-def _document(scenario: Scenario) -> dict[str, Any]:
+def _remaining_document(scenario: Scenario) -> dict[str, Any]:
     """What has no column, as JSON data; actors, flows and region come with their columns."""
     held = ("name", "description", "map", "simulation")
     data = scenario.model_dump(mode="json", include={*held})
@@ -87,7 +87,7 @@ def _document(scenario: Scenario) -> dict[str, Any]:
     return {name: value for name, value in data.items() if value or name in held}
 
 
-def _environment(environment: Environment) -> dict[str, Array]:
+def _environment_arrays(environment: Environment) -> dict[str, Array]:
     return {
         "environment_preset": np.array(environment.preset),
         "environment_affects_driving": np.array(environment.affects_driving),
@@ -96,7 +96,9 @@ def _environment(environment: Environment) -> dict[str, Array]:
     }
 
 
-def _region(scenario: Scenario, graph: MapGraph, document: dict[str, Any]) -> dict[str, Array]:
+def _region_arrays(
+    scenario: Scenario, graph: MapGraph, document: dict[str, Any]
+) -> dict[str, Array]:
     rows: dict[str, int] = {name: row for row, name in enumerate(graph.segments.ids)}
     found = np.array([rows.get(name, -1) for name in scenario.roi], dtype=np.int64)
     if np.any(found < 0):
@@ -104,56 +106,62 @@ def _region(scenario: Scenario, graph: MapGraph, document: dict[str, Any]) -> di
     return {"roi": found}
 
 
-def _actors(actors: Sequence[Actor], graph: MapGraph, document: dict[str, Any]) -> dict[str, Array]:
-    walks = [on_foot(one.category) for one in actors]
-    node = _nodes([one.spawn for one in actors], walks, graph)
-    goal = _nodes([one.goal for one in actors], walks, graph)
-    via = _via(actors, walks, graph)
-    style = [DRIVING_STYLES.index(one.style) if one.style in DRIVING_STYLES else OTHER_STYLE
-             for one in actors]  # fmt: skip
+def _actor_arrays(
+    actors: Sequence[Actor], graph: MapGraph, document: dict[str, Any]
+) -> dict[str, Array]:
+    walks = [on_foot(actor.category) for actor in actors]
+    node = _node_indices([actor.spawn for actor in actors], walks, graph)
+    goal = _node_indices([actor.goal for actor in actors], walks, graph)
+    via = _via_indices(actors, walks, graph)
+    style = [DRIVING_STYLES.index(actor.style) if actor.style in DRIVING_STYLES else OTHER_STYLE
+             for actor in actors]  # fmt: skip
     document["actors"] = [
-        _remainder(
+        _remaining_fields(
             one,
             {"id", "category", *ACTOR_COLUMNS}
-            | _written(spawn=node[row], goal=goal[row])
+            | _fields_with_index(spawn=node[row], goal=goal[row])
             | ({"via"} if np.all(via[row, : len(one.via)] >= 0) else set())
             | ({"style"} if style[row] != OTHER_STYLE else set()),
         )
         for row, one in enumerate(actors)
     ]
     return {
-        "actor_id": texts(one.id for one in actors),
+        "actor_id": texts(actor.id for actor in actors),
         "actor_row": np.arange(len(actors)),
         "actor_category": np.array(
-            [CATEGORIES.index(one.category) for one in actors], dtype=np.uint8
+            [CATEGORIES.index(actor.category) for actor in actors], dtype=np.uint8
         ),
         "actor_node": node,
         "actor_goal": goal,
         "actor_via": via,
         "actor_style": np.array(style, dtype=np.uint8),
-        **_columns("actor", ACTOR_COLUMNS, actors),
+        **_column_arrays("actor", ACTOR_COLUMNS, actors),
     }
 
 
-def _flows(flows: Sequence[Flow], graph: MapGraph, document: dict[str, Any]) -> dict[str, Array]:
-    places = [place_of(graph, one.spawn) for one in flows]
+def _flow_arrays(
+    flows: Sequence[Flow], graph: MapGraph, document: dict[str, Any]
+) -> dict[str, Array]:
+    places = [place_of(graph, flow.spawn) for flow in flows]
     walks = [place is not None and place.walk for place in places]
-    node = _nodes([one.spawn for one in flows], walks, graph)
-    goal = _nodes([one.goal for one in flows], walks, graph)
+    node = _node_indices([flow.spawn for flow in flows], walks, graph)
+    goal = _node_indices([flow.goal for flow in flows], walks, graph)
     document["flows"] = [
-        _remainder(one, {"id", "mix", *FLOW_COLUMNS} | _written(spawn=node[row], goal=goal[row]))
+        _remaining_fields(
+            one, {"id", "mix", *FLOW_COLUMNS} | _fields_with_index(spawn=node[row], goal=goal[row])
+        )
         | _mix_order(one)
         for row, one in enumerate(flows)
     ]
-    mixes = [[one.mix.get(category, 0.0) for category in CATEGORIES] for one in flows]
+    mixes = [[flow.mix.get(category, 0.0) for category in CATEGORIES] for flow in flows]
     return {
-        "flow_id": texts(one.id for one in flows),
+        "flow_id": texts(flow.id for flow in flows),
         "flow_row": np.arange(len(flows)),
         "flow_on_foot": np.array(walks, dtype=np.bool_),
         "flow_node": node,
         "flow_goal": goal,
         "flow_mix": np.array(mixes, dtype=np.float64).reshape(-1, len(CATEGORIES)),
-        **_columns("flow", FLOW_COLUMNS, flows),
+        **_column_arrays("flow", FLOW_COLUMNS, flows),
     }
 
 
@@ -163,18 +171,18 @@ def _mix_order(flow: Flow) -> dict[str, Any]:
     return {} if order == sorted(order, key=CATEGORIES.index) else {"mix": [*map(str, order)]}
 
 
-def _columns(
+def _column_arrays(
     table: str, columns: dict[str, str], ones: Sequence[Actor] | Sequence[Flow]
 ) -> dict[str, Array]:
     found: dict[str, Array] = {}
     for name, kind in columns.items():
         values = [getattr(one, name) for one in ones]
-        given = [np.nan if one is None else one for one in values]
+        given = [np.nan if value is None else value for value in values]
         found[f"{table}_{name}"] = np.array(given, dtype=_KINDS[kind])
     return found
 
 
-def _nodes(names: Sequence[str | None], walks: Sequence[bool], graph: MapGraph) -> Array:
+def _node_indices(names: Sequence[str | None], walks: Sequence[bool], graph: MapGraph) -> Array:
     """Index of each node on the graph of its road user; :data:`NO_NODE` if it is not there."""
     found = np.full(len(names), NO_NODE, dtype=np.int64)
     for row, (name, walk) in enumerate(zip(names, walks, strict=True)):
@@ -184,23 +192,23 @@ def _nodes(names: Sequence[str | None], walks: Sequence[bool], graph: MapGraph) 
     return found
 
 
-def _via(actors: Sequence[Actor], walks: Sequence[bool], graph: MapGraph) -> Array:
+def _via_indices(actors: Sequence[Actor], walks: Sequence[bool], graph: MapGraph) -> Array:
     """Shape ``(A, V)``, filled up with :data:`NO_NODE`; a row with an unknown node has none."""
-    found = np.full((len(actors), max((len(one.via) for one in actors), default=0)), NO_NODE)
+    found = np.full((len(actors), max((len(actor.via) for actor in actors), default=0)), NO_NODE)
     for row, one in enumerate(actors):
-        nodes = _nodes(one.via, [walks[row]] * len(one.via), graph)
+        nodes = _node_indices(one.via, [walks[row]] * len(one.via), graph)
         if np.all(nodes >= 0):
             found[row, : len(nodes)] = nodes
     return found
 
 
-def _written(**nodes: int) -> set[str]:
+def _fields_with_index(**nodes: int) -> set[str]:
     """Fields whose node has an index."""
     return {name for name, node in nodes.items() if node >= 0}
 
 
-def _remainder(one: Actor | Flow, columns: set[str]) -> dict[str, Any]:
-    return one.model_dump(mode="json", exclude_defaults=True, exclude=columns)
+def _remaining_fields(actor: Actor | Flow, columns: set[str]) -> dict[str, Any]:
+    return actor.model_dump(mode="json", exclude_defaults=True, exclude=columns)
 
 
 def texts(values: Iterable[str]) -> Array:

@@ -77,25 +77,28 @@ def from_arrays(arrays: Mapping[str, Array], *, file: str | None = None) -> Scen
     """
     try:
         reading = _ArrayReading({name: np.asarray(one) for name, one in arrays.items()})
-        scenario = _scenario(reading.fields(), reading.rows)
+        scenario = _validate_scenario(reading.fields(), reading.rows)
         return loads(dumps(scenario)) if scenario.formulas else scenario
     except InputError as error:
         error.file = error.file or file
         raise
 
 
-def _scenario(fields: Mapping[str, Any], tables: Mapping[str, frozenset[str]]) -> Scenario:
+def _validate_scenario(fields: Mapping[str, Any], tables: Mapping[str, frozenset[str]]) -> Scenario:
     try:
         return Scenario.model_validate(fields)
     except ValidationError as error:
-        problems = [_named(one, tables) for one in validation_problems(error)]
+        problems = [
+            _name_array_place(validation_problem, tables)
+            for validation_problem in validation_problems(error)
+        ]
         what = "a problem" if len(problems) == 1 else f"{len(problems)} problems"
         raise ScenarioError(
             f"the scenario of these arrays has {what}", problems=problems
         ) from error
 
 
-def _named(problem: str, tables: Mapping[str, frozenset[str]]) -> str:
+def _name_array_place(problem: str, tables: Mapping[str, frozenset[str]]) -> str:
     """Say the array and row in place of the field of the document, where it has a column."""
     place, colon, said = problem.partition(": ")
     table, _, rest = place.partition("s[")
@@ -118,7 +121,7 @@ class _ArrayReading:
         self._arrays = arrays
         self._refuse_others()
         self.rows = {"actor": frozenset(ACTOR_COLUMNS), "flow": frozenset(FLOW_COLUMNS)}
-        self._document = self._json()
+        self._document = self._read_json()
         self._graph: MapGraph = graph_from_arrays(arrays)
         said = self._document.get("map")
         if isinstance(said, dict) and said.get("sha256") != self._graph.map_sha256:
@@ -132,49 +135,49 @@ class _ArrayReading:
         whole = {name: value for name, value in self._document.items() if value is not None}
         simulation = whole.get("simulation", {})
         if not isinstance(simulation, dict):
-            raise _wrong("document", "its simulation is not an object")
-        numbers = {name: float(self._one(name, REAL)) for name in RUN_NUMBERS}
+            raise _array_error("document", "its simulation is not an object")
+        numbers = {name: float(self._read_single(name, REAL)) for name in RUN_NUMBERS}
         return {
             **whole,
-            "seed": int(self._one("seed", WHOLE)),
+            "seed": int(self._read_single("seed", WHOLE)),
             "simulation": {**simulation, **numbers},
-            "environment": self._environment(),
-            "roi": self._roi(),
-            "actors": self._actors(),
-            "flows": self._flows(),
+            "environment": self._read_environment(),
+            "roi": self._read_roi(),
+            "actors": self._read_actors(),
+            "flows": self._read_flows(),
         }
 
     def _refuse_others(self) -> None:
         try:
-            about = json.loads(str(self._text("about")))
+            about = json.loads(str(self._read_text("about")))
             known = (about["format"], about["version"])
         except (ValueError, KeyError, TypeError, RecursionError) as error:
-            raise _wrong("about", "it does not say which arrays these are") from error
+            raise _array_error("about", "it does not say which arrays these are") from error
         if known != (FORMAT, VERSION):
-            raise _wrong("about", f"these are {known[0]} {known[1]}, not {FORMAT} {VERSION}")
+            raise _array_error("about", f"these are {known[0]} {known[1]}, not {FORMAT} {VERSION}")
 
-    def _json(self) -> dict[str, Any]:
-        data = self._column("document", "u", "bytes")
+    def _read_json(self) -> dict[str, Any]:
+        data = self._read_column("document", "u", "bytes")
         try:
             document = json.loads(data.astype(np.uint8).tobytes())
         except (ValueError, RecursionError) as error:
-            raise _wrong("document", f"it is not JSON: {error}") from error
+            raise _array_error("document", f"it is not JSON: {error}") from error
         if not isinstance(document, dict):
-            raise _wrong("document", "it is not a JSON object")
+            raise _array_error("document", "it is not a JSON object")
         return document
 
     # ------------------------------------------------------------------ parts of the document
-    def _environment(self) -> dict[str, Any]:
-        names = self._column("environment_parameter", _TEXT, "texts")
-        values = self._numbers("environment_value", REAL, len(names))
+    def _read_environment(self) -> dict[str, Any]:
+        names = self._read_column("environment_parameter", _TEXT, "texts")
+        values = self._read_numbers("environment_value", REAL, len(names))
         return {
-            "preset": str(self._text("environment_preset")),
-            "affects_driving": bool(self._one("environment_affects_driving", TRUTH)),
+            "preset": str(self._read_text("environment_preset")),
+            "affects_driving": bool(self._read_single("environment_affects_driving", TRUTH)),
             "parameters": dict(zip(names.tolist(), values.tolist(), strict=True)),
         }
 
-    def _roi(self) -> list[str]:
-        rows = self._column("roi", _ACCEPTED[WHOLE], _CALLED[WHOLE])
+    def _read_roi(self) -> list[str]:
+        rows = self._read_column("roi", _ACCEPTED[WHOLE], _CALLED[WHOLE])
         named, known = self._document.get("roi"), self._graph.segments.ids
         found = []
         for place, row in enumerate(rows.tolist()):
@@ -183,35 +186,37 @@ class _ArrayReading:
             elif row == -1 and isinstance(named, list) and place < len(named):
                 found.append(named[place])
             else:
-                raise _wrong("roi", f"row {place}: there is no segment {row}")
+                raise _array_error("roi", f"row {place}: there is no segment {row}")
         return found
 
-    def _actors(self) -> list[dict[str, Any]]:
-        ids = self._ids("actor")
+    def _read_actors(self) -> list[dict[str, Any]]:
+        ids = self._read_ids("actor")
         size = len(ids)
-        kinds = self._indices("actor_category", size, len(CATEGORIES))
-        styles = self._indices("actor_style", size, len(DRIVING_STYLES), but=OTHER_STYLE)
-        via = self._matrix("actor_via", _ACCEPTED[WHOLE], size)
+        kinds = self._read_indices("actor_category", size, len(CATEGORIES))
+        styles = self._read_indices("actor_style", size, len(DRIVING_STYLES), but=OTHER_STYLE)
+        via = self._read_matrix("actor_via", _ACCEPTED[WHOLE], size)
         walks = [on_foot(CATEGORIES[kind]) for kind in kinds]
-        ends = self._ends("actor", walks)
-        found = self._read("actor", ACTOR_COLUMNS, self._written_of("actor", size))
+        ends = self._read_ends("actor", walks)
+        found = self._read_columns("actor", ACTOR_COLUMNS, self._written_of("actor", size))
         for row, fields in enumerate(found):
             fields.update(ends[row])
             if passed := [one for one in via[row].tolist() if one != NO_NODE]:
                 walk = walks[row]
-                fields["via"] = [self._name("actor_via", row, one, walk=walk) for one in passed]
+                fields["via"] = [
+                    self._name_of_node("actor_via", row, one, walk=walk) for one in passed
+                ]
             if styles[row] != OTHER_STYLE:
                 fields["style"] = DRIVING_STYLES[styles[row]]
             fields["id"], fields["category"] = ids[row], CATEGORIES[kinds[row]]
         return _with_ids(found, "actor")
 
-    def _flows(self) -> list[dict[str, Any]]:
-        ids = self._ids("flow")
+    def _read_flows(self) -> list[dict[str, Any]]:
+        ids = self._read_ids("flow")
         size = len(ids)
-        walks = self._numbers("flow_on_foot", TRUTH, size).tolist()
-        mixes = self._matrix("flow_mix", _ACCEPTED[REAL], size, len(CATEGORIES))
-        ends = self._ends("flow", walks)
-        found = self._read("flow", FLOW_COLUMNS, self._written_of("flow", size))
+        walks = self._read_numbers("flow_on_foot", TRUTH, size).tolist()
+        mixes = self._read_matrix("flow_mix", _ACCEPTED[REAL], size, len(CATEGORIES))
+        ends = self._read_ends("flow", walks)
+        found = self._read_columns("flow", FLOW_COLUMNS, self._written_of("flow", size))
         for row, fields in enumerate(found):
             fields.update(ends[row])
             order = fields.get("mix")
@@ -229,20 +234,20 @@ class _ArrayReading:
         """What the document has of each row without a column; a new row has nothing."""
         held = self._document.get(f"{table}s", [])
         if not (isinstance(held, list) and all(isinstance(one, dict) for one in held)):
-            raise _wrong("document", f"its {table}s are not a list of objects")
-        rows = self._indices(f"{table}_row", size, len(held), but=-1)
+            raise _array_error("document", f"its {table}s are not a list of objects")
+        rows = self._read_indices(f"{table}_row", size, len(held), but=-1)
         return [dict(held[row]) if row >= 0 else {} for row in rows]
 
-    def _ids(self, table: str) -> list[str]:
-        ids: list[str] = self._column(f"{table}_id", _TEXT, "texts").tolist()
+    def _read_ids(self, table: str) -> list[str]:
+        ids: list[str] = self._read_column(f"{table}_id", _TEXT, "texts").tolist()
         return ids
 
-    def _read(
+    def _read_columns(
         self, table: str, columns: Mapping[str, str], found: list[dict[str, Any]]
     ) -> list[dict[str, Any]]:
         """Put the values of columns into the fields of each row; NaN leaves the default."""
         for name, kind in columns.items():
-            values = self._numbers(f"{table}_{name}", kind, len(found))
+            values = self._read_numbers(f"{table}_{name}", kind, len(found))
             for fields, value, no_value in zip(
                 found, values.tolist(), np.isnan(values).tolist(), strict=True
             ):
@@ -251,72 +256,78 @@ class _ArrayReading:
         return found
 
     # ------------------------------------------------------------------ arrays
-    def _ends(self, table: str, walks: list[bool]) -> list[dict[str, str]]:
+    def _read_ends(self, table: str, walks: list[bool]) -> list[dict[str, str]]:
         """Start and goal of each row of which the arrays have a node."""
         found: list[dict[str, str]] = [{} for _ in walks]
         for field, array in (("spawn", f"{table}_node"), ("goal", f"{table}_goal")):
-            nodes = self._numbers(array, WHOLE, len(walks)).tolist()
+            nodes = self._read_numbers(array, WHOLE, len(walks)).tolist()
             for row, node in enumerate(nodes):
                 if node != NO_NODE:
-                    found[row][field] = self._name(array, row, node, walk=walks[row])
+                    found[row][field] = self._name_of_node(array, row, node, walk=walks[row])
         return found
 
-    def _name(self, array: str, row: int, node: int, *, walk: bool) -> str:
+    def _name_of_node(self, array: str, row: int, node: int, *, walk: bool) -> str:
         number = len(self._graph.walks.x if walk else self._graph.lanes.x)
         if not 0 <= node < number:
             graph = "pedestrian graph" if walk else "lane graph"
-            raise _wrong(array, f"row {row}: there is no node {node}; the {graph} has {number}")
+            raise _array_error(
+                array, f"row {row}: there is no node {node}; the {graph} has {number}"
+            )
         return node_name(self._graph, node, walk=walk)
 
-    def _indices(self, array: str, size: int, end: int, *, but: int | None = None) -> list[int]:
-        found: list[int] = self._numbers(array, WHOLE, size).tolist()
+    def _read_indices(
+        self, array: str, size: int, end: int, *, but: int | None = None
+    ) -> list[int]:
+        found: list[int] = self._read_numbers(array, WHOLE, size).tolist()
         for row, value in enumerate(found):
             if not 0 <= value < end and value != but:
                 other = "" if but is None else f" or {but}"
-                raise _wrong(array, f"row {row}: {value} is not 0 to {end - 1}{other}")
+                raise _array_error(array, f"row {row}: {value} is not 0 to {end - 1}{other}")
         return found
 
-    def _numbers(self, array: str, kind: str, size: int) -> Array:
-        values = self._column(array, _ACCEPTED[kind], _CALLED[kind])
+    def _read_numbers(self, array: str, kind: str, size: int) -> Array:
+        values = self._read_column(array, _ACCEPTED[kind], _CALLED[kind])
         if len(values) != size:
-            raise _wrong(array, f"it has {len(values)} rows; its table has {size}")
+            raise _array_error(array, f"it has {len(values)} rows; its table has {size}")
         return values.astype(np.float64) if kind == REAL else values
 
-    def _matrix(self, array: str, kinds: str, size: int, wide: int | None = None) -> Array:
-        values = self._array(array)
+    def _read_matrix(self, array: str, kinds: str, size: int, wide: int | None = None) -> Array:
+        values = self._required_array(array)
         fits = values.ndim == 2 and len(values) == size and wide in (None, values.shape[1])
         if not fits or values.dtype.kind not in kinds:
             columns = "any number of" if wide is None else wide
-            raise _wrong(
+            raise _array_error(
                 array,
                 f"it is {values.shape} of {values.dtype}, not {size} rows of {columns} numbers",
             )
         return values
 
-    def _column(self, array: str, kinds: str, called: str) -> Array:
-        values = self._array(array)
+    def _read_column(self, array: str, kinds: str, called: str) -> Array:
+        values = self._required_array(array)
         empty = values.ndim == 1 and not len(values)  # a list without values has any kind
         if values.ndim != 1 or (values.dtype.kind not in kinds and not empty):
-            raise _wrong(array, f"it is {values.shape} of {values.dtype}, not a column of {called}")
+            raise _array_error(
+                array, f"it is {values.shape} of {values.dtype}, not a column of {called}"
+            )
         return values
 
-    def _one(self, array: str, kind: str) -> Any:
-        values = self._array(array)
+    def _read_single(self, array: str, kind: str) -> Any:
+        values = self._required_array(array)
         if values.size != 1 or values.dtype.kind not in _ACCEPTED[kind]:
-            raise _wrong(
+            raise _array_error(
                 array, f"it is {values.shape} of {values.dtype}, not one value: {_CALLED[kind]}"
             )
         return values.item()
 
-    def _text(self, array: str) -> str:
-        values = self._array(array)
+    def _read_text(self, array: str) -> str:
+        values = self._required_array(array)
         if values.size != 1 or values.dtype.kind != _TEXT:
-            raise _wrong(array, f"it is {values.shape} of {values.dtype}, not one text")
+            raise _array_error(array, f"it is {values.shape} of {values.dtype}, not one text")
         return str(values.item())
 
-    def _array(self, array: str) -> Array:
+    def _required_array(self, array: str) -> Array:
         if array not in self._arrays:
-            raise _wrong(array, "it is missing")
+            raise _array_error(array, "it is missing")
         return self._arrays[array]
 
 
@@ -334,5 +345,5 @@ def _with_ids(rows: list[dict[str, Any]], table: str) -> list[dict[str, Any]]:
     return rows
 
 
-def _wrong(array: str, problem: str) -> InputError:
+def _array_error(array: str, problem: str) -> InputError:
     return InputError(problem, element=f"array {array}")

@@ -72,9 +72,9 @@ def write_graphml(graph: nx.MultiDiGraph) -> str:
     """
     edges = list(graph.edges(data=True))
     keys = {
-        "graph": _types([graph.graph]),
-        "node": _types(data for _, data in graph.nodes(data=True)),
-        "edge": _types(data for _, _, data in edges),
+        "graph": _attribute_types([graph.graph]),
+        "node": _attribute_types(data for _, data in graph.nodes(data=True)),
+        "edge": _attribute_types(data for _, _, data in edges),
     }
     head = (
         f'<key id="{kind[0]}_{escape(name)}" for="{kind}" attr.name={quoteattr(name)} '
@@ -83,11 +83,11 @@ def write_graphml(graph: nx.MultiDiGraph) -> str:
         for name, type_ in types.items()
     )
     nodes = (
-        f"<node id={_quoted(node)}>{_data('n', data)}</node>"
+        f"<node id={_quote_name(node)}>{_write_data('n', data)}</node>"
         for node, data in graph.nodes(data=True)
     )
     lines = (
-        f"<edge source={_quoted(source)} target={_quoted(target)}>{_data('e', data)}</edge>"
+        f"<edge source={_quote_name(source)} target={_quote_name(target)}>{_write_data('e', data)}</edge>"
         for source, target, data in edges
     )
     return "\n".join(
@@ -95,7 +95,7 @@ def write_graphml(graph: nx.MultiDiGraph) -> str:
             ["<?xml version='1.0' encoding='UTF-8'?>"],
             ['<graphml xmlns="http://graphml.graphdrawing.org/xmlns">'],
             head,
-            ['<graph edgedefault="directed">' + _data("g", graph.graph)],
+            ['<graph edgedefault="directed">' + _write_data("g", graph.graph)],
             nodes,
             lines,
             ["</graph>", "</graphml>", ""],
@@ -113,7 +113,7 @@ def read_graphml(text: str) -> nx.MultiDiGraph:
     """
     import networkx as nx
 
-    root = _parse(text)
+    root = _parse_xml(text)
     keys = {
         key.get("id", ""): (key.get("attr.name", ""), key.get("attr.type", "string"))
         for key in root.iter(_NAMESPACE + "key")
@@ -121,21 +121,21 @@ def read_graphml(text: str) -> nx.MultiDiGraph:
     element = root.find(_NAMESPACE + "graph")
     if element is None or element.get("edgedefault") != "directed":
         raise ScenarioError("not a GraphML file with a directed graph")
-    graph = nx.MultiDiGraph(**_values(element, keys, "graph"))
+    graph = nx.MultiDiGraph(**_read_values(element, keys, "graph"))
     for node in element.iterchildren(_NAMESPACE + "node"):
         name = node.get("id", "")
-        graph.add_node(name, **_values(node, keys, f"node {name}"))
+        graph.add_node(name, **_read_values(node, keys, f"node {name}"))
     for edge in element.iterchildren(_NAMESPACE + "edge"):
         source, target = edge.get("source", ""), edge.get("target", "")
         where = f"edge {source} -> {target}"
         if source not in graph or target not in graph:
             raise ScenarioError("one of its nodes is not in the graph", element=where)
-        values = _values(edge, keys, where)
+        values = _read_values(edge, keys, where)
         graph.add_edge(source, target, key=values.get("relation"), **values)
     return graph
 
 
-def _parse(text: str) -> etree._Element:
+def _parse_xml(text: str) -> etree._Element:
     try:
         root = read_xml(text)
     except LimitError:
@@ -147,7 +147,7 @@ def _parse(text: str) -> etree._Element:
     return root
 
 
-def _types(attributes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+def _attribute_types(attributes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """GraphML type of each attribute; the widest of boolean, long, double, string."""
     order = list(_TYPES.values())
     found: dict[str, str] = {}
@@ -160,15 +160,15 @@ def _types(attributes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     return found
 
 
-def _data(prefix: str, data: Mapping[str, Any]) -> str:
+def _write_data(prefix: str, data: Mapping[str, Any]) -> str:
     return "".join(
-        f'<data key="{prefix}_{escape(name)}">{_text(value)}</data>'
+        f'<data key="{prefix}_{escape(name)}">{_format_value(value)}</data>'
         for name, value in data.items()
         if value is not None
     )
 
 
-def _text(value: str | float | bool) -> str:
+def _format_value(value: str | float | bool) -> str:
     if isinstance(value, str):
         return escape(value, {"\r": "&#13;"})
     if isinstance(value, bool):
@@ -177,11 +177,11 @@ def _text(value: str | float | bool) -> str:
     return words.get(repr(value), repr(value))
 
 
-def _quoted(name: object) -> str:
+def _quote_name(name: object) -> str:
     return quoteattr(str(name))
 
 
-def _values(
+def _read_values(
     element: etree._Element, keys: Mapping[str, tuple[str, str]], where: str
 ) -> dict[str, Any]:
     values: dict[str, Any] = {}
@@ -223,12 +223,12 @@ def to_graph(scenario: Scenario, graph: MapGraph) -> nx.MultiDiGraph:
     problems = [*map_problems(scenario, graph), *shared_nodes(scenario), *duplicate_ids(scenario)]
     refuse_errors([*problems, *(roi_problems(scenario, graph) if scenario.roi else ())])
     region = Region.of(graph, scenario.roi)
-    result = _induced(graph, region)
-    result.graph.update(_about(scenario))
+    result = _induced_graph(graph, region)
+    result.graph.update(_graph_attributes(scenario))
     for order, actor in enumerate(scenario.actors):
-        _write(result, "actor", order, actor)
+        _write_on_nodes(result, "actor", order, actor)
     for order, flow in enumerate(scenario.flows):
-        _write(result, "flow", order, flow)
+        _write_on_nodes(result, "flow", order, flow)
     return result
 
 
@@ -254,8 +254,8 @@ def from_graph(graph: nx.MultiDiGraph) -> Scenario:
     for name in _JSON:
         if name in about:
             fields[name] = _from_json(name, about[name])
-    fields["actors"] = tuple(_read(graph, "actor", Actor))
-    fields["flows"] = tuple(_read(graph, "flow", Flow))
+    fields["actors"] = tuple(_read_from_nodes(graph, "actor", Actor))
+    fields["flows"] = tuple(_read_from_nodes(graph, "flow", Flow))
     return validated(Scenario, fields)
 
 
@@ -279,7 +279,7 @@ def from_graphml(text: str, *, file: str | None = None) -> Scenario:
         raise
 
 
-def _about(scenario: Scenario) -> dict[str, Any]:
+def _graph_attributes(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json")
     for name in OPTIONAL:
         data[name] = without_defaults(scenario, name)
@@ -297,7 +297,7 @@ def _about(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _induced(graph: MapGraph, region: Region) -> nx.MultiDiGraph:
+def _induced_graph(graph: MapGraph, region: Region) -> nx.MultiDiGraph:
     """Lane nodes and walk nodes of the region in one directed graph, walks in both directions."""
     import networkx as nx
 
@@ -320,25 +320,25 @@ def _induced(graph: MapGraph, region: Region) -> nx.MultiDiGraph:
     return result
 
 
-def _write(graph: nx.MultiDiGraph, prefix: str, order: int, one: Actor | Flow) -> None:
-    for what, node in (("spawn", one.spawn), ("goal", one.goal)):
+def _write_on_nodes(graph: nx.MultiDiGraph, prefix: str, order: int, actor: Actor | Flow) -> None:
+    for what, node in (("spawn", actor.spawn), ("goal", actor.goal)):
         if node is not None and node not in graph:
             raise ScenarioError(
-                f"{one.id!r} has its {what} on {node!r}, which is not inside the region",
+                f"{actor.id!r} has its {what} on {node!r}, which is not inside the region",
                 element=f"{prefix}s[{order}].{what}",
             )
-    data = one.model_dump(mode="json", exclude={"spawn", "goal"}, exclude_none=True)
+    data = actor.model_dump(mode="json", exclude={"spawn", "goal"}, exclude_none=True)
     attributes = {
         f"{prefix}_{name}": json.dumps(value) if isinstance(value, dict | list) else value
         for name, value in data.items()
         if value != []
     }
-    graph.nodes[one.spawn].update({f"{prefix}_order": order, **attributes})
-    if one.goal is not None:
-        graph.add_edge(one.spawn, one.goal, key=GOAL, relation=GOAL)
+    graph.nodes[actor.spawn].update({f"{prefix}_order": order, **attributes})
+    if actor.goal is not None:
+        graph.add_edge(actor.spawn, actor.goal, key=GOAL, relation=GOAL)
 
 
-def _read(graph: nx.MultiDiGraph, prefix: str, model: type[_One]) -> Iterator[_One]:
+def _read_from_nodes(graph: nx.MultiDiGraph, prefix: str, model: type[_One]) -> Iterator[_One]:
     """Actors or flows in their order; those without one follow in the order of the nodes."""
     found: list[tuple[float, str, dict[str, Any]]] = []
     for node, data in graph.nodes(data=True):
@@ -351,15 +351,15 @@ def _read(graph: nx.MultiDiGraph, prefix: str, model: type[_One]) -> Iterator[_O
     taken = {fields.get("id") for _, _, fields in found}
     free = (name for k in count(1) if (name := f"{prefix}-{k}") not in taken)
     for _, node, fields in found:
-        fields["spawn"], fields["goal"] = str(node), _goal(graph, node)
+        fields["spawn"], fields["goal"] = str(node), _goal_of_node(graph, node)
         if "id" not in fields:
             fields["id"] = next(free)
         for name in {"mix", "via"} & fields.keys():
             fields[name] = _from_json(name, fields[name])
-        yield _checked(model, fields)
+        yield _validate_fields(model, fields)
 
 
-def _goal(graph: nx.MultiDiGraph, node: str) -> str | None:
+def _goal_of_node(graph: nx.MultiDiGraph, node: str) -> str | None:
     edges = graph.out_edges(node, data="relation")
     goals = [str(target) for _, target, relation in edges if relation == GOAL]
     if len(goals) > 1:
@@ -369,7 +369,7 @@ def _goal(graph: nx.MultiDiGraph, node: str) -> str | None:
     return goals[0] if goals else None
 
 
-def _checked(model: type[_One], fields: dict[str, Any]) -> _One:
+def _validate_fields(model: type[_One], fields: dict[str, Any]) -> _One:
     try:
         return validated(model, fields)
     except ScenarioError as error:

@@ -107,11 +107,11 @@ class Crowd:
 
     def add(self, label: int, box: Box) -> None:
         """Add a box under a number that :meth:`touching` gives back."""
-        self._cells.setdefault(self._key(box), []).append((label, box))
+        self._cells.setdefault(self._cell_of(box), []).append((label, box))
 
     def touching(self, box: Box) -> Iterator[int]:
         """Numbers of the boxes that overlap ``box``."""
-        column, row = self._key(box)
+        column, row = self._cell_of(box)
         for i, j in _AROUND:
             for label, other in self._cells.get((column + i, row + j), ()):
                 if overlap(box, other):
@@ -121,5 +121,5 @@ class Crowd:
         """Whether nothing overlaps ``box``."""
         return next(self.touching(box), None) is None
 
-    def _key(self, box: Box) -> tuple[int, int]:
+    def _cell_of(self, box: Box) -> tuple[int, int]:
         return floor(box.x / self._cell), floor(box.y / self._cell)

@@ -126,7 +126,7 @@ class Region:
     @classmethod
     def of(cls, graph: MapGraph, segments: Iterable[str]) -> Region:
         """The region of these segments; names that the map does not have are left out."""
-        return _region(graph, tuple(segments))
+        return _shared_region(graph, tuple(segments))
 
     @property
     def router(self) -> Router:
@@ -193,9 +193,9 @@ class Region:
         """Nodes of the path from node to node, each leg the shortest; empty if there is none."""
         router = self.walk_router if walk else self.router
         found = [router.path(here, there) for here, there in pairwise(nodes)]
-        if not all(len(one) for one in found):
+        if not all(len(array) for array in found):
             return np.empty(0, dtype=np.int32)
-        return np.concatenate([found[0], *(one[1:] for one in found[1:])])
+        return np.concatenate([found[0], *(array[1:] for array in found[1:])])
 
     def look_up(self, pairs: Iterable[tuple[str, str | None]]) -> None:
         """Find what :meth:`leads` and :meth:`is_candidate` say of many spawns and goals at once."""
@@ -229,7 +229,7 @@ class Region:
 
 
 @lru_cache(maxsize=4)
-def _region(graph: MapGraph, segments: tuple[str, ...]) -> Region:
+def _shared_region(graph: MapGraph, segments: tuple[str, ...]) -> Region:
     """One region for all scenarios of a batch that have it, with what is known of its paths."""
     known = set(graph.segments.ids)
     inside = tuple(SegmentId(name) for name in dict.fromkeys(segments) if name in known)

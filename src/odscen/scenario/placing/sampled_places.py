@@ -137,14 +137,14 @@ def place_at_random(supply: Supply, count: int, rng: np.random.Generator) -> tup
     at about three quarters of what fits), ``count`` members of the maximal crowd are taken instead.
     """
     count = min(count, len(supply.fit))
-    spots = _thrown(supply, count, rng)
+    spots = _throw_spots(supply, count, rng)
     if len(spots) < count:
         chosen = rng.choice(len(supply.fit), size=count, replace=False)
         spots = [Spot(supply.fit.nodes[i], supply.fit.categories[i]) for i in chosen]
     return tuple(sorted(spots))
 
 
-def _thrown(supply: Supply, count: int, rng: np.random.Generator) -> list[Spot]:
+def _throw_spots(supply: Supply, count: int, rng: np.random.Generator) -> list[Spot]:
     crowd = crowd_for(supply.bodies, minimum_gap=supply.minimum_gap)
     free = {
         category: _free_nodes(supply, category, crowd, rng)

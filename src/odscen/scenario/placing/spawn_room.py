@@ -62,8 +62,8 @@ def standing_room(graph: LaneGraph, body: Body, *, allowed: BoolArray) -> BoolAr
     source, target = graph.source[follows], graph.target[follows]
     ahead, behind = good.copy(), good.copy()
     for _ in range(ceil(body.length / 2 / graph.spacing)):
-        ahead &= _step(ahead, source, target)
-        behind &= _step(behind, target, source)
+        ahead &= _step_back(ahead, source, target)
+        behind &= _step_back(behind, target, source)
     return ahead & behind & (graph.width >= body.width + 2 * LANE_MARGIN)
 
 
@@ -82,7 +82,7 @@ def late_for_changes(graph: LaneGraph, body: Body) -> BoolArray:
         here = graph.lane_change & side > 0
         ahead = here.copy()
         for _ in range(ceil((body.length / 2.0 + LANE_CHANGE) / graph.spacing)):
-            ahead &= _step(ahead, source, target)
+            ahead &= _step_back(ahead, source, target)
         late |= here & ~ahead
     return late
 
@@ -168,10 +168,10 @@ class Reach:
         if part not in self._known:
             if len(self._known) >= _PARTS_KEPT:
                 self._known.clear()
-            self._known[part] = self._reached(node)
+            self._known[part] = self._nodes_reached(node)
         return self._known[part]
 
-    def _reached(self, node: int) -> BoolArray:
+    def _nodes_reached(self, node: int) -> BoolArray:
         from scipy.sparse.csgraph import breadth_first_order
 
         reached = np.zeros(len(self._mask), dtype=np.bool_)
@@ -195,7 +195,7 @@ def _shortest_edges(graph: LaneGraph, mask: BoolArray) -> csr_array:
     return csr_array((length[first], (source[first], target[first])), shape=(count, count))
 
 
-def _step(good: BoolArray, source: np.ndarray, target: np.ndarray) -> BoolArray:
+def _step_back(good: BoolArray, source: np.ndarray, target: np.ndarray) -> BoolArray:
     """Nodes with at least one edge out, all of whose edges lead to good nodes."""
     some = np.zeros(len(good), dtype=bool)
     some[source] = True

@@ -82,15 +82,17 @@ def redrawn(scenario: Scenario, what: Redraw) -> Scenario:
         return scenario
     styles = _dealt_styles(scenario)
     actors = [
-        actor if actor.ego else _redrawn(actor, scenario.seed, styles[actor.id])
+        actor if actor.ego else _redraw_behaviour(actor, scenario.seed, styles[actor.id])
         for actor in scenario.actors
     ]
     if what == "traffic":
-        actors = [one if one.ego else one.model_copy(update={"goal": None}) for one in actors]
+        actors = [
+            actor if actor.ego else actor.model_copy(update={"goal": None}) for actor in actors
+        ]
     return scenario.model_copy(update={"actors": tuple(actors)})
 
 
-def _redrawn(actor: Actor, seed: int, style: str) -> Actor:
+def _redraw_behaviour(actor: Actor, seed: int, style: str) -> Actor:
     fields: dict[str, object] = {"style": style}
     if actor.depart > 0:
         later = DEPARTURE.draw(stream(seed, "redrawn departure", actor.id))
@@ -108,8 +110,8 @@ def _dealt_styles(scenario: Scenario) -> dict[str, str]:
     """Style of each actor: those of a category dealt out again."""
     dealt: dict[str, str] = {}
     for category in Category:
-        group = [one for one in scenario.actors if one.category is category and not one.ego]
-        styles = [one.style for one in group]
+        group = [actor for actor in scenario.actors if actor.category is category and not actor.ego]
+        styles = [actor.style for actor in group]
         order = stream(scenario.seed, "redrawn styles", category).permutation(len(group))
         dealt |= {one.id: styles[place] for one, place in zip(group, order.tolist(), strict=True)}
     return dealt
@@ -125,8 +127,8 @@ def draw_behaviour(
     """Draw the fields of an actor that say how it moves; speeds and offsets to the centimetre."""
     room = (float(graph.width[spot.node]) - body.width) / 2 - LANE_MARGIN
     fields: dict[str, Any] = {
-        "speed": _speed(behaviour, graph, spot, rng),
-        "lateral_offset": _within(behaviour.lateral_offset.draw(rng), max(room, 0.0)),
+        "speed": _draw_speed(behaviour, graph, spot, rng),
+        "lateral_offset": _cut_offset(behaviour.lateral_offset.draw(rng), max(room, 0.0)),
         "depart": round(max(behaviour.depart.draw(rng), 0.0), 1),
     }
     if spot.category is Category.PEDESTRIAN:
@@ -137,7 +139,7 @@ def draw_behaviour(
     return fields
 
 
-def _speed(
+def _draw_speed(
     behaviour: Behaviour,
     graph: LaneGraph | PedestrianGraph,
     spot: Spot,
@@ -156,7 +158,7 @@ def _speed(
     return min(max(round(speed, 2), low), high)
 
 
-def _within(offset: float, room: float) -> float:
+def _cut_offset(offset: float, room: float) -> float:
     """``offset`` cut to ``room`` either side, towards zero to whole centimetres."""
     return math.trunc(max(-room, min(room, offset)) * 100) / 100
 
@@ -179,7 +181,7 @@ def choose_map(maps: MapFilter, statistics: Mapping[str, Mapping[str, Any]], *, 
         If a statistic is unknown or no map passes the filter.
     """
     used = {*maps.where, *([maps.weight_by] if maps.weight_by else [])}
-    numbers = {name: _numbers(of_map) for name, of_map in statistics.items()}
+    numbers = {name: _numeric_statistics(of_map) for name, of_map in statistics.items()}
     known = {name for of_map in numbers.values() for name in of_map}
     if statistics and (unknown := sorted(used - known)):
         raise ScenarioError(
@@ -318,7 +320,7 @@ def numbers_to_place(
     return cars, people
 
 
-def _numbers(statistics: Mapping[str, Any]) -> dict[str, float]:
+def _numeric_statistics(statistics: Mapping[str, Any]) -> dict[str, float]:
     return {
         name: float(value)
         for name, value in statistics.items()
@@ -398,10 +400,14 @@ def _sample_actors(
     cars, people, supply, walkers = crew
     rng = stream(seed, "places")
     drafts = [
-        *_drafts(region, config, usable, place_at_random(supply, cars, rng), supply, seed=seed),
-        *_drafts(region, config, usable, place_at_random(walkers, people, rng), walkers, seed=seed),
+        *_draft_actors(
+            region, config, usable, place_at_random(supply, cars, rng), supply, seed=seed
+        ),
+        *_draft_actors(
+            region, config, usable, place_at_random(walkers, people, rng), walkers, seed=seed
+        ),
     ]
-    drafts, offsets = _settled(region, drafts, usable)
+    drafts, offsets = _settle_offsets(region, drafts, usable)
     ego = _draw_ego(drafts, stream(seed, "ego")) if config.ego else None
     counter: Counter[Category] = Counter()
     actors = []
@@ -425,7 +431,7 @@ def _sample_actors(
     return tuple(actors)
 
 
-def _drafts(
+def _draft_actors(
     region: Region,
     config: SamplingConfig,
     usable: Usable,
@@ -454,7 +460,7 @@ def _drafts(
     return drafts
 
 
-def _settled(
+def _settle_offsets(
     region: Region, drafts: Sequence[_ScenarioDraft], usable: Usable
 ) -> tuple[list[_ScenarioDraft], list[float]]:
     """Lateral offsets with which no bodies touch, and the drafts that can stay.

@@ -63,28 +63,30 @@ def green_bands(
     """Widest band of either direction with given offsets; none lasts 0 s."""
     pairs = list(zip(lights, offsets, strict=True))
     return (
-        _widest([(one.out, offset - one.out_time) for one, offset in pairs], cycle),
-        _widest([(one.back, offset - one.back_time) for one, offset in pairs], cycle),
+        _widest_band([(one.out, offset - one.out_time) for one, offset in pairs], cycle),
+        _widest_band([(one.back, offset - one.back_time) for one, offset in pairs], cycle),
     )
 
 
-def _widest(windows: Sequence[tuple[Sequence[GreenWindow], float]], cycle: float) -> Band:
+def _widest_band(windows: Sequence[tuple[Sequence[GreenWindow], float]], cycle: float) -> Band:
     """Longest common stretch of windows that are shifted, on the circle of a cycle."""
     free = [(0.0, 2.0 * cycle)]
     for own, shift in windows:
         shown = [
-            (begin + turn * cycle, begin + turn * cycle + min(one.seconds, cycle))
-            for one in own
-            for begin in ((one.begin + shift) % cycle,)
+            (begin + turn * cycle, begin + turn * cycle + min(window.seconds, cycle))
+            for window in own
+            for begin in ((window.begin + shift) % cycle,)
             for turn in (-1, 0, 1)
         ]
-        if any(one.seconds >= cycle for one in own):
+        if any(window.seconds >= cycle for window in own):
             continue
         free = [
             (max(a, c), min(b, d)) for a, b in free for c, d in shown if min(b, d) - max(a, c) > 0.0
         ]
     # What the end of the two cycles cuts is whole in the first of them.
-    best = max(free, key=lambda one: (round(min(one[1] - one[0], cycle), 6), -one[0]), default=None)
+    best = max(
+        free, key=lambda pair: (round(min(pair[1] - pair[0], cycle), 6), -pair[0]), default=None
+    )
     if best is None:
         return Band(0.0, 0.0)
     return Band(best[0] % cycle, min(best[1] - best[0], cycle))
@@ -103,11 +105,11 @@ def widest_offsets(
     """
     grid = max(math.floor(cycle + _NEAR), 1)
     steps: FloatArray = np.arange(2 * grid, dtype=np.float64)
-    out = [_room(one.out, one.out_time - steps[:grid], cycle) for one in lights]
+    out = [_green_left(light.out, light.out_time - steps[:grid], cycle) for light in lights]
     # By seconds that the band back begins after the one out, less the offset.
-    back = [_room(one.back, steps + (one.back_time - grid), cycle) for one in lights]
+    back = [_green_left(light.back, steps + (light.back_time - grid), cycle) for light in lights]
     places = np.arange(grid)[None, :] - np.arange(grid)[:, None] + grid
-    rooms = [one[places] for one in back]  # by offset, then by the lateness of the band back
+    rooms = [array[places] for array in back]  # by offset, then by the lateness of the band back
     widest = math.floor(min(float(room.max()) for room in out) + _NEAR)
     best: tuple[tuple[float, float], int, float, int] | None = None
     for width in range(widest + 1):
@@ -116,7 +118,7 @@ def widest_offsets(
             fits = room >= width - _NEAR if width else room > -np.inf  # no band fits anywhere
             through = np.minimum(through, other[fits].max(axis=0))
         for late in np.flatnonzero(through >= through.max() - _NEAR).tolist()[:1]:
-            value = _value(float(width), max(float(through[late]), 0.0), favoured)
+            value = _value_of_bands(float(width), max(float(through[late]), 0.0), favoured)
             if best is None or value > best[0]:
                 best = value, width, float(through[late]), late
     if best is None:
@@ -128,10 +130,10 @@ def widest_offsets(
         if width:
             spare = np.minimum(room - width, spare)
         offsets.append(int(np.flatnonzero(spare >= spare.max() - _NEAR)[0]))
-    return tuple(float((one - offsets[0]) % grid) for one in offsets)
+    return tuple(float((offset - offsets[0]) % grid) for offset in offsets)
 
 
-def _value(out: float, back: float, favoured: Favoured) -> tuple[float, float]:
+def _value_of_bands(out: float, back: float, favoured: Favoured) -> tuple[float, float]:
     if favoured == "out":
         return round(out, 6), round(back, 6)
     if favoured == "back":
@@ -139,7 +141,7 @@ def _value(out: float, back: float, favoured: Favoured) -> tuple[float, float]:
     return round(min(out, back), 6), round(out + back, 6)
 
 
-def _room(windows: Sequence[GreenWindow], times: FloatArray, cycle: float) -> FloatArray:
+def _green_left(windows: Sequence[GreenWindow], times: FloatArray, cycle: float) -> FloatArray:
     """Seconds of green that are left at times of the program; negative without any."""
     room = np.full(len(times), -1.0)
     for window in windows:

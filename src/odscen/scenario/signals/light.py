@@ -161,7 +161,7 @@ def shortest_names(wanted: Iterable[int], movements: Sequence[SignalMovement]) -
     goal = frozenset(left)
     while left:
         first = min(left)
-        for name in _names(movements[first]):
+        for name in _names_of_movement(movements[first]):
             found = frozenset(find_movements(name, movements))
             if found <= goal:
                 break
@@ -172,10 +172,16 @@ def shortest_names(wanted: Iterable[int], movements: Sequence[SignalMovement]) -
 
 def known_names(movements: Sequence[SignalMovement]) -> tuple[str, ...]:
     """Names of all movements, by segments, for messages."""
-    return tuple(dict.fromkeys(one.name for one in movements if one.turn))
+    return tuple(dict.fromkeys(movement.name for movement in movements if movement.turn))
 
 
-def _names(one: SignalMovement) -> tuple[str, ...]:
-    if one.walk:
-        return tuple(f"walk {leg}" for leg in one.legs)
-    return one.approach, f"{one.approach} {one.turn}", one.name, one.lanes[0], one.exact_name
+def _names_of_movement(signal_movement: SignalMovement) -> tuple[str, ...]:
+    if signal_movement.walk:
+        return tuple(f"walk {leg}" for leg in signal_movement.legs)
+    return (
+        signal_movement.approach,
+        f"{signal_movement.approach} {signal_movement.turn}",
+        signal_movement.name,
+        signal_movement.lanes[0],
+        signal_movement.exact_name,
+    )

@@ -130,11 +130,15 @@ class DesignedProgram:
         timing = self.timing
         if not timing.plans:
             ids = tuple(stage.id for stage in timing.stages)
-            return (TimedPlan(ONLY_PLAN, self._stages(ids), timing.cycle, timing.offset, ()),)
+            return (
+                TimedPlan(ONLY_PLAN, self._planned_stages(ids), timing.cycle, timing.offset, ()),
+            )
         return tuple(
             TimedPlan(
                 plan.id,
-                self._stages(plan.stages or tuple(stage.id for stage in timing.stages), plan),
+                self._planned_stages(
+                    plan.stages or tuple(stage.id for stage in timing.stages), plan
+                ),
                 timing.cycle if plan.cycle is None else plan.cycle,
                 plan.offset,
                 tuple(map(seconds_of_day, plan.times)),
@@ -142,7 +146,7 @@ class DesignedProgram:
             for plan in timing.plans
         )
 
-    def _stages(
+    def _planned_stages(
         self, ids: tuple[str, ...], plan: DayPlan | None = None
     ) -> tuple[PlannedStage, ...]:
         design = {stage.id: stage for stage in self.timing.stages}
@@ -305,7 +309,7 @@ def change_steps(
     """Steps from the end of a stage's green to the begin of the next one's."""
     ending = sorted(stage.groups - following.groups)
     beginning = beginning_groups(stage, following)
-    needs = {name: _need(program, name, beginning) for name in ending}
+    needs = {name: _seconds_before_stage(program, name, beginning) for name in ending}
     length = max(needs.values(), default=0.0)
     before, behind = stage_state(program, stage), stage_state(program, following)
     starts = {name: length - needs[name] for name in ending}
@@ -327,16 +331,20 @@ def change_steps(
         going = any(begin < start for start in starts.values())
         name = YELLOW if "y" in text else CLEARANCE if going else ALL_RED
         steps.append(ShownStep(end - begin, text, name))
-    return _merged(steps)
+    return _merge_steps(steps)
 
 
-def _need(program: DesignedProgram, ending: str, beginning: frozenset[str]) -> float:
+def _seconds_before_stage(
+    program: DesignedProgram, ending: str, beginning: frozenset[str]
+) -> float:
     """Seconds before the next stage at which a group has to end."""
     group = program.groups[ending]
-    return max((program.intergreen(ending, one) for one in beginning), default=0.0) or group.yellow
+    return (
+        max((program.intergreen(ending, name) for name in beginning), default=0.0) or group.yellow
+    )
 
 
-def _merged(steps: list[ShownStep]) -> tuple[ShownStep, ...]:
+def _merge_steps(steps: list[ShownStep]) -> tuple[ShownStep, ...]:
     result: list[ShownStep] = []
     for step in steps:
         if result and result[-1].state == step.state:

@@ -146,7 +146,7 @@ def critical_ratios(
         Share of the cycle that a stage has as green, over its flow ratio.
     """
     ratios = [0.0] * stages
-    for lane in sorted(lanes, key=lambda one: (len(one.gaps), len(one.stages), -one.ratio)):
+    for lane in sorted(lanes, key=lambda lane: (len(lane.gaps), len(lane.stages), -lane.ratio)):
         had = sum(ratios[stage] for stage in lane.stages)
         filtered = sum(
             max(ratios[n] * spare - blocked, 0.0) / (1.0 - blocked) * share
@@ -181,14 +181,14 @@ def webster(
     """
     ratios = critical_ratios(lanes, len(stages))
     lost = _lost_time(stages, ratios, between)
-    wanted = _wanted(lost, sum(ratios))
+    wanted = _optimal_cycle(lost, sum(ratios))
     if any(lane.gaps for lane in lanes):
         for _ in range(_ROUNDS):
             length = min(max(wanted if cycle is None else cycle, bounds[0]), bounds[1])
             spare = max((1.0 - lost / length) / sum(ratios), 1.0) if any(ratios) else 1.0
             ratios = critical_ratios(lanes, len(stages), spare=spare)
             lost = _lost_time(stages, ratios, between)
-            wanted = _wanted(lost, sum(ratios))
+            wanted = _optimal_cycle(lost, sum(ratios))
     if cycle is None:
         cycle = min(max(wanted, bounds[0]), bounds[1])
         cycle = float(math.ceil(cycle - 1e-9))
@@ -206,7 +206,7 @@ def _lost_time(stages: Sequence[StageNeed], ratios: Sequence[float], between: fl
     )
 
 
-def _wanted(lost: float, total: float) -> float:
+def _optimal_cycle(lost: float, total: float) -> float:
     return (1.5 * lost + 5.0) / (1.0 - total) if total < 1.0 else math.inf
 
 

@@ -63,49 +63,51 @@ _SHORT = 1e-9
 """Seconds in which no one moves."""
 
 
-def walk(part: Walking, one: ActingActor) -> float:
+def walk(part: Walking, acting_actor: ActingActor) -> float:
     """Begin to walk straight to a place."""
-    places = [one.view.place(place) for place in (*part.through, part.to)]
-    line = (one.spot(), *places)
+    places = [acting_actor.view.place(place) for place in (*part.through, part.to)]
+    line = (acting_actor.spot(), *places)
     if line_length(line) < 1e-6:
-        return one.instant
-    _along_line(line, part.speed, one)
+        return acting_actor.instant
+    _along_line(line, part.speed, acting_actor)
     return math.inf
 
 
-def _along_line(line: tuple[Point, ...], speed: float | None, one: ActingActor) -> None:
-    channel = one.channel
-    usual = speed or one.view.walking_speed(one.actor.id)
+def _along_line(line: tuple[Point, ...], speed: float | None, acting_actor: ActingActor) -> None:
+    channel = acting_actor.channel
+    usual = speed or acting_actor.view.walking_speed(acting_actor.actor.id)
     if speed is not None or channel.law is None or channel.held or channel.borrowed:
         # ... unless a rule has said how fast it goes
-        channel.take_speed(steady(one.instant, usual), one.owner)
-    channel.take_line(line, 0.0, None, one.owner, one.instant)
+        channel.take_speed(steady(acting_actor.instant, usual), acting_actor.owner)
+    channel.take_line(line, 0.0, None, acting_actor.owner, acting_actor.instant)
 
 
-def on_the_line(_: object, one: ActingActor, __: float) -> float:
+def on_the_line(_: object, acting_actor: ActingActor, __: float) -> float:
     """When the end of the line is reached, if it is in this step."""
-    end = one.channel.reaches_end(one.instant, one.instant + one.step)
+    end = acting_actor.channel.reaches_end(
+        acting_actor.instant, acting_actor.instant + acting_actor.step
+    )
     return math.inf if end is None else end
 
 
-def end_of_walk(part: Walking, one: ActingActor) -> None:
+def end_of_walk(part: Walking, acting_actor: ActingActor) -> None:
     """Stay there; on a sidewalk, walk on with the next step."""
-    _leave_or_stay(part.to, one)
+    _leave_or_stay(part.to, acting_actor)
 
 
-def stay(one: ActingActor) -> None:
+def stay(acting_actor: ActingActor) -> None:
     """Let a person stand where its line ends."""
-    channel = one.channel
-    channel.take_speed(steady(one.instant, 0.0), None)
+    channel = acting_actor.channel
+    channel.take_speed(steady(acting_actor.instant, 0.0), None)
     channel.held = True
 
 
-def _leave_or_stay(place: RulePlace, one: ActingActor) -> None:
-    stay(one)
-    one.channel.leaves = isinstance(place, str) and place.startswith("ped.")
+def _leave_or_stay(place: RulePlace, acting_actor: ActingActor) -> None:
+    stay(acting_actor)
+    acting_actor.channel.leaves = isinstance(place, str) and place.startswith("ped.")
 
 
-def follow_path(part: PathFollowing, one: ActingActor) -> float:
+def follow_path(part: PathFollowing, acting_actor: ActingActor) -> float:
     """Begin to follow a drawn path; the front of a vehicle is on it, the centre of a person.
 
     Raises
@@ -114,91 +116,95 @@ def follow_path(part: PathFollowing, one: ActingActor) -> float:
         If the actor stands, and no rule says how fast it goes; or who the points are relative to
         is not on the road.
     """
-    points = _points(part, one)
-    line = (_own_point(one), *points)
+    points = _points_of_path(part, acting_actor)
+    line = (_own_point(acting_actor), *points)
     if line_length(line) < 1e-6:
-        return one.instant
-    channel = one.channel
+        return acting_actor.instant
+    channel = acting_actor.channel
     if part.times or part.speeds:
         legs = [math.dist(a, b) for a, b in itertools.pairwise(line)]
-        knots = _timed(legs, part.times) if part.times else _at_points(legs, part.speeds, one.speed)
-        table = SpeedTable(one.instant, knots)
-        channel.take_speed(table, one.owner)
-        channel.take_line(line, 0.0, None, one.owner, one.instant)
+        knots = (
+            _time_of_legs(legs, part.times)
+            if part.times
+            else _at_points(legs, part.speeds, acting_actor.speed)
+        )
+        table = SpeedTable(acting_actor.instant, knots)
+        channel.take_speed(table, acting_actor.owner)
+        channel.take_line(line, 0.0, None, acting_actor.owner, acting_actor.instant)
         return table.end
-    if one.actor.person or part.speed is not None:
-        _along_line(line, part.speed, one)
-    elif one.speed > 0.0 or channel.law is not None:
-        channel.take_line(line, 0.0, None, one.owner, one.instant)
+    if acting_actor.actor.person or part.speed is not None:
+        _along_line(line, part.speed, acting_actor)
+    elif acting_actor.speed > 0.0 or channel.law is not None:
+        channel.take_line(line, 0.0, None, acting_actor.owner, acting_actor.instant)
     else:
         raise CannotAct("it is stopped; the path has to say how fast it is followed")
     return math.inf
 
 
-def _points(part: PathFollowing, one: ActingActor) -> list[Point]:
+def _points_of_path(part: PathFollowing, acting_actor: ActingActor) -> list[Point]:
     if part.relative_to is None:
-        return [one.view.place(place) for place in part.points]
-    base = one.view.actor(part.relative_to)
+        return [acting_actor.view.place(place) for place in part.points]
+    base = acting_actor.view.actor(part.relative_to)
     if base is None:
         raise CannotAct(f"{part.relative_to!r} is not on the road")
     # The actor itself is where it is at the instant of the begin, within the step.
-    x, y = one.spot() if part.relative_to == one.actor.id else (base.x, base.y)
+    x, y = acting_actor.spot() if part.relative_to == acting_actor.actor.id else (base.x, base.y)
     c, s = math.cos(base.hdg), math.sin(base.hdg)
     return [
         (x + ahead * c - left * s, y + ahead * s + left * c)
-        for ahead, left in (one.view.place(place) for place in part.points)
+        for ahead, left in (acting_actor.view.place(place) for place in part.points)
     ]
 
 
-def on_the_path(part: PathFollowing, one: ActingActor, end: float) -> float:
+def on_the_path(part: PathFollowing, acting_actor: ActingActor, end: float) -> float:
     """When the end of the path is reached."""
-    return end if end < math.inf else on_the_line(part, one, end)
+    return end if end < math.inf else on_the_line(part, acting_actor, end)
 
 
-def end_of_path(part: PathFollowing, one: ActingActor) -> None:
+def end_of_path(part: PathFollowing, acting_actor: ActingActor) -> None:
     """Give a vehicle back to SUMO; a person stays unless it is on a sidewalk."""
-    if one.actor.person:
-        _leave_or_stay(part.points[-1], one)
+    if acting_actor.actor.person:
+        _leave_or_stay(part.points[-1], acting_actor)
     else:
-        one.channel.release_speed(one.instant)
-        one.channel.leaves = True
+        acting_actor.channel.release_speed(acting_actor.instant)
+        acting_actor.channel.leaves = True
 
 
-def replay(part: Replaying, one: ActingActor) -> float:
+def replay(part: Replaying, acting_actor: ActingActor) -> float:
     """Begin to be where a recorded road user was."""
-    end = one.instant + part.rows[-1][0]
-    _replay_until(part, one, one.instant)
+    end = acting_actor.instant + part.rows[-1][0]
+    _replay_until(part, acting_actor, acting_actor.instant)
     return end
 
 
-def replay_further(part: Replaying, one: ActingActor, end: float) -> float:
+def replay_further(part: Replaying, acting_actor: ActingActor, end: float) -> float:
     """Hand over the rows of this step."""
-    _replay_until(part, one, end - part.rows[-1][0])
+    _replay_until(part, acting_actor, end - part.rows[-1][0])
     return end
 
 
-def end_of_replay(_: Replaying, one: ActingActor) -> None:
+def end_of_replay(_: Replaying, acting_actor: ActingActor) -> None:
     """Give a vehicle back to SUMO, with the last speed; a person stays."""
-    if one.actor.person:
-        stay(one)
+    if acting_actor.actor.person:
+        stay(acting_actor)
     else:
-        one.channel.release_speed(one.instant)
-        one.channel.leaves = True
+        acting_actor.channel.release_speed(acting_actor.instant)
+        acting_actor.channel.leaves = True
 
 
-def _replay_until(part: Replaying, one: ActingActor, begin: float) -> None:
+def _replay_until(part: Replaying, acting_actor: ActingActor, begin: float) -> None:
     """Lead the actor through the rows of this step, in a run that began at ``begin``.
 
     A step is handed over at a time, however long the recording is.
     """
-    start = one.instant - begin
-    stop = min(one.view.time + one.step - begin, part.rows[-1][0])
+    start = acting_actor.instant - begin
+    stop = min(acting_actor.view.time + acting_actor.step - begin, part.rows[-1][0])
     times = _Times(part.rows)
     inside = part.rows[bisect_right(times, start) : bisect_left(times, stop)]
     rows = [_row_at(part.rows, times, start), *inside]
     if stop - start > _SHORT:
         rows.append(_row_at(part.rows, times, stop))
-    half = 0.0 if one.actor.person else one.actor.length / 2.0
+    half = 0.0 if acting_actor.actor.person else acting_actor.actor.length / 2.0
     line = tuple((x + half * math.cos(hdg), y + half * math.sin(hdg)) for _, x, y, hdg in rows)
     knots: list[tuple[float, float]] = []
     for (a, b), (p, q) in zip(itertools.pairwise(rows), itertools.pairwise(line), strict=True):
@@ -207,10 +213,15 @@ def _replay_until(part: Replaying, one: ActingActor, begin: float) -> None:
     if not knots:
         line, knots = (*line, *line), [(0.0, 0.0)]
         rows = [*rows, *rows]
-    table = SpeedTable(one.instant, tuple(knots))
-    one.channel.take_speed(table, one.owner)
-    one.channel.take_line(
-        line, 0.0, None, one.owner, one.instant, headings=tuple(row[3] for row in rows)
+    table = SpeedTable(acting_actor.instant, tuple(knots))
+    acting_actor.channel.take_speed(table, acting_actor.owner)
+    acting_actor.channel.take_line(
+        line,
+        0.0,
+        None,
+        acting_actor.owner,
+        acting_actor.instant,
+        headings=tuple(row[3] for row in rows),
     )
 
 
@@ -235,13 +246,13 @@ def _row_at(rows: tuple[TrajectoryRow, ...], times: _Times, time: float) -> Traj
     return time, x0 + (x1 - x0) * share, y0 + (y1 - y0) * share, h0 + turn * share
 
 
-def _own_point(one: ActingActor) -> Point:
-    x, y = one.spot()
-    half = 0.0 if one.actor.person else one.actor.length / 2.0
-    return x + half * math.cos(one.actor.hdg), y + half * math.sin(one.actor.hdg)
+def _own_point(acting_actor: ActingActor) -> Point:
+    x, y = acting_actor.spot()
+    half = 0.0 if acting_actor.actor.person else acting_actor.actor.length / 2.0
+    return x + half * math.cos(acting_actor.actor.hdg), y + half * math.sin(acting_actor.actor.hdg)
 
 
-def _timed(legs: list[float], times: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+def _time_of_legs(legs: list[float], times: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
     knots: list[tuple[float, float]] = []
     for length, (begin, end) in zip(legs, itertools.pairwise((0.0, *times)), strict=True):
         speed = length / (end - begin)
@@ -320,15 +331,15 @@ def said_of_signal(part: SignalSwitch) -> str:
     return f"light {part.light}: {part.movement or ''} {part.shows}".replace("  ", " ")
 
 
-def has_appeared(_: Appearing, one: ActingActor, __: float) -> float:
+def has_appeared(_: Appearing, acting_actor: ActingActor, __: float) -> float:
     """Instant at which it is seen on the road."""
-    return one.view.time
+    return acting_actor.view.time
 
 
-def set_goal(part: NewGoal, one: ActingActor) -> float:
+def set_goal(part: NewGoal, acting_actor: ActingActor) -> float:
     """Take another goal."""
-    one.channel.goal = part.to
-    return one.instant
+    acting_actor.channel.goal = part.to
+    return acting_actor.instant
 
 
 def said_of_goal(part: NewGoal) -> str:
@@ -336,28 +347,28 @@ def said_of_goal(part: NewGoal) -> str:
     return f"goal {part.to}"
 
 
-def set_lights(part: VehicleLights, one: ActingActor) -> float:
+def set_lights(part: VehicleLights, acting_actor: ActingActor) -> float:
     """Switch lights of a vehicle."""
-    one.channel.lights = _lights(part) if part.model_fields_set else None
-    return one.instant
+    acting_actor.channel.lights = _shown_lights(part) if part.model_fields_set else None
+    return acting_actor.instant
 
 
 def said_of_lights(part: VehicleLights) -> str:
     """Lights that are on."""
     if not part.model_fields_set:
         return "lights: the driver's"
-    return f"lights: {', '.join(_lights(part)) or 'off'}"
+    return f"lights: {', '.join(_shown_lights(part)) or 'off'}"
 
 
-def _lights(part: VehicleLights) -> tuple[str, ...]:
+def _shown_lights(part: VehicleLights) -> tuple[str, ...]:
     shown = () if part.indicator in (None, "off") else (str(part.indicator),)
     names = ("brake", "front", "high_beam", "fog", "emergency")
     return shown + tuple(name for name in names if getattr(part, name))
 
 
-def sound_horn(_: object, one: ActingActor) -> float:
+def sound_horn(_: object, acting_actor: ActingActor) -> float:
     """Sound the horn: nothing moves."""
-    return one.instant
+    return acting_actor.instant
 
 
 def said_of_horn(_: object) -> str:
@@ -371,7 +382,7 @@ _ON_LANE = 2.0
 """Metres from the centre of a lane at which the front of a vehicle is still on it."""
 
 
-def change_lane(part: LaneChange, one: ActingActor) -> float:
+def change_lane(part: LaneChange, acting_actor: ActingActor) -> float:
     """Begin a lane change.
 
     Raises
@@ -380,28 +391,32 @@ def change_lane(part: LaneChange, one: ActingActor) -> float:
         If there is no such lane.
     """
     if part.to is not None:
-        line = one.view.lane_line_to(one.actor.id, part.to)
+        line = acting_actor.view.lane_line_to(acting_actor.actor.id, part.to)
         missing = "none of the lanes beside it leads to the place"
     else:
         by = part.by or 0
-        line = _back_in_lane(by, one) or one.view.lane_line(one.actor.id, by)
+        line = _back_in_lane(by, acting_actor) or acting_actor.view.lane_line(
+            acting_actor.actor.id, by
+        )
         missing = f"there is no lane {abs(by)} to the {'left' if by > 0 else 'right'} for it"
-    if line is None or not _leads_on(line, _front(one), one.actor.hdg):
+    if line is None or not _leads_on(line, _front_of_actor(acting_actor), acting_actor.actor.hdg):
         raise CannotAct(missing)
-    _beside_lane(line, 0.0, part.over, one)
-    return one.instant + part.over
+    _beside_lane(line, 0.0, part.over, acting_actor)
+    return acting_actor.instant + part.over
 
 
-def _back_in_lane(by: int, one: ActingActor) -> tuple[Point, ...] | None:
+def _back_in_lane(by: int, acting_actor: ActingActor) -> tuple[Point, ...] | None:
     """The lane beside which a vehicle is led, if that is the next one that way.
 
     Beside all lanes and in an opposite lane, SUMO does not know which lane it came from.
     """
-    line, side = one.channel.line, one.channel.side
+    line, side = acting_actor.channel.line, acting_actor.channel.side
     if line is None or side is None or by != -math.copysign(1, side.e1) or abs(side.e1) < _ON_LANE:
         return None
-    under = one.view.lane_line(one.actor.id, 0)
-    own_way = under is not None and _leads_on(under, _front(one), one.actor.hdg)
+    under = acting_actor.view.lane_line(acting_actor.actor.id, 0)
+    own_way = under is not None and _leads_on(
+        under, _front_of_actor(acting_actor), acting_actor.actor.hdg
+    )
     return None if own_way else line
 
 
@@ -410,7 +425,7 @@ def _leads_on(line: tuple[Point, ...], point: Point, hdg: float) -> bool:
     return math.cos(point_on(line, beside(line, point).along).hdg - hdg) > 0.0
 
 
-def move_aside(part: LateralMove, one: ActingActor) -> float:
+def move_aside(part: LateralMove, acting_actor: ActingActor) -> float:
     """Begin to move to an offset.
 
     Raises
@@ -420,15 +435,15 @@ def move_aside(part: LateralMove, one: ActingActor) -> float:
     """
     # Far beside its lane SUMO has it on another one, or none: what follows is about the lane that
     # it was led along until now.
-    led = one.channel.line if one.channel.side is not None else None
-    line = led or one.view.lane_line(one.actor.id, 0)
+    led = acting_actor.channel.line if acting_actor.channel.side is not None else None
+    line = led or acting_actor.view.lane_line(acting_actor.actor.id, 0)
     if line is None:
         raise CannotAct("it is on no lane")
-    _beside_lane(line, part.to, part.over, one)
-    return one.instant + part.over
+    _beside_lane(line, part.to, part.over, acting_actor)
+    return acting_actor.instant + part.over
 
 
-def cut_in(part: CuttingIn, one: ActingActor) -> float:
+def cut_in(part: CuttingIn, acting_actor: ActingActor) -> float:
     """Begin to change into the lane of another.
 
     Raises
@@ -436,17 +451,17 @@ def cut_in(part: CuttingIn, one: ActingActor) -> float:
     CannotAct
         If that is not on a lane of the road, or the gap cannot be reached in time.
     """
-    other = _other(part, one)
-    line = one.view.lane_line(part.to, 0)
+    other = _other_actor(part, acting_actor)
+    line = acting_actor.view.lane_line(part.to, 0)
     if line is None:
         raise CannotAct(f"{part.to!r} is on no lane")
-    _beside_lane(line, 0.0, part.over, one)
-    end = one.instant + part.over
-    _reach_gap(part, one, other, end)
+    _beside_lane(line, 0.0, part.over, acting_actor)
+    end = acting_actor.instant + part.over
+    _reach_gap(part, acting_actor, other, end)
     return end
 
 
-def cut_in_further(part: CuttingIn, one: ActingActor, end: float) -> float:
+def cut_in_further(part: CuttingIn, acting_actor: ActingActor, end: float) -> float:
     """Choose the speed of this step by the gap that is left, until it is half over.
 
     Then the actor is in the other lane, and the other one may brake for it.
@@ -456,20 +471,20 @@ def cut_in_further(part: CuttingIn, one: ActingActor, end: float) -> float:
     CannotAct
         If the lane ends, or the gap cannot be reached in time.
     """
-    lane_lasts(part, one, end)
-    if end - one.instant > part.over / 2.0:
-        _reach_gap(part, one, _other(part, one), end)
+    lane_lasts(part, acting_actor, end)
+    if end - acting_actor.instant > part.over / 2.0:
+        _reach_gap(part, acting_actor, _other_actor(part, acting_actor), end)
     return end
 
 
-def after_cut_in(part: CuttingIn, one: ActingActor) -> None:
+def after_cut_in(part: CuttingIn, acting_actor: ActingActor) -> None:
     """Let SUMO drive on."""
     if part.gap is not None:
-        one.channel.release_speed(one.instant)
-    leave_line(part, one)
+        acting_actor.channel.release_speed(acting_actor.instant)
+    leave_line(part, acting_actor)
 
 
-def lane_lasts(_: object, one: ActingActor, end: float) -> float:
+def lane_lasts(_: object, acting_actor: ActingActor, end: float) -> float:
     """Look whether the lane goes on.
 
     Raises
@@ -477,55 +492,61 @@ def lane_lasts(_: object, one: ActingActor, end: float) -> float:
     CannotAct
         If it ends in this step.
     """
-    channel = one.channel
-    metres = channel.metres(one.instant, one.instant + one.step)
+    channel = acting_actor.channel
+    metres = channel.metres(acting_actor.instant, acting_actor.instant + acting_actor.step)
     if channel.along + metres > line_length(channel.line or ()):
         raise CannotAct("the lane ends before it is there")
     return end
 
 
-def leave_aside(part: LateralMove, one: ActingActor) -> None:
+def leave_aside(part: LateralMove, acting_actor: ActingActor) -> None:
     """Leave the line with this step if it ends on a lane that leads the same way.
 
     Elsewhere the line is followed on: beside all lanes, or in an opposite lane, where SUMO would
     turn the vehicle round.
     """
-    line = one.channel.line
+    line = acting_actor.channel.line
     if line is None or abs(part.to) < _ON_LANE:
-        one.channel.leaves = True
+        acting_actor.channel.leaves = True
         return
-    x, y, hdg = point_on(line, one.channel.along, left=part.to)
+    x, y, hdg = point_on(line, acting_actor.channel.along, left=part.to)
     for by in (0, 1 if part.to > 0 else -1):
-        lane = one.view.lane_line(one.actor.id, by)
+        lane = acting_actor.view.lane_line(acting_actor.actor.id, by)
         if lane is None or abs(beside(lane, (x, y)).left) >= _ON_LANE:
             continue
         if _leads_on(lane, (x, y), hdg):
-            one.channel.leaves = True
+            acting_actor.channel.leaves = True
 
 
-def leave_line(_: object, one: ActingActor) -> None:
+def leave_line(_: object, acting_actor: ActingActor) -> None:
     """Leave the line with this step."""
-    one.channel.leaves = True
+    acting_actor.channel.leaves = True
 
 
-def _other(part: CuttingIn, one: ActingActor) -> ActorView:
-    other = one.view.actor(part.to)
+def _other_actor(part: CuttingIn, acting_actor: ActingActor) -> ActorView:
+    other = acting_actor.view.actor(part.to)
     if other is None or other.person:
         raise CannotAct(f"{part.to!r} does not drive on the road")
     return other
 
 
-def _beside_lane(line: tuple[Point, ...], left: float, over: float, one: ActingActor) -> None:
+def _beside_lane(
+    line: tuple[Point, ...], left: float, over: float, acting_actor: ActingActor
+) -> None:
     """Move the front to ``left`` metres of a line."""
-    place = beside(line, _front(one))
-    side = SideLaw(one.instant, place.left, left, over)
-    one.channel.take_line(line, place.along, side, one.owner, one.instant)
-    one.channel.keeps_lane = True
+    place = beside(line, _front_of_actor(acting_actor))
+    side = SideLaw(acting_actor.instant, place.left, left, over)
+    acting_actor.channel.take_line(
+        line, place.along, side, acting_actor.owner, acting_actor.instant
+    )
+    acting_actor.channel.keeps_lane = True
 
 
-def _front(one: ActingActor) -> Point:
-    actor = one.actor
-    ahead = actor.length / 2.0 + one.channel.metres(one.view.time, one.instant)
+def _front_of_actor(acting_actor: ActingActor) -> Point:
+    actor = acting_actor.actor
+    ahead = actor.length / 2.0 + acting_actor.channel.metres(
+        acting_actor.view.time, acting_actor.instant
+    )
     return actor.x + ahead * math.cos(actor.hdg), actor.y + ahead * math.sin(actor.hdg)
 
 
@@ -540,7 +561,7 @@ def _reach_gap(part: CuttingIn, one: ActingActor, other: ActorView, end: float) 
     half, left = other.length / 2.0, end - one.instant
     front = other.x + half * math.cos(other.hdg), other.y + half * math.sin(other.hdg)
     theirs = beside(line, front).along + other.speed * (one.instant - one.view.time)
-    mine = beside(line, _front(one)).along
+    mine = beside(line, _front_of_actor(one)).along
     gap = mine - one.actor.length - theirs
     v, u = one.speed, other.speed
     v1 = 2.0 * ((part.gap - gap) / left + u) - v
@@ -558,26 +579,29 @@ _BY = 1.5
 _SAME = 1e-6
 
 
-def arrive(part: Arriving, one: ActingActor) -> float:
+def arrive(part: Arriving, acting_actor: ActingActor) -> float:
     """Begin: a pedestrian goes straight to the place, unless it is on a line that leads there."""
-    if one.actor.person and _on_line(one.actor, part.at, one.view, one.channel) is None:
-        line = (one.spot(), one.view.place(part.at))
-        one.channel.take_speed(steady(one.instant, 0.0), one.owner)
-        one.channel.take_line(line, 0.0, None, one.owner, one.instant)
+    if (
+        acting_actor.actor.person
+        and _on_line(acting_actor.actor, part.at, acting_actor.view, acting_actor.channel) is None
+    ):
+        line = (acting_actor.spot(), acting_actor.view.place(part.at))
+        acting_actor.channel.take_speed(steady(acting_actor.instant, 0.0), acting_actor.owner)
+        acting_actor.channel.take_line(line, 0.0, None, acting_actor.owner, acting_actor.instant)
     return math.inf
 
 
-def end_of_arrival(part: Arriving, one: ActingActor) -> None:
+def end_of_arrival(part: Arriving, acting_actor: ActingActor) -> None:
     """Keep the speed; a pedestrian stays where its line ends if that is the place."""
-    line = one.channel.line
-    at = one.view.place(part.at)
-    if one.actor.person and line is not None and math.dist(line[-1], at) < _SAME:
-        stay(one)
+    line = acting_actor.channel.line
+    at = acting_actor.view.place(part.at)
+    if acting_actor.actor.person and line is not None and math.dist(line[-1], at) < _SAME:
+        stay(acting_actor)
     else:
-        one.channel.keep_speed()
+        acting_actor.channel.keep_speed()
 
 
-def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
+def synchronise(part: Arriving, acting_actor: ActingActor, end: float) -> float:
     """Choose the speed that brings both there at one instant; for good once the other is steady.
 
     Raises
@@ -587,27 +611,27 @@ def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
     """
     if end < math.inf:
         return end
-    view, channel = one.view, one.channel
+    view, channel = acting_actor.view, acting_actor.channel
     other = view.actor(part.to)
     if other is None:
         raise CannotAct(f"{part.to!r} is not on the road")
-    theirs = _rest(other, part.when_at, view, one.channels.get(part.to))
+    theirs = _metres_to_place(other, part.when_at, view, acting_actor.channels.get(part.to))
     if theirs is None:
         raise CannotAct(f"{part.to!r} does not come by the place where it is to be met")
-    done = one.instant - view.time
-    mine = _own_rest(part, one)
+    done = acting_actor.instant - view.time
+    mine = _own_rest(part, acting_actor)
     if other.speed < 0.1:
-        channel.take_speed(steady(one.instant, 0.0), one.owner)
+        channel.take_speed(steady(acting_actor.instant, 0.0), acting_actor.owner)
         return math.inf
     left = theirs / other.speed - done
-    law = arrival_law(part, one.instant, mine, left)
-    needed = law.speed(one.instant) if left > 0.0 else math.inf
-    fastest = FASTEST_WALKER if one.actor.person else FASTEST_VEHICLE
+    law = arrival_law(part, acting_actor.instant, mine, left)
+    needed = law.speed(acting_actor.instant) if left > 0.0 else math.inf
+    fastest = FASTEST_WALKER if acting_actor.actor.person else FASTEST_VEHICLE
     if needed > fastest:
         raise CannotAct(f"it would have to go at {needed:.1f} m/s to be there in time")
-    channel.take_speed(law, one.owner)
-    settled = abs(other.acceleration) < _STEADY or left <= one.step
-    return one.instant + left if settled else math.inf
+    channel.take_speed(law, acting_actor.owner)
+    settled = abs(other.acceleration) < _STEADY or left <= acting_actor.step
+    return acting_actor.instant + left if settled else math.inf
 
 
 def arrival_law(part: Arriving, instant: float, rest: float, left: float) -> AnyLaw:
@@ -632,15 +656,15 @@ def arrival_law(part: Arriving, instant: float, rest: float, left: float) -> Any
     return SpeedTable(instant, ((0.0, 0.0), (waits, 0.0), (seconds, last)))
 
 
-def _own_rest(part: Arriving, one: ActingActor) -> float:
+def _own_rest(part: Arriving, acting_actor: ActingActor) -> float:
     """Metres from where the actor is at the instant to where it is to be."""
-    rest = _rest(one.actor, part.at, one.view, one.channel)
+    rest = _metres_to_place(acting_actor.actor, part.at, acting_actor.view, acting_actor.channel)
     if rest is None:
         raise CannotAct("its route does not lead to the place")
-    return rest - one.channel.metres(one.view.time, one.instant)
+    return rest - acting_actor.channel.metres(acting_actor.view.time, acting_actor.instant)
 
 
-def _rest(
+def _metres_to_place(
     actor: ActorView, place: RulePlace, view: RoadView, channel: Channel | None
 ) -> float | None:
     on_line = None if channel is None else _on_line(actor, place, view, channel)
@@ -716,139 +740,142 @@ class ActionKind:
     check: Callable[[Any], str | None] | None = None
 
 
-def _speed(part: SpeedChange, one: ActingActor) -> float:
-    law = speed_change(part, one.instant, one.speed)
-    one.channel.take_speed(law, one.owner)
+def _begin_speed(part: SpeedChange, acting_actor: ActingActor) -> float:
+    law = speed_change(part, acting_actor.instant, acting_actor.speed)
+    acting_actor.channel.take_speed(law, acting_actor.owner)
     return law.end
 
 
-def _keep(_: Any, one: ActingActor) -> None:
-    one.channel.keep_speed()
+def _begin_keep_speed(_: Any, acting_actor: ActingActor) -> None:
+    acting_actor.channel.keep_speed()
 
 
-def _brake(part: Braking, one: ActingActor) -> float:
-    law = braking(part.by, one.instant, one.speed)
-    one.channel.take_speed(law, one.owner)
+def _begin_brake(part: Braking, acting_actor: ActingActor) -> float:
+    law = braking(part.by, acting_actor.instant, acting_actor.speed)
+    acting_actor.channel.take_speed(law, acting_actor.owner)
     return law.end + (part.hold or 0.0)
 
 
-def _after_braking(part: Braking, one: ActingActor) -> None:
+def _after_braking(part: Braking, acting_actor: ActingActor) -> None:
     if part.hold is None:
-        one.channel.keep_speed()
+        acting_actor.channel.keep_speed()
     else:
-        one.channel.release_speed(one.instant)
+        acting_actor.channel.release_speed(acting_actor.instant)
 
 
-def _stop(part: Stopping, one: ActingActor) -> float:
-    law = stopping(part.within, one.instant, one.speed)
-    one.channel.take_speed(law, one.owner)
-    if one.actor.person and one.channel.line is None:
-        (x, y), hdg = one.spot(), one.actor.hdg
+def _begin_stop(part: Stopping, acting_actor: ActingActor) -> float:
+    law = stopping(part.within, acting_actor.instant, acting_actor.speed)
+    acting_actor.channel.take_speed(law, acting_actor.owner)
+    if acting_actor.actor.person and acting_actor.channel.line is None:
+        (x, y), hdg = acting_actor.spot(), acting_actor.actor.hdg
         ahead = part.within or _HELD
         line = ((x, y), (x + ahead * math.cos(hdg), y + ahead * math.sin(hdg)))
-        one.channel.take_line(line, 0.0, None, one.owner, one.instant)
+        acting_actor.channel.take_line(line, 0.0, None, acting_actor.owner, acting_actor.instant)
     return law.end
 
 
-def _stand(_: Any, one: ActingActor) -> None:
-    if one.actor.person:
-        stay(one)
+def _finish_stop(_: Any, acting_actor: ActingActor) -> None:
+    if acting_actor.actor.person:
+        stay(acting_actor)
     else:
-        one.channel.keep_speed()
+        acting_actor.channel.keep_speed()
 
 
-def _go(_: Going, one: ActingActor) -> float:
-    channel = one.channel
-    if one.actor.person and channel.held:
+def _begin_go(_: Going, acting_actor: ActingActor) -> float:
+    channel = acting_actor.channel
+    if acting_actor.actor.person and channel.held:
         channel.release_line()
         channel.rejoins = True
-    channel.release_speed(one.instant)
-    return one.instant
+    channel.release_speed(acting_actor.instant)
+    return acting_actor.instant
 
 
-def _keep_gap(part: GapKeeping, one: ActingActor) -> float:
-    there = _follow(part, one)
+def _keep_gap(part: GapKeeping, acting_actor: ActingActor) -> float:
+    there = _follow_gap(part, acting_actor)
     if part.once and there:
-        return one.instant
-    return math.inf if part.lasting is None else one.instant + part.lasting
+        return acting_actor.instant
+    return math.inf if part.lasting is None else acting_actor.instant + part.lasting
 
 
-def _follow_on(part: GapKeeping, one: ActingActor, end: float) -> float:
-    there = _follow(part, one)
-    return min(end, one.instant) if part.once and there else end
+def _follow_on(part: GapKeeping, acting_actor: ActingActor, end: float) -> float:
+    there = _follow_gap(part, acting_actor)
+    return min(end, acting_actor.instant) if part.once and there else end
 
 
-def _follow(part: GapKeeping, one: ActingActor) -> bool:
+def _follow_gap(part: GapKeeping, acting_actor: ActingActor) -> bool:
     """Choose the speed of this step by the gap: faster where it is too long, slower if short.
 
     Returns whether the gap is what it should be, at the speed of the other one.
     """
-    other = one.view.actor(part.to)
+    other = acting_actor.view.actor(part.to)
     if other is None:
         raise CannotAct(f"{part.to!r} is not on the road")
-    me = one.actor
+    me = acting_actor.actor
     c, s = math.cos(me.hdg), math.sin(me.hdg)
     ahead = (other.x - me.x) * c + (other.y - me.y) * s
     gap = (-ahead if part.ahead else ahead) - (me.length + other.length) / 2.0
-    speed = one.speed
+    speed = acting_actor.speed
     behind = other.speed if part.ahead else speed
     wanted = part.metres if part.metres is not None else (part.seconds or 0.0) * behind
     error = wanted - gap if part.ahead else gap - wanted
     # Far away no faster than half the rate can take back in time.
     faster = min(_GAP_GAIN * abs(error), math.sqrt(part.rate * abs(error)))
     target = max(0.0, other.speed + math.copysign(faster, error))
-    most = part.rate * one.step
+    most = part.rate * acting_actor.step
     reached = min(max(target, speed - most), speed + most)
-    left = one.view.time + one.step - one.instant
-    law = SpeedLaw(one.instant, speed, reached, max(left, 1e-9))
-    one.channel.take_speed(law, one.owner)
+    left = acting_actor.view.time + acting_actor.step - acting_actor.instant
+    law = SpeedLaw(acting_actor.instant, speed, reached, max(left, 1e-9))
+    acting_actor.channel.take_speed(law, acting_actor.owner)
     return abs(error) < _GAP_REACHED and abs(other.speed - speed) < _GAP_REACHED
 
 
-def _vanish(_: Vanishing, one: ActingActor) -> float:
-    one.channel.vanishes = True
-    return one.instant
+def _begin_vanish(_: Vanishing, acting_actor: ActingActor) -> float:
+    acting_actor.channel.vanishes = True
+    return acting_actor.instant
 
 
-def _ignore(part: Ignoring, one: ActingActor) -> float:
-    one.channel.ignore_red, one.channel.ignore_right_of_way = part.red, part.right_of_way
-    return one.instant
+def _begin_ignore(part: Ignoring, acting_actor: ActingActor) -> float:
+    acting_actor.channel.ignore_red, acting_actor.channel.ignore_right_of_way = (
+        part.red,
+        part.right_of_way,
+    )
+    return acting_actor.instant
 
 
-def _release(_: Releasing, one: ActingActor) -> float:
-    channel = one.channel
-    channel.rejoins = one.actor.person and channel.line is not None
+def _begin_release(_: Releasing, acting_actor: ActingActor) -> float:
+    channel = acting_actor.channel
+    channel.rejoins = acting_actor.actor.person and channel.line is not None
     channel.release_line()
-    channel.release_speed(one.instant)
+    channel.release_speed(acting_actor.instant)
     channel.ignore_red = channel.ignore_right_of_way = channel.keeps_lane = False
     channel.lights = None
-    return one.instant
+    return acting_actor.instant
 
 
 _MIRRORED = "mirrored"
 """What CARLA does: it shows what SUMO does."""
 
 ACTIONS = {
-    one.name: one
-    for one in (
+    action_kind.name: action_kind
+    for action_kind in (
         ActionKind(
             "speed", "reach `to` at a `rate`, `over` seconds or `within` metres; then keep it, as "
             "far as traffic allows. Shapes: `step`, `linear`, `cosine`", "m/s, m/s², s, m",
-            "`setSpeed` each step", "SpeedAction", _MIRRORED, _speed, finish=_keep,
+            "`setSpeed` each step", "SpeedAction", _MIRRORED, _begin_speed, finish=_begin_keep_speed,
         ),
         ActionKind(
             "brake", "brake with `by` to a standstill, whatever the vehicle type allows; SUMO "
             "drives on after `hold` seconds, without it not before `go` or `release`", "m/s², s",
-            "`setSpeed` each step", "SpeedAction to 0", _MIRRORED, _brake, finish=_after_braking,
+            "`setSpeed` each step", "SpeedAction to 0", _MIRRORED, _begin_brake, finish=_after_braking,
         ),
         ActionKind(
             "stop", "stand after exactly `within` metres, at once without it; until `go`", "m",
-            "`setSpeed`; persons are held in place", "SpeedAction to 0", _MIRRORED, _stop,
-            finish=_stand,
+            "`setSpeed`; persons are held in place", "SpeedAction to 0", _MIRRORED, _begin_stop,
+            finish=_finish_stop,
         ),
         ActionKind(
             "go", "SUMO chooses the speed again", "", "`setSpeed(-1)`", "ActivateControllerAction",
-            _MIRRORED, _go,
+            _MIRRORED, _begin_go,
         ),
         ActionKind(
             "lane", "change `by` lanes to the left (negative: right), or to the lane that leads "
@@ -874,7 +901,7 @@ ACTIONS = {
             "`seconds` at the speed of the one behind, "
             "with `rate` at most; for `lasting` seconds, or `once`: until it is that", "m, s, m/s²",
             "`setSpeed` each step",
-            "LongitudinalDistanceAction", _MIRRORED, _keep_gap, _follow_on, _keep,
+            "LongitudinalDistanceAction", _MIRRORED, _keep_gap, _follow_on, _begin_keep_speed,
             vehicles_only=True,
         ),
         ActionKind(
@@ -916,7 +943,7 @@ ACTIONS = {
         ),
         ActionKind(
             "vanish", "leave the simulation", "", "`remove`", "DeleteEntityAction", _MIRRORED,
-            _vanish,
+            _begin_vanish,
         ),
         ActionKind(
             "end", "end the run, which is then complete; nothing moves after that step", "",
@@ -925,7 +952,7 @@ ACTIONS = {
         ),
         ActionKind(
             "ignore", "heed no `red`, or no `right_of_way`", "", "`setSpeedMode`",
-            "none", _MIRRORED, _ignore, vehicles_only=True,
+            "none", _MIRRORED, _begin_ignore, vehicles_only=True,
         ),
         ActionKind(
             "signal", "switch a `light`: its program jumps to where `movement` has green, or it "
@@ -944,7 +971,7 @@ ACTIONS = {
         ),
         ActionKind(
             "release", "SUMO drives as if there had been no rule", "", "all of the above undone",
-            "ActivateControllerAction", _MIRRORED, _release,
+            "ActivateControllerAction", _MIRRORED, _begin_release,
         ),
         ActionKind(
             "own", "a `kind` that an installed package gives, with its `values`", "its own",

@@ -228,7 +228,7 @@ class Channel:
                 self.along = line_length(self.line)
             else:
                 self.along += metres
-            pose = self._pose(time + step, person=person)
+            pose = self._pose_at(time + step, person=person)
         speed = metres / step if self._forced else None
         if speed is None and self.law is not None:
             speed = self.law.v1
@@ -247,7 +247,7 @@ class Channel:
         self.rejoins, self.goal = False, None
         return move
 
-    def _pose(self, instant: float, *, person: bool) -> Pose:
+    def _pose_at(self, instant: float, *, person: bool) -> Pose:
         line = self.line or ()
         left = self.side.offset(instant) if self.side else 0.0
         along = min(self.along, line_length(line)) if person else self.along
@@ -305,5 +305,5 @@ class ActingActor(NamedTuple):
         ahead = self.channel.metres(self.view.time, self.instant)
         if self.channel.held:
             ahead = 0.0
-        one = self.actor
-        return one.x + ahead * math.cos(one.hdg), one.y + ahead * math.sin(one.hdg)
+        view = self.actor
+        return view.x + ahead * math.cos(view.hdg), view.y + ahead * math.sin(view.hdg)

@@ -37,10 +37,10 @@ def body_distance(one: ActorView, other: ActorView) -> float:
     reach = (one.length + one.width + other.length + other.width) / 2.0
     if abs(dx) <= reach and abs(dy) <= reach and overlap(one.corners, other.corners):
         return 0.0
-    return min(_nearest(one, other.corners), _nearest(other, one.corners))
+    return min(_nearest_distance(one, other.corners), _nearest_distance(other, one.corners))
 
 
-def _nearest(body: ActorView, points: Sequence[Point]) -> float:
+def _nearest_distance(body: ActorView, points: Sequence[Point]) -> float:
     """Metres from a body to the nearest of some points outside of it."""
     x, y, c, s = body.x, body.y, math.cos(body.hdg), math.sin(body.hdg)
     half, side = body.length / 2.0, body.width / 2.0
@@ -61,13 +61,13 @@ def polygon_distance(one: Sequence[Point], other: Sequence[Point]) -> float:
         _to_edge(corner, *edge)
         for corners, edges in ((one, other), (other, one))
         for corner in corners
-        for edge in _edges(edges)
+        for edge in _polygon_edges(edges)
     )
 
 
 def overlap(one: Sequence[Point], other: Sequence[Point]) -> bool:
     """Whether two convex polygons overlap or touch: no side of either lies between them."""
-    for (ax, ay), (bx, by) in (*_edges(one), *_edges(other)):
+    for (ax, ay), (bx, by) in (*_polygon_edges(one), *_polygon_edges(other)):
         nx, ny = by - ay, ax - bx
         first = [nx * x + ny * y for x, y in one]
         second = [nx * x + ny * y for x, y in other]
@@ -81,7 +81,7 @@ def point_distance(corners: Sequence[Point], point: Point) -> float:
     return polygon_distance(corners, (point, point))
 
 
-def _edges(corners: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
+def _polygon_edges(corners: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
     return zip(corners, (*corners[1:], corners[0]), strict=True)
 
 
@@ -153,23 +153,23 @@ class ConditionKind:
     check: Callable[[Any], str | None] | None = None
 
 
-def _bounded(part: Bounded, value: float, rate: float | None = None) -> Reading:
+def _read_bounded(part: Bounded, value: float, rate: float | None = None) -> Reading:
     below = part.below
     if below is not None:
         return Reading(value, below - value, None if rate is None else -rate)
     return Reading(value, value - (part.above or 0.0), rate)
 
 
-def _truth(is_so: bool) -> Reading:
+def _read_truth(is_so: bool) -> Reading:
     return Reading(float(is_so), 1.0 if is_so else NEVER, 0.0)
 
 
-def _own(part: Any, actor: str, view: RoadView) -> ActorView | None:
+def _actor_of_condition(part: Any, actor: str, view: RoadView) -> ActorView | None:
     return view.actor(part.of or actor)
 
 
-def _pair(part: Any, actor: str, view: RoadView) -> tuple[ActorView, ActorView] | None:
-    one, other = _own(part, actor, view), view.actor(part.to)
+def _pair_of_condition(part: Any, actor: str, view: RoadView) -> tuple[ActorView, ActorView] | None:
+    one, other = _actor_of_condition(part, actor, view), view.actor(part.to)
     return None if one is None or other is None else (one, other)
 
 
@@ -187,7 +187,7 @@ class _Lengthwise(NamedTuple):
     behind: ActorView
 
 
-def _lengthwise(one: ActorView, other: ActorView) -> _Lengthwise:
+def _measure_lengthwise(one: ActorView, other: ActorView) -> _Lengthwise:
     guide = other if one.person and not other.person else one
     c, s = math.cos(guide.hdg), math.sin(guide.hdg)
     dx, dy = other.x - one.x, other.y - one.y
@@ -195,13 +195,13 @@ def _lengthwise(one: ActorView, other: ActorView) -> _Lengthwise:
     faster = one.speed * math.cos(one.hdg - guide.hdg) - other.speed * math.cos(
         other.hdg - guide.hdg
     )
-    gap = abs(ahead) - _reach(one, guide.hdg) - _reach(other, guide.hdg)
+    gap = abs(ahead) - _reach_in_direction(one, guide.hdg) - _reach_in_direction(other, guide.hdg)
     if ahead >= 0.0:
         return _Lengthwise(ahead, aside, faster, gap, one)
     return _Lengthwise(ahead, aside, -faster, gap, other)
 
 
-def _reach(body: ActorView, hdg: float) -> float:
+def _reach_in_direction(body: ActorView, hdg: float) -> float:
     """Metres from the centre of a body to its farthest point in a direction."""
     turned = body.hdg - hdg
     if turned == 0.0:  # half of all that is asked
@@ -210,25 +210,25 @@ def _reach(body: ActorView, hdg: float) -> float:
     return (body.length * abs(math.cos(turned)) + across) / 2.0
 
 
-def _time(part: AfterTime, _: str, view: RoadView) -> Reading:
+def _read_time(part: AfterTime, _: str, view: RoadView) -> Reading:
     return Reading(view.time, view.time - part.after, 1.0)
 
 
-def _ttc(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
-    if (both := _pair(part, actor, view)) is None:
+def _read_ttc(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
+    if (both := _pair_of_condition(part, actor, view)) is None:
         return None
-    found = _lengthwise(*both)
-    return _seconds(part, max(found.gap, 0.0), found.closing)
+    found = _measure_lengthwise(*both)
+    return _read_seconds(part, max(found.gap, 0.0), found.closing)
 
 
-def _headway(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
-    if (both := _pair(part, actor, view)) is None:
+def _read_headway(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
+    if (both := _pair_of_condition(part, actor, view)) is None:
         return None
-    found = _lengthwise(*both)
-    return _seconds(part, max(found.gap, 0.0), found.behind.speed)
+    found = _measure_lengthwise(*both)
+    return _read_seconds(part, max(found.gap, 0.0), found.behind.speed)
 
 
-def _seconds(part: PairBounded, gap: float, speed: float) -> Reading:
+def _read_seconds(part: PairBounded, gap: float, speed: float) -> Reading:
     """Seconds that a gap is long at a speed.
 
     They leap where the speed is about 0, and no line through two readings says when they meet a
@@ -241,15 +241,15 @@ def _seconds(part: PairBounded, gap: float, speed: float) -> Reading:
     return Reading(value, margin if part.below is not None else -margin)
 
 
-def _distance(part: DistanceBounded, actor: str, view: RoadView) -> Reading | None:
-    if (one := _own(part, actor, view)) is None:
+def _read_distance(part: DistanceBounded, actor: str, view: RoadView) -> Reading | None:
+    if (one := _actor_of_condition(part, actor, view)) is None:
         return None
     if part.to is None:
         value = _to_place(part, one, view)
     else:
         other = view.actor(part.to)
         value = None if other is None else _to_actor(part, one, other, view)
-    return None if value is None else _bounded(part, value)
+    return None if value is None else _read_bounded(part, value)
 
 
 def _to_actor(
@@ -257,13 +257,15 @@ def _to_actor(
 ) -> float | None:
     if part.along == "straight":
         if not part.free:
-            return math.dist(_centre(one), _centre(other))
-        return _straight(one, other, (part.below or 0.0) + (part.above or 0.0))
-    found = _lengthwise(one, other)
+            return math.dist(_centre_of(one), _centre_of(other))
+        return _straight_distance(one, other, (part.below or 0.0) + (part.above or 0.0))
+    found = _measure_lengthwise(one, other)
     if part.along == "longitudinal":
         return max(found.gap, 0.0) if part.free else abs(found.ahead)
     if part.along == "lateral":
-        half = _reach(one, one.hdg + math.pi / 2) + _reach(other, one.hdg + math.pi / 2)
+        half = _reach_in_direction(one, one.hdg + math.pi / 2) + _reach_in_direction(
+            other, one.hdg + math.pi / 2
+        )
         return max(abs(found.aside) - half, 0.0) if part.free else abs(found.aside)
     if part.along == "lane":
         metres = view.lane_distance(one.id, other.id)
@@ -272,95 +274,101 @@ def _to_actor(
     raise ValueError(f"unknown direction {part.along!r}")
 
 
-def _straight(one: ActorView, other: ActorView, bound: float) -> float:
+def _straight_distance(one: ActorView, other: ActorView, bound: float) -> float:
     """Metres between two bodies; at least so many where they are much farther than the bound."""
-    least = math.dist(_centre(one), _centre(other))
+    least = math.dist(_centre_of(one), _centre_of(other))
     least -= (one.length + one.width + other.length + other.width) / 2.0
     return least if least > bound + _FAR else body_distance(one, other)
 
 
-def _to_place(part: DistanceBounded, one: ActorView, view: RoadView) -> float | None:
+def _to_place(part: DistanceBounded, actor_view: ActorView, view: RoadView) -> float | None:
     place = view.place(part.place or "")
-    dx, dy = place[0] - one.x, place[1] - one.y
-    c, s = math.cos(one.hdg), math.sin(one.hdg)
+    dx, dy = place[0] - actor_view.x, place[1] - actor_view.y
+    c, s = math.cos(actor_view.hdg), math.sin(actor_view.hdg)
     if part.along == "longitudinal":
         ahead = abs(dx * c + dy * s)
-        return max(ahead - one.length / 2.0, 0.0) if part.free else ahead
+        return max(ahead - actor_view.length / 2.0, 0.0) if part.free else ahead
     if part.along == "lateral":
         aside = abs(dy * c - dx * s)
-        return max(aside - one.width / 2.0, 0.0) if part.free else aside
+        return max(aside - actor_view.width / 2.0, 0.0) if part.free else aside
     if part.along == "lane":
-        metres = view.lane_distance(one.id, part.place or "")
-        return metres if metres is None or not part.free else max(metres - one.length / 2.0, 0.0)
-    return point_distance(one.corners, place) if part.free else math.hypot(dx, dy)
+        metres = view.lane_distance(actor_view.id, part.place or "")
+        return (
+            metres
+            if metres is None or not part.free
+            else max(metres - actor_view.length / 2.0, 0.0)
+        )
+    return point_distance(actor_view.corners, place) if part.free else math.hypot(dx, dy)
 
 
-def _centre(one: ActorView) -> Point:
-    return one.x, one.y
+def _centre_of(actor_view: ActorView) -> Point:
+    return actor_view.x, actor_view.y
 
 
 def _relative_speed(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
-    if (both := _pair(part, actor, view)) is None:
+    if (both := _pair_of_condition(part, actor, view)) is None:
         return None
     one, other = both
     bx, by = other.velocity
-    return _bounded(part, one.speed - bx * math.cos(one.hdg) - by * math.sin(one.hdg))
+    return _read_bounded(part, one.speed - bx * math.cos(one.hdg) - by * math.sin(one.hdg))
 
 
-def _speed(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
-    one = _own(part, actor, view)
-    return None if one is None else _bounded(part, one.speed)
+def _read_speed(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
+    actor_view = _actor_of_condition(part, actor, view)
+    return None if actor_view is None else _read_bounded(part, actor_view.speed)
 
 
-def _acceleration(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
-    one = _own(part, actor, view)
-    return None if one is None else _bounded(part, one.acceleration, 0.0)
+def _read_acceleration(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
+    actor_view = _actor_of_condition(part, actor, view)
+    return None if actor_view is None else _read_bounded(part, actor_view.acceleration, 0.0)
 
 
-def _stands(part: Standing, actor: str, view: RoadView) -> Reading | None:
-    one = _own(part, actor, view)
-    if one is None:
+def _read_stands(part: Standing, actor: str, view: RoadView) -> Reading | None:
+    actor_view = _actor_of_condition(part, actor, view)
+    if actor_view is None:
         return None
-    if one.standing is None:
+    if actor_view.standing is None:
         return Reading(0.0, NEVER, 0.0)
-    stood = view.time - one.standing
+    stood = view.time - actor_view.standing
     return Reading(stood, stood - part.seconds, 1.0)
 
 
-def _reaches(part: Reaching, actor: str, view: RoadView) -> Reading | None:
-    one = _own(part, actor, view)
-    if one is None:
+def _read_reaches(part: Reaching, actor: str, view: RoadView) -> Reading | None:
+    actor_view = _actor_of_condition(part, actor, view)
+    if actor_view is None:
         return None
-    away = math.dist(_centre(one), view.place(part.place))
+    away = math.dist(_centre_of(actor_view), view.place(part.place))
     return Reading(away, part.within - away)
 
 
-def _travelled(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
-    one = _own(part, actor, view)
-    return None if one is None else _bounded(part, one.travelled, one.speed)
+def _read_travelled(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
+    actor_view = _actor_of_condition(part, actor, view)
+    return (
+        None if actor_view is None else _read_bounded(part, actor_view.travelled, actor_view.speed)
+    )
 
 
-def _signal(part: SignalShows, _: str, view: RoadView) -> Reading | None:
+def _read_signal(part: SignalShows, _: str, view: RoadView) -> Reading | None:
     shown = view.signal(part.light, part.movement)
-    return None if shown is None else _truth(shown in COLOURS[part.shows])
+    return None if shown is None else _read_truth(shown in COLOURS[part.shows])
 
 
-def _appeared(part: OneActor, actor: str, view: RoadView) -> Reading:
-    return _truth(_own(part, actor, view) is not None)
+def _read_appeared(part: OneActor, actor: str, view: RoadView) -> Reading:
+    return _read_truth(_actor_of_condition(part, actor, view) is not None)
 
 
-def _touched(part: Touching, actor: str, view: RoadView) -> Reading | None:
-    one = _own(part, actor, view)
+def _read_touched(part: Touching, actor: str, view: RoadView) -> Reading | None:
+    one = _actor_of_condition(part, actor, view)
     if one is None:
         return None
     others = [view.actor(part.to)] if part.to is not None else view.named()
     near = [other for other in others if other is not None and other.id != one.id]
-    return _truth(any(body_distance(one, other) == 0.0 for other in near))
+    return _read_truth(any(body_distance(one, other) == 0.0 for other in near))
 
 
 def _off_road(part: OneActor, actor: str, view: RoadView) -> Reading | None:
-    one = _own(part, actor, view)
-    return None if one is None else _truth(one.off_road)
+    actor_view = _actor_of_condition(part, actor, view)
+    return None if actor_view is None else _read_truth(actor_view.off_road)
 
 
 _MIRRORED = "mirrored"
@@ -368,51 +376,51 @@ _MIRRORED = "mirrored"
 _EXTRAPOLATED = "read each step, extrapolated to the instant"
 
 CONDITIONS = {
-    one.name: one
-    for one in (
+    condition_kind.name: condition_kind
+    for condition_kind in (
         ConditionKind(
             "time", "simulated time is `after` or more", "s", "exact", "SimulationTimeCondition",
-            _MIRRORED, _time,
+            _MIRRORED, _read_time,
         ),
         ConditionKind(
             "ttc", "time to collision of two actors: gap between the bodies along the heading, "
             "over the speed at which it closes", "s", _EXTRAPOLATED, "TimeToCollisionCondition",
-            _MIRRORED, _ttc,
+            _MIRRORED, _read_ttc,
         ),
         ConditionKind(
             "headway", "time headway: gap between the bodies along the heading, over the speed of "
-            "the one behind", "s", _EXTRAPOLATED, "TimeHeadwayCondition", _MIRRORED, _headway,
+            "the one behind", "s", _EXTRAPOLATED, "TimeHeadwayCondition", _MIRRORED, _read_headway,
         ),
         ConditionKind(
             "distance", "metres to an actor (`to`) or a place (`place`): `straight`, "
             "`longitudinal`, `lateral` or along the `lane`; `free` is between the bodies",
             "m", _EXTRAPOLATED, "RelativeDistanceCondition, DistanceCondition", _MIRRORED,
-            _distance,
+            _read_distance,
         ),
         ConditionKind(
             "relative_speed", "own speed less that of `to` along the own heading", "m/s",
             _EXTRAPOLATED, "RelativeSpeedCondition", _MIRRORED, _relative_speed,
         ),
-        ConditionKind("speed", "speed", "m/s", _EXTRAPOLATED, "SpeedCondition", _MIRRORED, _speed),
+        ConditionKind("speed", "speed", "m/s", _EXTRAPOLATED, "SpeedCondition", _MIRRORED, _read_speed),
         ConditionKind(
             "acceleration", "acceleration along the heading, negative when braking", "m/s²",
-            "on whole steps", "AccelerationCondition", _MIRRORED, _acceleration,
+            "on whole steps", "AccelerationCondition", _MIRRORED, _read_acceleration,
         ),
         ConditionKind(
             "stopped", "slower than 0.1 m/s for `seconds`", "s", "from the step of stopping on",
-            "StandStillCondition", _MIRRORED, _stands,
+            "StandStillCondition", _MIRRORED, _read_stands,
         ),
         ConditionKind(
             "reaches", "the centre of the body is `within` metres of a place", "m", _EXTRAPOLATED,
-            "ReachPositionCondition", _MIRRORED, _reaches,
+            "ReachPositionCondition", _MIRRORED, _read_reaches,
         ),
         ConditionKind(
             "travelled", "metres since departure", "m", _EXTRAPOLATED,
-            "TraveledDistanceCondition", _MIRRORED, _travelled,
+            "TraveledDistanceCondition", _MIRRORED, _read_travelled,
         ),
         ConditionKind(
             "signal", "a movement of a traffic light shows a colour", "", "on whole steps",
-            "TrafficSignalCondition", _MIRRORED, _signal,
+            "TrafficSignalCondition", _MIRRORED, _read_signal,
         ),
         ConditionKind(
             "rule", "another rule has started, or ended", "", "exact",
@@ -420,11 +428,11 @@ CONDITIONS = {
         ),
         ConditionKind(
             "appeared", "an actor is on the road", "", "on whole steps", "none", _MIRRORED,
-            _appeared,
+            _read_appeared,
         ),
         ConditionKind(
             "touched", "the bodies of two actors overlap", "", "on whole steps; by odscen",
-            "CollisionCondition", _MIRRORED, _touched,
+            "CollisionCondition", _MIRRORED, _read_touched,
         ),
         ConditionKind(
             "off_road", "the centre of the body is on no lane", "", "on whole steps",

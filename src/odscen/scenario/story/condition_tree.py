@@ -78,7 +78,7 @@ class Flips(NamedTuple):
     def first_rise(self, begin: float, end: float, *, after: float) -> float | None:
         """First instant from ``begin`` on, ``after`` one and before ``end``, of coming true."""
         rises = self.at[int(self.was) :: 2]
-        return next((one for one in rises if begin <= one < end and one > after), None)
+        return next((rise for rise in rises if begin <= rise < end and rise > after), None)
 
 
 def together(parts: Sequence[Flips], *, every: bool) -> Flips:
@@ -237,10 +237,10 @@ class _Leaf:
         """When it holds; it is read once a step."""
         flips = self.flips
         if flips is None:
-            flips = self.flips = self._look(view)
+            flips = self.flips = self._look_at(view)
         return flips
 
-    def _look(self, view: RoadView) -> Flips:
+    def _look_at(self, view: RoadView) -> Flips:
         reading = self._read(self._part, self._actor, view)
         before = self.before
         if reading is None:
@@ -248,20 +248,20 @@ class _Leaf:
             self.now = LeafMemory(None, holds=False)
             return Flips(was, (view.time,) if was else ())
         value, margin, rate = reading
-        flips = self._turns(margin, rate, before, view)
+        flips = self._find_flips(margin, rate, before, view)
         near = -math.inf < margin < math.inf
         far = not -math.inf < value < math.inf
         self.now = LeafMemory(margin if near else None, flips.last, None if far else value)
         return flips
 
-    def _turns(
+    def _find_flips(
         self, margin: float, rate: float | None, before: LeafMemory | None, view: RoadView
     ) -> Flips:
         time, last = view.time, None if before is None else before.margin
         if rate is None and last is not None:
             change = margin - last
             near = abs(margin) <= max(abs(change), CLOSE)  # it could come to the bound in this step
-            rate = None if near and self._leapt(view) else change / self._step
+            rate = None if near and self._has_leapt(view) else change / self._step
         holds = margin >= 0.0
         if abs(margin) <= CLOSE:
             holds = rate is None or rate * self._step >= -CLOSE
@@ -275,7 +275,7 @@ class _Leaf:
             return _ALWAYS if was else NEVER_IN_STEP
         return Flips(was, at)
 
-    def _leapt(self, view: RoadView) -> bool:
+    def _has_leapt(self, view: RoadView) -> bool:
         names = (getattr(self._part, "of", None) or self._actor, getattr(self._part, "to", None))
         return any(view.leapt(name) for name in names if name is not None)
 

@@ -62,9 +62,9 @@ class SpeedLaw:
 
     def metres(self, start: float, stop: float) -> float:
         """Metres from one instant to another."""
-        return self._covered(stop - self.begin) - self._covered(start - self.begin)
+        return self._metres_covered(stop - self.begin) - self._metres_covered(start - self.begin)
 
-    def _covered(self, t: float) -> float:
+    def _metres_covered(self, t: float) -> float:
         if t <= 0.0:
             return self.v0 * t
         inside, change = min(t, self.duration), self.v1 - self.v0
@@ -107,9 +107,9 @@ class SpeedTable:
 
     def metres(self, start: float, stop: float) -> float:
         """Metres from one instant to another."""
-        return self._covered(stop - self.begin) - self._covered(start - self.begin)
+        return self._metres_covered(stop - self.begin) - self._metres_covered(start - self.begin)
 
-    def _covered(self, t: float) -> float:
+    def _metres_covered(self, t: float) -> float:
         if t <= 0.0:
             return self.knots[0][1] * t
         covered = 0.0
@@ -211,7 +211,7 @@ def line_length(line: tuple[Point, ...]) -> float:
 
 
 @lru_cache(maxsize=256)
-def _pieces(line: tuple[Point, ...]) -> list[tuple[Point, Point, float]]:
+def _line_pieces(line: tuple[Point, ...]) -> list[tuple[Point, Point, float]]:
     """Straight pieces of a line with their lengths; asked for the same lines in each step."""
     return [(a, b, math.dist(a, b)) for a, b in itertools.pairwise(line) if a != b]
 
@@ -219,7 +219,7 @@ def _pieces(line: tuple[Point, ...]) -> list[tuple[Point, Point, float]]:
 def point_on(line: tuple[Point, ...], along: float, *, left: float = 0.0) -> OnLine:
     """Point of a line, moved to the left; the line goes on straight before and behind its ends."""
     rest = along
-    pieces = _pieces(line)
+    pieces = _line_pieces(line)
     for index, (a, b, length) in enumerate(pieces):
         if rest <= length or index == len(pieces) - 1:
             ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length

@@ -49,10 +49,12 @@ def own_condition(name: str) -> ConditionKind | None:
     InputError
         If it cannot be imported, or is something else.
     """
-    kind = _loaded(CONDITION_GROUP, name, ConditionKind)
+    kind = _load_object(CONDITION_GROUP, name, ConditionKind)
     if not isinstance(kind, ConditionKind):
         return None
-    return replace(kind, read=_guarded(kind.read, name), check=_guarded(kind.check, name))
+    return replace(
+        kind, read=_guard_function(kind.read, name), check=_guard_function(kind.check, name)
+    )
 
 
 @cache
@@ -64,17 +66,17 @@ def own_action(name: str) -> ActionKind | None:
     InputError
         If it cannot be imported, or is something else.
     """
-    kind = _loaded(ACTION_GROUP, name, ActionKind)
+    kind = _load_object(ACTION_GROUP, name, ActionKind)
     if not isinstance(kind, ActionKind):
         return None
     return replace(
         kind,
-        begin=_guarded(kind.begin, name),
-        update=_guarded(kind.update, name),
-        finish=_guarded(kind.finish, name),
-        ask=_guarded(kind.ask, name),
-        says=_guarded(kind.says, name),
-        check=_guarded(kind.check, name),
+        begin=_guard_function(kind.begin, name),
+        update=_guard_function(kind.update, name),
+        finish=_guard_function(kind.finish, name),
+        ask=_guard_function(kind.ask, name),
+        says=_guard_function(kind.says, name),
+        check=_guard_function(kind.check, name),
     )
 
 
@@ -88,7 +90,7 @@ def condition_kind(condition: Condition) -> ConditionKind:
     """
     if condition.own is None:
         return CONDITIONS[condition.kind]
-    return _given(own_condition(condition.own.kind), condition.own.kind)
+    return _find_kind(own_condition(condition.own.kind), condition.own.kind)
 
 
 def action_kind(action: Action) -> ActionKind:
@@ -101,16 +103,16 @@ def action_kind(action: Action) -> ActionKind:
     """
     if action.own is None:
         return ACTIONS[action.kind]
-    return _given(own_action(action.own.kind), action.own.kind)
+    return _find_kind(own_action(action.own.kind), action.own.kind)
 
 
-def _given(kind: _Kind | None, name: str) -> _Kind:
+def _find_kind(kind: _Kind | None, name: str) -> _Kind:
     if kind is None:
         raise InputError(f"no installed package gives {name!r}")
     return kind
 
 
-def _loaded(group: str, name: str, expected: type) -> object:
+def _load_object(group: str, name: str, expected: type) -> object:
     points = [*entry_points(group=group, name=name)]
     if not points:
         return None
@@ -127,7 +129,7 @@ def _loaded(group: str, name: str, expected: type) -> object:
     return found
 
 
-def _guarded(function: Callable[..., Any] | None, name: str) -> Callable[..., Any] | None:
+def _guard_function(function: Callable[..., Any] | None, name: str) -> Callable[..., Any] | None:
     """Let an error of code from outside end a run with a message that names it."""
     if function is None:
         return None

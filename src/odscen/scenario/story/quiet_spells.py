@@ -64,8 +64,8 @@ class QuietSpells:
         """Whether a rule whose condition is not met, and will not be in this step, is left now."""
         name = rule.id
         if name not in self._tellers:
-            self._tellers[name] = _teller(rule.when) if _can_be_told(rule) else None
-            self._actors[name] = _about(rule)
+            self._tellers[name] = _make_teller(rule.when) if _can_be_told(rule) else None
+            self._actors[name] = _actors_of_rule(rule)
         teller, time = self._tellers[name], view.time
         if teller is None or time < self._ask.get(name, time):
             return False
@@ -94,7 +94,7 @@ class QuietSpells:
     def restore(self, state: Mapping[str, float], rules: Mapping[str, StoryRule]) -> None:
         """Inverse of :meth:`state`."""
         for name, until in state.items():
-            self._actors[name] = _about(rules[name])
+            self._actors[name] = _actors_of_rule(rules[name])
             self.until[name] = until
 
 
@@ -119,42 +119,42 @@ class _Teller(NamedTuple):
     every: bool = False
 
 
-def _teller(condition: Condition) -> _Teller:
+def _make_teller(condition: Condition) -> _Teller:
     kind = condition.kind
     part = getattr(condition, kind)
     if kind in ("all", "any"):
-        return _Teller(None, None, tuple(map(_teller, part)), kind == "all")
+        return _Teller(None, None, tuple(map(_make_teller, part)), kind == "all")
     return _Teller(_TELL.get(kind), part)
 
 
 def _can_be_told(rule: StoryRule) -> bool:
     """Whether a rule can be left alone at all: not if something remembers each step of it."""
-    return not _remembers(rule.when) and _tells(rule.when)
+    return not _has_memory(rule.when) and _can_tell(rule.when)
 
 
-def _tells(condition: Condition) -> bool:
+def _can_tell(condition: Condition) -> bool:
     kind = condition.kind
     if kind in ("all", "any"):
-        parts = map(_tells, getattr(condition, kind))
+        parts = map(_can_tell, getattr(condition, kind))
         return any(parts) if kind == "all" else all(parts)
     return kind in _TELL
 
 
-def _remembers(condition: Condition) -> bool:
+def _has_memory(condition: Condition) -> bool:
     if condition.delay or condition.edge == "rising" or condition.kind == "own":
         return True
     if condition.kind == "not_":
-        return condition.not_ is not None and _remembers(condition.not_)
+        return condition.not_ is not None and _has_memory(condition.not_)
     parts = getattr(condition, condition.kind) if condition.kind in ("all", "any") else ()
-    return any(map(_remembers, parts))
+    return any(map(_has_memory, parts))
 
 
-def _about(rule: StoryRule) -> frozenset[str]:
+def _actors_of_rule(rule: StoryRule) -> frozenset[str]:
     parts = rule_parts(rule, "")
     return frozenset((rule.actor, *(name for _, _, part in parts for _, name in actors_of(part))))
 
 
-def _covers(metres: float, speed: float, gain: float) -> float:
+def _seconds_to_cover(metres: float, speed: float, gain: float) -> float:
     """Seconds in which so many metres are covered at the earliest."""
     if metres <= CLOSE:
         return 0.0
@@ -163,16 +163,16 @@ def _covers(metres: float, speed: float, gain: float) -> float:
     return (math.sqrt(speed * speed + 2.0 * gain * metres) - speed) / gain
 
 
-def _time(part: AfterTime, _: str, view: RoadView) -> float:
+def _quiet_until_time(part: AfterTime, _: str, view: RoadView) -> float:
     return part.after - view.time
 
 
-def _speed(part: OwnBounded, actor: str, view: RoadView) -> float:
+def _quiet_until_speed(part: OwnBounded, actor: str, view: RoadView) -> float:
     if part.above is None:  # whoever collides stands at once
         return 0.0
     one = view.actor(part.of or actor)
     if one is None:
-        return _absent(view, part.of or actor)
+        return _quiet_while_absent(view, part.of or actor)
     if one.person:
         return 0.0
     if part.above - one.speed <= CLOSE:
@@ -180,35 +180,39 @@ def _speed(part: OwnBounded, actor: str, view: RoadView) -> float:
     return (part.above - one.speed) / one.gain if one.gain > 0.0 else LONGEST
 
 
-def _travelled(part: OwnBounded, actor: str, view: RoadView) -> float:
+def _quiet_until_travelled(part: OwnBounded, actor: str, view: RoadView) -> float:
     if part.above is None:
         return 0.0
     one = view.actor(part.of or actor)
     if one is None:
-        return _absent(view, part.of or actor)
-    return _covers(part.above - one.travelled, *_pace(one))
+        return _quiet_while_absent(view, part.of or actor)
+    return _seconds_to_cover(part.above - one.travelled, *_speed_and_gain(one))
 
 
-def _absent(view: RoadView, *actors: str) -> float:
+def _quiet_while_absent(view: RoadView, *actors: str) -> float:
     """Seconds for which a condition on actors, one of whom is not there, is not met."""
     return LONGEST if any(map(view.gone, actors)) else 0.0
 
 
-def _pace(one: ActorView) -> tuple[float, float]:
+def _speed_and_gain(actor_view: ActorView) -> tuple[float, float]:
     """Speed, and how much of it can be gained in a second."""
-    return (max(one.speed, _RUNS), 0.0) if one.person else (one.speed, one.gain)
+    return (
+        (max(actor_view.speed, _RUNS), 0.0)
+        if actor_view.person
+        else (actor_view.speed, actor_view.gain)
+    )
 
 
-def _farthest(one: ActorView) -> float:
+def _farthest_reach(actor_view: ActorView) -> float:
     """Metres from the centre of a body, with and without it, and of lanes beside."""
-    return (one.length + one.width) / 2.0 + (0.0 if one.person else _ASIDE)
+    return (actor_view.length + actor_view.width) / 2.0 + (0.0 if actor_view.person else _ASIDE)
 
 
-def _reaches(part: Reaching, actor: str, view: RoadView) -> float:
+def _quiet_until_reached(part: Reaching, actor: str, view: RoadView) -> float:
     return _to_point(part.of or actor, view.place(part.place), part.within, view)
 
 
-def _distance(part: DistanceBounded, actor: str, view: RoadView) -> float:
+def _quiet_until_distance(part: DistanceBounded, actor: str, view: RoadView) -> float:
     if part.below is None or part.along != "straight":
         return 0.0  # along a heading it is another as soon as somebody turns
     name = part.of or actor
@@ -216,24 +220,26 @@ def _distance(part: DistanceBounded, actor: str, view: RoadView) -> float:
         return _to_point(name, view.place(part.place or ""), part.below, view)
     one, other = view.actor(name), view.actor(part.to)
     if one is None or other is None:
-        return _absent(view, name, part.to)
+        return _quiet_while_absent(view, name, part.to)
     away = math.dist((one.x, one.y), (other.x, other.y)) - part.below
-    (speed, gain), (speeds, gains) = _pace(one), _pace(other)
-    return _covers(away - _farthest(one) - _farthest(other), speed + speeds, gain + gains)
+    (speed, gain), (speeds, gains) = _speed_and_gain(one), _speed_and_gain(other)
+    return _seconds_to_cover(
+        away - _farthest_reach(one) - _farthest_reach(other), speed + speeds, gain + gains
+    )
 
 
 def _to_point(actor: str, point: Point, bound: float, view: RoadView) -> float:
     one = view.actor(actor)
     if one is None:
-        return _absent(view, actor)
-    away = math.dist((one.x, one.y), point) - _farthest(one) - bound
-    return _covers(away, *_pace(one))
+        return _quiet_while_absent(view, actor)
+    away = math.dist((one.x, one.y), point) - _farthest_reach(one) - bound
+    return _seconds_to_cover(away, *_speed_and_gain(one))
 
 
 _TELL: dict[str, Callable[[Any, str, RoadView], float]] = {
-    "distance": _distance,
-    "reaches": _reaches,
-    "speed": _speed,
-    "time": _time,
-    "travelled": _travelled,
+    "distance": _quiet_until_distance,
+    "reaches": _quiet_until_reached,
+    "speed": _quiet_until_speed,
+    "time": _quiet_until_time,
+    "travelled": _quiet_until_travelled,
 }

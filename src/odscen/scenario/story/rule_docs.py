@@ -16,17 +16,17 @@ _HEADS = ("name", "meaning", "unit", "in SUMO", "OpenSCENARIO", "CARLA")
 
 def condition_table() -> str:
     """Kinds of conditions: meaning, unit, and what they are elsewhere."""
-    return _table(CONDITIONS.values())
+    return _kinds_table(CONDITIONS.values())
 
 
 def action_table() -> str:
     """Kinds of actions: meaning, unit, and what they are elsewhere."""
-    return _table(ACTIONS.values())
+    return _kinds_table(ACTIONS.values())
 
 
-def _table(kinds: Iterable[ConditionKind | ActionKind]) -> str:
+def _kinds_table(kinds: Iterable[ConditionKind | ActionKind]) -> str:
     rows = (
-        (f"`{one.name}`", one.meaning, one.unit, one.sumo, one.openscenario, one.carla)
-        for one in kinds
+        (f"`{kind.name}`", kind.meaning, kind.unit, kind.sumo, kind.openscenario, kind.carla)
+        for kind in kinds
     )
     return markdown_table(_HEADS, rows)

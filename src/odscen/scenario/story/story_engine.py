@@ -145,7 +145,7 @@ class StoryEngine:
             if turn is None:
                 break
             now, rule = turn
-            self._turn(view, now, self._rules[rule])
+            self._turn_rule(view, now, self._rules[rule])
         for tree in self._looked.values():
             tree.next_step()
         self._looked = {}
@@ -191,7 +191,7 @@ class StoryEngine:
             actor = view.actor(name)
             if actor is None:
                 del self._channels[name]
-                self._gone(view, name)
+                self._end_gone_actor(view, name)
             else:
                 self._channels[name].begin_step(actor, view.time)
         if not self._busy:
@@ -199,16 +199,16 @@ class StoryEngine:
         for name, rule in self._rules.items():
             if running := self._states[name].running:
                 for one in list(running):
-                    self._update(view, rule, one, view.time)
+                    self._update_action(view, rule, one, view.time)
 
-    def _gone(self, view: RoadView, actor: str) -> None:
+    def _end_gone_actor(self, view: RoadView, actor: str) -> None:
         """End what an actor does that has left the road."""
         for name, rule in self._rules.items():
             if rule.actor == actor and self._states[name].item is not None:
                 vanished = any(one.vanish for one in rule.then)
                 if not vanished:
-                    self._say(view.time, FAILED, rule, "it has left the road")
-                self._over(rule, view.time)
+                    self._say_event(view.time, FAILED, rule, "it has left the road")
+                self._end_rule(rule, view.time)
 
     def _until_something(self, time: float) -> float:
         """Instant before which nothing can happen if nobody is put elsewhere."""
@@ -234,14 +234,14 @@ class StoryEngine:
                 due = max(min((one.end for one in state.running), default=now), now)
                 instant = due if due < end else None
             elif state.fired < rule.times and time >= until.get(name, time):
-                instant = self._instant(rule, state, view, now, end)
+                instant = self._next_firing(rule, state, view, now, end)
             else:
                 continue
             if instant is not None and instant < first:  # of several at once the first one
                 first, found = instant, (instant, name)
         return found
 
-    def _instant(
+    def _next_firing(
         self, rule: StoryRule, state: RuleState, view: RoadView, now: float, end: float
     ) -> float | None:
         """Instant from ``now`` on, before ``end``, at which a rule fires."""
@@ -260,25 +260,25 @@ class StoryEngine:
             tree.forget()
         return instant
 
-    def _turn(self, view: RoadView, now: float, rule: StoryRule) -> None:
+    def _turn_rule(self, view: RoadView, now: float, rule: StoryRule) -> None:
         state = self._states[rule.id]
         if state.item is None:
-            self._fire(view, now, rule)
+            self._fire_rule(view, now, rule)
             return
         for one in [one for one in state.running if one.end <= now]:
             state.running.remove(one)
-            self._finish(view, now, rule, one)
+            self._finish_action(view, now, rule, one)
         if not state.running:
             self._next_item(view, now, rule)
 
-    def _fire(self, view: RoadView, now: float, rule: StoryRule) -> None:
+    def _fire_rule(self, view: RoadView, now: float, rule: StoryRule) -> None:
         state = self._states[rule.id]
         state.fired += 1
         state.item = -1
         self._busy.add(rule.id)
         state.started = state.started or [now]
         values = self._trees[rule.id].values(now - view.time)
-        self._say(now, STARTED, rule, values=values or None)
+        self._say_event(now, STARTED, rule, values=values or None)
         self._next_item(view, now, rule)
 
     def _next_item(self, view: RoadView, now: float, rule: StoryRule) -> None:
@@ -286,76 +286,78 @@ class StoryEngine:
         state = self._states[rule.id]
         state.item = 0 if state.item is None else state.item + 1
         if state.item >= len(rule.then):
-            self._say(now, ENDED, rule)
-            self._over(rule, now)
+            self._say_event(now, ENDED, rule)
+            self._end_rule(rule, now)
             return
         for number, action in enumerate(rule.then[state.item].parts):
             one = Running(number, math.inf)
             state.running.append(one)
-            self._begin(view, now, rule, action, one)
+            self._begin_action(view, now, rule, action, one)
             if state.item is None:  # that failed
                 return
 
-    def _begin(
-        self, view: RoadView, now: float, rule: StoryRule, action: Action, one: Running
+    def _begin_action(
+        self, view: RoadView, now: float, rule: StoryRule, action: Action, running: Running
     ) -> None:
         kind, part = action_kind(action), getattr(action, action.kind)
         try:
             if kind.ask is not None:
                 self._asked.append(kind.ask(part, rule.actor, view))
-                one.end = math.inf if kind.update else now
+                running.end = math.inf if kind.update else now
             else:
-                self._move(view, now, rule, kind, part, one)
+                self._begin_motion(view, now, rule, kind, part, running)
         except CannotAct as error:
-            self._fail(rule, now, str(error))
+            self._fail_rule(rule, now, str(error))
             return
         if kind.says is not None:
-            self._say(now, ACTED, rule, kind.says(part))
+            self._say_event(now, ACTED, rule, kind.says(part))
 
-    def _move(
+    def _begin_motion(
         self,
         view: RoadView,
         now: float,
         rule: StoryRule,
         kind: ActionKind,
         part: Any,
-        one: Running,
+        running: Running,
     ) -> None:
         """Begin an action of an actor that is on the road."""
-        acting = self._acting(view, now, rule, one)
+        acting = self._acting_actor(view, now, rule, running)
         channel, person = acting.channel, acting.actor.person
         if (kind.persons_only and not person) or (kind.vehicles_only and person):
             raise CannotAct(f"{kind.name!r} is not for {'a person' if person else 'a vehicle'}")
         owners = channel.speed_owner, channel.line_owner
-        one.end = now if kind.begin is None else kind.begin(part, acting)
-        if one.end == math.inf and kind.update is not None:
-            one.end = kind.update(part, acting, one.end)
+        running.end = now if kind.begin is None else kind.begin(part, acting)
+        if running.end == math.inf and kind.update is not None:
+            running.end = kind.update(part, acting, running.end)
         after = channel.speed_owner, channel.line_owner
         for owner, new in zip(owners, after, strict=True):
             if owner is not None and new != owner:
-                self._override(owner, now, rule)
+                self._override_action(owner, now, rule)
 
-    def _update(self, view: RoadView, rule: StoryRule, one: Running, now: float) -> None:
+    def _update_action(self, view: RoadView, rule: StoryRule, running: Running, now: float) -> None:
         state = self._states[rule.id]
         if view.actor(rule.actor) is None or state.item is None:
             return
-        action = rule.then[state.item].parts[one.number]
+        action = rule.then[state.item].parts[running.number]
         kind = action_kind(action)
         if kind.update is None:
             return
         try:
-            acting = self._acting(view, now, rule, one)
-            one.end = kind.update(getattr(action, action.kind), acting, one.end)
+            acting = self._acting_actor(view, now, rule, running)
+            running.end = kind.update(getattr(action, action.kind), acting, running.end)
         except CannotAct as error:
-            self._fail(rule, now, str(error))
+            self._fail_rule(rule, now, str(error))
 
-    def _finish(self, view: RoadView, now: float, rule: StoryRule, one: Running) -> None:
-        action = rule.then[self._states[rule.id].item or 0].parts[one.number]
+    def _finish_action(self, view: RoadView, now: float, rule: StoryRule, running: Running) -> None:
+        action = rule.then[self._states[rule.id].item or 0].parts[running.number]
         kind = action_kind(action)
         if kind.finish is not None and view.actor(rule.actor) is not None:
-            kind.finish(getattr(action, action.kind), self._acting(view, now, rule, one))
+            kind.finish(getattr(action, action.kind), self._acting_actor(view, now, rule, running))
 
-    def _acting(self, view: RoadView, now: float, rule: StoryRule, one: Running) -> ActingActor:
+    def _acting_actor(
+        self, view: RoadView, now: float, rule: StoryRule, running: Running
+    ) -> ActingActor:
         actor = view.actor(rule.actor)
         if actor is None:
             raise CannotAct(f"{rule.actor!r} is not on the road")
@@ -364,10 +366,10 @@ class StoryEngine:
             channel = self._channels[actor.id] = Channel()
             self._quiet.end(actor.id)
             channel.begin_step(actor, view.time)
-        owner = f"{rule.id}/{one.number}"
+        owner = f"{rule.id}/{running.number}"
         return ActingActor(view, actor, channel, now, self._step, owner, self._channels)
 
-    def _override(self, owner: str, now: float, by: StoryRule) -> None:
+    def _override_action(self, owner: str, now: float, by: StoryRule) -> None:
         """End an action of another rule, as ``by`` has taken over what it had."""
         name, _, number = owner.rpartition("/")
         state = self._states[name]
@@ -377,28 +379,28 @@ class StoryEngine:
         state.running = [one for one in state.running if one.number != int(number)]
         if len(state.running) < before:
             rule = self._rules[name]
-            self._say(now, OVERRIDDEN, rule, f"rule {by.id!r} acts instead")
+            self._say_event(now, OVERRIDDEN, rule, f"rule {by.id!r} acts instead")
             if not state.running:
-                self._over(rule, now)
+                self._end_rule(rule, now)
 
-    def _fail(self, rule: StoryRule, now: float, why: str) -> None:
-        self._say(now, FAILED, rule, why)
+    def _fail_rule(self, rule: StoryRule, now: float, why: str) -> None:
+        self._say_event(now, FAILED, rule, why)
         channel = self._channels.get(rule.actor)
         if channel is not None:
             if (channel.line_owner or "").rpartition("/")[0] == rule.id and not channel.held:
                 channel.release_line()
             if (channel.speed_owner or "").rpartition("/")[0] == rule.id:
                 channel.release_speed(now)
-        self._over(rule, now)
+        self._end_rule(rule, now)
 
-    def _over(self, rule: StoryRule, now: float) -> None:
+    def _end_rule(self, rule: StoryRule, now: float) -> None:
         state = self._states[rule.id]
         state.item, state.ready = None, now
         self._busy.discard(rule.id)
         state.running = []
         state.ended = state.ended or [now]
 
-    def _say(
+    def _say_event(
         self,
         now: float,
         what: str,

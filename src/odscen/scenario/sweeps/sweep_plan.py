@@ -60,7 +60,7 @@ class Range:
 
     def at(self, share: float) -> tuple[float, ...]:
         """Value at a share of the range, from 0 to 1."""
-        return (_rounded(self.low + share * (self.high - self.low)),)
+        return (_round_value(self.low + share * (self.high - self.low)),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -327,13 +327,13 @@ def axis_from_text(text: str) -> Range | Table:
         raise InputError(f"{text!r} varies nothing; write gap=1..4:7, gap=1..4 or gap=1,2,4")
     if (match := _RANGE.fullmatch(said)) is not None:
         steps = match["steps"]
-        return _range(
+        return _make_range(
             name,
-            _number(match["low"], text),
-            _number(match["high"], text),
-            None if steps is None else _number(steps, text),
+            _parse_number(match["low"], text),
+            _parse_number(match["high"], text),
+            None if steps is None else _parse_number(steps, text),
         )
-    return Table((name,), tuple((_number(one, text),) for one in said.split(",")))
+    return Table((name,), tuple((_parse_number(part, text),) for part in said.split(",")))
 
 
 def plan_from_data(data: Mapping[str, Any]) -> SweepPlan:
@@ -355,69 +355,71 @@ def plan_from_data(data: Mapping[str, Any]) -> SweepPlan:
     if not isinstance(method, str):
         raise InputError(f"method must be a name, not {method!r:.60}")
     proposal_kind(method)
-    count = None if samples is None else _whole(samples, "samples", least=1)
-    seed = _whole(data.get("seed", 0), "seed", least=0)
-    axes = tuple(_axis(one, f"vary[{index}]") for index, one in enumerate(vary))
+    count = None if samples is None else _require_whole(samples, "samples", least=1)
+    seed = _require_whole(data.get("seed", 0), "seed", least=0)
+    axes = tuple(_read_axis(one, f"vary[{index}]") for index, one in enumerate(vary))
     return SweepPlan(axes, method, count, seed)
 
 
-def _axis(data: Mapping[str, Any], place: str) -> Range | Table:
+def _read_axis(data: Mapping[str, Any], place: str) -> Range | Table:
     keys = set(data)
     if keys <= {"parameter", "from", "to", "steps"} and {"parameter", "from", "to"} <= keys:
-        low, high = (_real(data[key], f"{place}.{key}") for key in ("from", "to"))
+        low, high = (_require_real(data[key], f"{place}.{key}") for key in ("from", "to"))
         steps = data.get("steps")
-        return _range(
+        return _make_range(
             str(data["parameter"]),
             low,
             high,
-            None if steps is None else _real(steps, f"{place}.steps"),
+            None if steps is None else _require_real(steps, f"{place}.steps"),
         )
     if keys == {"parameter", "values"} and isinstance(data["values"], list):
-        rows = tuple((_real(one, f"{place}.values"),) for one in data["values"])
-        return _table((str(data["parameter"]),), rows, place)
+        rows = tuple((_require_real(one, f"{place}.values"),) for one in data["values"])
+        return _make_table((str(data["parameter"]),), rows, place)
     if keys == {"parameters", "table"} and isinstance(data["table"], list):
         if not isinstance(data["parameters"], list):
             raise InputError(
                 f"{place}.parameters must be a list of names, not {data['parameters']!r:.60}"
             )
         names = tuple(map(str, data["parameters"]))
-        return _table(names, tuple(_row(row, names, place) for row in data["table"]), place)
+        return _make_table(
+            names, tuple(_read_row(row, names, place) for row in data["table"]), place
+        )
     raise InputError(
         f"{place} has {', '.join(sorted(keys)) or 'nothing'}; give parameter, from, to and steps, "
         "or parameter and values, or parameters and table"
     )
 
 
-def _row(row: object, names: tuple[str, ...], place: str) -> tuple[float, ...]:
+def _read_row(row: object, names: tuple[str, ...], place: str) -> tuple[float, ...]:
     if not isinstance(row, list) or len(row) != len(names):
         raise InputError(
             f"{place}.table: row {row!r:.60} does not have a value of each of {', '.join(names)}"
         )
-    return tuple(_real(one, f"{place}.table") for one in row)
+    return tuple(_require_real(one, f"{place}.table") for one in row)
 
 
-def _table(names: tuple[str, ...], rows: tuple[tuple[float, ...], ...], place: str) -> Table:
+def _make_table(names: tuple[str, ...], rows: tuple[tuple[float, ...], ...], place: str) -> Table:
     if not rows or not names:
         raise InputError(f"{place} has no values")
     return Table(names, rows)
 
 
-def _range(name: str, low: float, high: float, steps: float | None) -> Range:
+def _make_range(name: str, low: float, high: float, steps: float | None) -> Range:
     if low > high:
         raise InputError(f"{name}: the range {low:g}..{high:g} ends before it begins")
     if steps is not None:
-        steps = _whole(steps, f"{name}: steps", least=2)
+        steps = _require_whole(steps, f"{name}: steps", least=2)
     return Range(name, low, high, steps)
 
 
-def _number(text: str, whole: str) -> float:
+def _parse_number(text: str, whole: str) -> float:
     try:
-        return _real(float(text), whole)
+        return _require_real(float(text), whole)
     except ValueError:
         raise InputError(f"{text.strip()!r} in {whole!r} is not a number") from None
 
 
-def _real(value: object, place: str) -> float:
+def _require_real(value: object, place: str) -> float:
     try:
         if isinstance(value, int | float) and not isinstance(value, bool):
             number = float(value)
@@ -428,12 +430,12 @@ def _real(value: object, place: str) -> float:
     raise InputError(f"{place}: {value!r:.60} is not a finite number")
 
 
-def _whole(value: object, place: str, *, least: int) -> int:
-    number = _real(value, place)
+def _require_whole(value: object, place: str, *, least: int) -> int:
+    number = _require_real(value, place)
     if not number.is_integer() or number < least or number > MOST_CASES * 1e6:
         raise InputError(f"{place}: {number:g} is not a whole number from {least} on")
     return int(number)
 
 
-def _rounded(value: float) -> float:
+def _round_value(value: float) -> float:
     return round(float(value), _DIGITS)

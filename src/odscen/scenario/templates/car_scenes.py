@@ -57,7 +57,7 @@ def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
 
     def place(stretch: LaneStretch) -> TemplateScene:
         near = near_side(site, stretch)
-        lane = _either(site, stretch, near)
+        lane = _stretch_on_either_side(site, stretch, near)
         centre = apart(site, int(stretch.nodes[0]), int(lane.nodes[0]))
         border = site.region.graph.lanes.width[lane.nodes[0]] / 2.0 - width / 2.0 + INTRUSION
         # half-cosine: offset = centre (1 - cos(pi t / over)) / 2
@@ -94,7 +94,7 @@ def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     return first_fit(found, why, place, what="a cut-in", map_name=site.region.graph.map_name)
 
 
-def _either(site: TemplateSite, stretch: LaneStretch, near: int) -> LaneStretch:
+def _stretch_on_either_side(site: TemplateSite, stretch: LaneStretch, near: int) -> LaneStretch:
     try:
         return beside(site, stretch, near)
     except Unfit:
@@ -192,7 +192,7 @@ LEAD_BRAKES = SceneTemplate(
 )
 
 
-def _bus(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+def _bus_scene(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     speed, ttc = values["ego_speed"], values["ttc"]
     halves = (body_length(site, Category.CAR) + body_length(site, Category.BUS)) / 2.0
     ahead = halves + (ttc + values["approach"]) * speed
@@ -250,5 +250,5 @@ BUS_LEAVES = SceneTemplate(
         TemplateParameter("over", 5, 2, 12, "s", "duration of the lane change"),
         TemplateParameter("approach", 2, 0.5, 20, "s", "time before it"),
     ),
-    place=_bus,
+    place=_bus_scene,
 )

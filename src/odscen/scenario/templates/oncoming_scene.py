@@ -83,7 +83,7 @@ def overtaking(values: Mapping[str, float], lengths: float) -> Overtaking:
     return Overtaking(back, total, metres, at_end + metres + values["ego_speed"] * total)
 
 
-def _oncoming(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+def _oncoming_scene(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     slow, fast, ego = values["slow_speed"], values["speed"], values["ego_speed"]
     half_car = body_length(site, Category.CAR) / 2.0
     half_bike = body_length(site, Category.BICYCLE) / 2.0
@@ -95,7 +95,7 @@ def _oncoming(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
 
     def place(stretch: LaneStretch) -> TemplateScene:
         near = near_side(site, stretch)
-        other = _opposite(site, stretch, -near)
+        other = _opposite_stretch(site, stretch, -near)
         across = apart(site, int(stretch.nodes[0]), int(other.nodes[-1]))
         start, ahead = (node_near(site, stretch, at) for at in (_REAR, bike))
         oncoming = node_near(site, other, float(other.along[-1]) - (meet + ego * settle))
@@ -147,7 +147,7 @@ def _oncoming(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     return first_fit(found, why, place, what=what, map_name=site.region.graph.map_name)
 
 
-def _opposite(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretch:
+def _opposite_stretch(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretch:
     """The lane of the other direction beside a stretch, in its own direction.
 
     Raises
@@ -202,5 +202,5 @@ ONCOMING = SceneTemplate(
         ),
         TemplateParameter("approach", 3.5, 2, 20, "s", "time before it, in which the gap settles"),
     ),
-    place=_oncoming,
+    place=_oncoming_scene,
 )

@@ -53,12 +53,15 @@ class _CrossingPaths(NamedTuple):
 
 def _red_light(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     why: Counter[str] = Counter()
-    meetings = {id(one.ego): one for one in _meetings(site, why)}
+    meetings = {
+        id(crossing_movement.ego): crossing_movement
+        for crossing_movement in _crossing_movements(site, why)
+    }
 
     def place(stretch: LaneStretch) -> TemplateScene:
         return _at_light(site, meetings[id(stretch)], values)
 
-    candidates = [one.ego for one in meetings.values()]
+    candidates = [meeting.ego for meeting in meetings.values()]
     what = "a vehicle that runs a red light"
     map_name = site.region.graph.map_name
     return first_fit(candidates, why, place, what=what, map_name=map_name)
@@ -112,37 +115,39 @@ def _at_light(
     )  # fmt: skip
 
 
-def _meetings(site: TemplateSite, why: Counter[str]) -> Iterator[_CrossingPaths]:
+def _crossing_movements(site: TemplateSite, why: Counter[str]) -> Iterator[_CrossingPaths]:
     """Pairs of movements straight through a light from different legs, in the map's order."""
     names = {name: row for row, name in enumerate(map(str, site.region.graph.lanes.lanes.keys))}
     for light in site.lights:
         paths = []
         for movement in light.movements:
             if movement.turn == "straight" and movement.lanes[0] in names:
-                path = _through(site, names[movement.lanes[0]], movement.lanes[1])
+                path = _path_through_junction(site, names[movement.lanes[0]], movement.lanes[1])
                 if path is not None:
                     paths.append((movement, *path))
         pairs = [
-            _CrossingPaths(light, one[1], other[1], one[0], one[2], other[2])
-            for one in paths
+            _CrossingPaths(light, path[1], other[1], path[0], path[2], other[2])
+            for path in paths
             for other in paths
-            if one[0].approach != other[0].approach
+            if path[0].approach != other[0].approach
         ]
         if not pairs:
             why["have no two movements straight on from different legs"] += 1
         yield from pairs
 
 
-def _through(site: TemplateSite, row: int, out: str) -> tuple[LaneStretch, float] | None:
+def _path_through_junction(
+    site: TemplateSite, row: int, out: str
+) -> tuple[LaneStretch, float] | None:
     """Path over a lane and through a junction, and the metres at which the junction begins."""
     lanes, stretches = site.region.graph.lanes, site.stretches
-    first, last = (int(lanes.lanes.first_node[row + one]) for one in (0, 1))
+    first, last = (int(lanes.lanes.first_node[row + number]) for number in (0, 1))
     nodes = list(range(max(first, last - int(_LONGEST / lanes.spacing)), last))
     if not stretches.plain[nodes].all():
         return None
     before = len(nodes) - 1
     exit_nodes = 0
-    for follower in _followers(site, nodes[-1], out):
+    for follower in _nodes_behind(site, nodes[-1], out):
         nodes.append(follower)
         exit_nodes += 1
     if not exit_nodes:
@@ -154,7 +159,7 @@ def _through(site: TemplateSite, row: int, out: str) -> tuple[LaneStretch, float
     return LaneStretch(np.array(nodes), along, 0.0), float(along[before])
 
 
-def _followers(site: TemplateSite, node: int, out: str) -> list[int]:
+def _nodes_behind(site: TemplateSite, node: int, out: str) -> list[int]:
     """Nodes behind the end of a lane up to some metres on the lane ``out``."""
     lanes = site.region.graph.lanes
     router = site.stretches.router
@@ -178,16 +183,16 @@ def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, in
     """
     lanes = site.region.graph.lanes
     lines = [
-        LineString(np.stack([lanes.x[one.nodes], lanes.y[one.nodes]], axis=1))
-        for one in (found.ego, found.runner)
+        LineString(np.stack([lanes.x[stretch.nodes], lanes.y[stretch.nodes]], axis=1))
+        for stretch in (found.ego, found.runner)
     ]
     crossed = lines[0].intersection(lines[1])
     if crossed.is_empty or crossed.geom_type != "Point":
         raise Unfit("are two movements whose paths do not cross at one place")
     nodes = []
-    for one in (found.ego, found.runner):
-        away = np.hypot(lanes.x[one.nodes] - crossed.x, lanes.y[one.nodes] - crossed.y)
-        nodes.append(int(one.nodes[np.argmin(away)]))
+    for stretch in (found.ego, found.runner):
+        away = np.hypot(lanes.x[stretch.nodes] - crossed.x, lanes.y[stretch.nodes] - crossed.y)
+        nodes.append(int(stretch.nodes[np.argmin(away)]))
     if not all(metres_at(one, node) > line for one, node, line in (
         (found.ego, nodes[0], found.stop_line), (found.runner, nodes[1], found.runner_line),
     )):  # fmt: skip

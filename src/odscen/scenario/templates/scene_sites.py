@@ -86,10 +86,10 @@ class LaneStretches:
         Also why the others do not fit.
         """
         starts = self.beginnings()
-        nodes, along = self._followed(starts, metres)
+        nodes, along = self._follow_lanes(starts, metres)
         whole = along[:, -1] >= metres
         hdg = self.graph.lanes.hdg
-        turned = np.abs(_wrapped(hdg[nodes] - hdg[starts][:, None])).max(axis=1, initial=0.0)
+        turned = np.abs(_wrap_angle(hdg[nodes] - hdg[starts][:, None])).max(axis=1, initial=0.0)
         straight = turned <= bend
         why = Counter(
             {
@@ -119,7 +119,7 @@ class LaneStretches:
         """Paths on the lanes that can be driven."""
         return Router(self.graph, self.drivable)
 
-    def _followed(self, starts: IntArray, metres: float) -> tuple[IntArray, FloatArray]:
+    def _follow_lanes(self, starts: IntArray, metres: float) -> tuple[IntArray, FloatArray]:
         """Nodes and metres along, shapes ``(C, K)``; where a lane ends both stay as they are."""
         nodes, along = [starts], [np.zeros(len(starts))]
         for _ in range(int(np.ceil(metres / (self.graph.lanes.spacing * 0.5)))):
@@ -170,7 +170,7 @@ def _straight_on(lanes: LaneGraph, drivable: BoolArray) -> tuple[IntArray, Float
     length = lanes.length[follows]
     ok = drivable[source] & drivable[target]
     source, target, length = source[ok], target[ok], length[ok]
-    turn = np.round(np.abs(_wrapped(lanes.hdg[target] - lanes.hdg[source])), 6)
+    turn = np.round(np.abs(_wrap_angle(lanes.hdg[target] - lanes.hdg[source])), 6)
     # Of several that turn alike at first, the one that leads straight on a little later.
     order = np.lexsort((target, turn, source))
     source, target, length = source[order], target[order], length[order]
@@ -180,7 +180,7 @@ def _straight_on(lanes: LaneGraph, drivable: BoolArray) -> tuple[IntArray, Float
     return after, metres
 
 
-def _wrapped(angle: FloatArray) -> FloatArray:
+def _wrap_angle(angle: FloatArray) -> FloatArray:
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
@@ -248,19 +248,23 @@ class WalkSides:
         lanes, walks = self._graph.lanes, self._graph.walks
         place = int(np.argmin(np.abs(stretch.along - along)))
         node = int(stretch.nodes[place])
-        if self._tree is None:
+        if self._walk_node_tree is None:
             raise Unfit("have no sidewalk")
         c, s = math.cos(lanes.hdg[node]), math.sin(lanes.hdg[node])
-        around = np.array(sorted(self._tree.query_ball_point((lanes.x[node], lanes.y[node]), 32)))
+        around = np.array(
+            sorted(self._walk_node_tree.query_ball_point((lanes.x[node], lanes.y[node]), 32))
+        )
         around = around.astype(np.int64)
         around = around[self._usable[around] & (np.abs(walks.z[around] - lanes.z[node]) < _LEVEL)]
         dx, dy = walks.x[around] - lanes.x[node], walks.y[around] - lanes.y[node]
         ahead, left = dx * c + dy * s, dy * c - dx * s
-        start = _nearest(around, ahead, left * near, beyond + float(lanes.width[node]) / 2.0)
+        start = _nearest_to_side(
+            around, ahead, left * near, beyond + float(lanes.width[node]) / 2.0
+        )
         if start is None:
             raise Unfit("have no sidewalk on the near side")
         met = float(ahead[around == start][0])
-        end = _nearest(around, ahead - met, -left * near, float(lanes.width[node]) / 2.0)
+        end = _nearest_to_side(around, ahead - met, -left * near, float(lanes.width[node]) / 2.0)
         if end is None:
             raise Unfit("have no sidewalk on the far side")
         across = float(abs(left[around == start][0]))
@@ -269,10 +273,10 @@ class WalkSides:
         meets = float(lanes.x[node] + met * c), float(lanes.y[node] + met * s)
         if self._near_crosswalk(meets):
             raise Unfit(f"have a crosswalk within {_FROM_CORNER:.0f} m")
-        goal = self._goal(start, end)
+        goal = self._goal_behind(start, end)
         there: str | list[float] = walk_node_id(self._graph, end)
         if goal is None:  # nothing joins the two sides: it stays where it gets to
-            goal = self._goal(start, start)
+            goal = self._goal_behind(start, start)
             there = [round(float(at[end]), 3) for at in (walks.x, walks.y)]
         if goal is None:
             raise Unfit("have a sidewalk from which no path leads on")
@@ -285,7 +289,7 @@ class WalkSides:
             across,
         )
 
-    def _goal(self, start: int, behind: int) -> int | None:
+    def _goal_behind(self, start: int, behind: int) -> int | None:
         """Nearest place behind a node that walks from the start may lead to."""
         goals: Int32Array = self._router.goal_candidates(start)
         metres = np.round(self._router.distances(behind)[goals], 3)
@@ -294,17 +298,17 @@ class WalkSides:
         return int(goals[fits][order[0]]) if len(order) else None
 
     def _near_crosswalk(self, place: tuple[float, float]) -> bool:
-        if self._crosswalks is None:
+        if self._crosswalk_tree is None:
             return False
-        return bool(self._crosswalks.query(place)[0] < _FROM_CORNER)
+        return bool(self._crosswalk_tree.query(place)[0] < _FROM_CORNER)
 
     @cached_property
-    def _tree(self) -> cKDTree | None:
+    def _walk_node_tree(self) -> cKDTree | None:
         walks = self._graph.walks
         return cKDTree(np.stack([walks.x, walks.y], axis=1)) if len(walks.x) else None
 
     @cached_property
-    def _crosswalks(self) -> cKDTree | None:
+    def _crosswalk_tree(self) -> cKDTree | None:
         walks = self._graph.walks
         over = np.array([bool(name) for name in walks.crosswalk], dtype=np.bool_)
         if not over.any():
@@ -314,7 +318,7 @@ class WalkSides:
         return cKDTree(np.stack(middle, axis=1))
 
 
-def _nearest(rows: IntArray, ahead: object, aside: object, least: float) -> int | None:
+def _nearest_to_side(rows: IntArray, ahead: object, aside: object, least: float) -> int | None:
     """Row of the node that is nearest to a line straight to one side, at least so far off."""
     along, away = np.abs(np.asarray(ahead)), np.asarray(aside)
     fits = (along <= 2.5) & (away >= least)

@@ -96,18 +96,24 @@ class SceneTemplate:
         InputError
             If a name is unknown or a number out of its range.
         """
-        known = {one.name: one for one in self.parameters}
+        known = {parameter.name: parameter for parameter in self.parameters}
         for name, value in given.items():
-            one = known.get(name)
-            if one is None:
+            template_parameter = known.get(name)
+            if template_parameter is None:
                 raise InputError(
                     f"template {self.name!r} has no parameter {name!r}; it has {', '.join(known)}"
                 )
-            if not (math.isfinite(value) and one.low <= value <= one.high):
+            if not (
+                math.isfinite(value) and template_parameter.low <= value <= template_parameter.high
+            ):
                 raise InputError(
-                    f"{name} must be {one.low:g} to {one.high:g} {one.unit}, not {value:g}"
+                    f"{name} must be {template_parameter.low:g} to {template_parameter.high:g} {template_parameter.unit}, not {value:g}"
                 )
-        usual = {one.name: one.default for one in self.parameters if one.default is not None}
+        usual = {
+            parameter.name: parameter.default
+            for parameter in self.parameters
+            if parameter.default is not None
+        }
         return usual | dict(given)
 
 

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from odscen.scenario.templates.scene_template import SceneTemplate
 
 TEMPLATES: dict[str, SceneTemplate] = {
-    one.name: one
-    for one in (CUT_IN, LEAD_BRAKES, HIDDEN_CHILD, MID_BLOCK, RED_LIGHT, ONCOMING, BUS_LEAVES)
+    template.name: template
+    for template in (CUT_IN, LEAD_BRAKES, HIDDEN_CHILD, MID_BLOCK, RED_LIGHT, ONCOMING, BUS_LEAVES)
 }
 """By name, in the order in which they are offered."""
 

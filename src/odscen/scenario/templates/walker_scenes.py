@@ -61,13 +61,13 @@ def _runs_out(
     for hides, speed, reach in product(hidden, speeds, _REACHES):
         try:
             wanted = {**values, "ego_speed": speed}
-            return _within(site, wanted, reach, walker=walker, hidden=hides)
+            return _crossing_scene(site, wanted, reach, walker=walker, hidden=hides)
         except NoPlaceError as error:
             refused = error
     raise refused
 
 
-def _within(
+def _crossing_scene(
     site: TemplateSite,
     values: Mapping[str, float],
     reach: float,
@@ -94,7 +94,7 @@ def _within(
         rules = [at_once("wait", walker, {"stop": {}})]
         seen = ""
         if parked_lane is not None:
-            actors.append(_parked(site, parked_lane, crossing.along - values["clearance"]))
+            actors.append(_park_vehicle(site, parked_lane, crossing.along - values["clearance"]))
             rules.append(at_once("parked", "parked", {"stop": {}}))
             seen = " It is hidden by a vehicle stopped in the lane at the kerb."
         elif hidden is _HiddenBy.AT_KERB:
@@ -104,7 +104,7 @@ def _within(
             stays = [[0.0, *pose], [_FOR_EVER, *pose]]
             rules.append(at_once("parked", "parked", {"replay": {"rows": stays}}))
             seen = " It is hidden by a vehicle parked beside the lane."
-        rules.append(_crosses(walker, crossing, distance, walking))
+        rules.append(_crossing_rule(walker, crossing, distance, walking))
         duration = values["approach"] + crossing.metres / walking + 20.0
         return TemplateScene(
             actors=tuple(actors),
@@ -123,7 +123,7 @@ def _within(
     return first_fit(found, why, place, what=what, map_name=site.region.graph.map_name)
 
 
-def _parked(site: TemplateSite, lane: LaneStretch, front: float) -> dict[str, Any]:
+def _park_vehicle(site: TemplateSite, lane: LaneStretch, front: float) -> dict[str, Any]:
     """Make a vehicle that stands with its front where is said, or up to a node's spacing before."""
     half = body_length(site, Category.CAR) / 2.0
     centre = front - half - site.region.graph.lanes.spacing / 2.0
@@ -151,7 +151,7 @@ def _at_kerb(
     return parked, [round(x, 3), round(y, 3), round(math.remainder(hdg, math.tau), 5)]
 
 
-def _crosses(
+def _crossing_rule(
     walker: str, crossing: RoadCrossing, distance: float, walking: float
 ) -> dict[str, Any]:
     far = {
@@ -162,7 +162,7 @@ def _crosses(
     return rule("cross", walker, when, {"walk": walk})
 
 
-def _child(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+def _child_scene(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     return _runs_out(site, values, walker="child", hidden=(_HiddenBy.IN_LANE, _HiddenBy.AT_KERB))
 
 
@@ -197,7 +197,7 @@ HIDDEN_CHILD = SceneTemplate(
             "least distance from the front of the stopped vehicle to the child's path",
         ),
     ),
-    place=_child,
+    place=_child_scene,
 )  # fmt: skip
 MID_BLOCK = SceneTemplate(
     name="mid-block",

@@ -45,12 +45,13 @@ class CorridorFinder:
     def in_order(self, numbers: Sequence[int]) -> list[int]:
         """Lights in the order in which they lie along their road, from one of the outermost."""
         apart = {
-            (one, other): min(
-                self._length(self._path(one, other)), self._length(self._path(other, one))
+            (number, other): min(
+                self._path_length(self._path_between(number, other)),
+                self._path_length(self._path_between(other, number)),
             )
-            for one in numbers
+            for number in numbers
             for other in numbers
-            if one < other
+            if number < other
         }
         first, _ = max(apart, key=lambda pair: (apart[pair], -pair[0]))
         return sorted(
@@ -72,7 +73,7 @@ class CorridorFinder:
         InputError
             If another light lies on the way.
         """
-        paths = [self._path(one, other) for one, other in pairwise(numbers)]
+        paths = [self._path_between(one, other) for one, other in pairwise(numbers)]
         if any(path is None for path in paths):
             return None
         ways = [path for path in paths if path is not None]
@@ -81,18 +82,18 @@ class CorridorFinder:
         for place, number in enumerate(numbers):
             source = ways[place - 1][-1] if place else None
             target = ways[place][0] if place < len(ways) else None
-            own = self._through(number, source, target)
+            own = self._links_along(number, source, target)
             if not own:
                 return None
             links.append(own)
             if target is not None:
-                inside = self._inside(number, own[0])
-                lanes = [*inside, *self._lanes(ways[place])]
+                inside = self._inner_lengths(number, own[0])
+                lanes = [*inside, *self._lane_lengths(ways[place])]
                 metres.append(metres[-1] + sum(length for length, _ in lanes))
                 seconds.append(seconds[-1] + sum(one / (speed or limit) for one, limit in lanes))
         return CorridorDirection(tuple(links), tuple(metres), tuple(seconds))
 
-    def _through(self, number: int, source: str | None, target: str | None) -> tuple[int, ...]:
+    def _links_along(self, number: int, source: str | None, target: str | None) -> tuple[int, ...]:
         """Links for those who drive along; at an end of the corridor those straight on, if any."""
         turns = self._turns[number]
         if source is not None and target is not None:
@@ -106,32 +107,32 @@ class CorridorFinder:
         straight = [own for own in fitting if links[own[0]].turn == "s"]
         return max(straight or fitting, key=lambda own: (len(own), -own[0]), default=())
 
-    def _path(self, one: int, other: int) -> tuple[str, ...] | None:
+    def _path_between(self, one: int, other: int) -> tuple[str, ...] | None:
         """Shortest way from a light to the stop line of another, as edges."""
         exits = sorted({turn.target for turn in self._turns[one]})
         stops = sorted({turn.source for turn in self._turns[other]})
         found = [
             path for a in exits for b in stops if (path := self._net.path(a, b, DRIVEN)) is not None
         ]
-        return min(found, key=lambda path: (self._length(path), path), default=None)
+        return min(found, key=lambda path: (self._path_length(path), path), default=None)
 
-    def _length(self, path: Sequence[str] | None) -> float:
+    def _path_length(self, path: Sequence[str] | None) -> float:
         return float("inf") if path is None else self._net.path_length(path)
 
-    def _inside(self, number: int, link: int) -> list[tuple[float, float]]:
+    def _inner_lengths(self, number: int, link: int) -> list[tuple[float, float]]:
         own = self._map.lights[number].links[link]
         target = self._net.lanes[own.target].edge
         passed = self._net.passage(own.source, target) or ()
         return [(lane.length, lane.speed) for lane in passed[:-1]]
 
-    def _lanes(self, path: Sequence[str]) -> list[tuple[float, float]]:
+    def _lane_lengths(self, path: Sequence[str]) -> list[tuple[float, float]]:
         """Lengths and speed limits of edges and of what lies between them."""
         found = []
         for edge, after in pairwise((*path, "")):
             lanes = [lane for lane in self._net.edge_lanes[edge] if lane.allows(DRIVEN)]
             found.append((lanes[-1].length, lanes[-1].speed))
             passages = (self._net.passage(lane.id, after) for lane in lanes) if after else ()
-            passed = next((one for one in passages if one), ())
+            passed = next((passage for passage in passages if passage), ())
             found += [(lane.length, lane.speed) for lane in passed[:-1]]
         return found
 
@@ -142,13 +143,13 @@ class CorridorFinder:
             steps = {Turn(*step) for step in pairwise(way)}
             for number, turns in enumerate(self._turns):
                 if steps & turns.keys():
-                    between, before, behind = (self._name(n) for n in (number, one, other))
+                    between, before, behind = (self._name_light(n) for n in (number, one, other))
                     raise InputError(
                         f"the light of junction {between} lies between those of {before} and "
                         f"{behind}: name it too"
                     )
 
-    def _name(self, number: int) -> str:
+    def _name_light(self, number: int) -> str:
         light = self._map.lights[number]
         return ", ".join(light.junctions) or light.id
 

@@ -94,13 +94,13 @@ class CountFits:
         groups: dict[tuple[str, str], list[CountFit]] = {}
         for row in self.rows:
             groups.setdefault((row.counts, row.place), []).append(row)
-        return tuple(one for rows in groups.values() for one in _whole_hours(rows))
+        return tuple(whole_hour for rows in groups.values() for whole_hour in _whole_hours(rows))
 
     @property
     def hours_met(self) -> float | None:
         """Share of the hours with a good GEH; ``None`` if no hour is made of slices."""
         hours = self.hours
-        return sum(one.met for one in hours) / len(hours) if hours else None
+        return sum(hour.met for hour in hours) / len(hours) if hours else None
 
     @property
     def rmse(self) -> float | None:
@@ -131,7 +131,7 @@ class CountFits:
 def _whole_hours(rows: Sequence[CountFit]) -> Iterator[HourFit]:
     """Yield hours of one place that slices without gaps between them make up."""
     slices: list[CountFit] = []
-    for row in sorted(rows, key=lambda one: one.begin):
+    for row in sorted(rows, key=lambda row: row.begin):
         if slices and abs(row.begin - slices[-1].end) > _TOGETHER:
             slices = []
         slices.append(row)
@@ -140,8 +140,8 @@ def _whole_hours(rows: Sequence[CountFit]) -> Iterator[HourFit]:
             continue
         if len(slices) > 1 and lasts < _HOUR + _TOGETHER:
             counted, modelled = (
-                sum(one.counted for one in slices),
-                sum(one.modelled for one in slices),
+                sum(count_fit.counted for count_fit in slices),
+                sum(count_fit.modelled for count_fit in slices),
             )
             value = geh(modelled, counted, _HOUR)
             yield HourFit(row.counts, row.place, slices[0].begin, counted, modelled, value)
@@ -163,17 +163,17 @@ def planned_fit(scenario: Scenario, sumo_map: SumoMap) -> CountFits:
     routes = RoutesOfDemand(scenario, region, ground.router)
     passages = planned_passages(users, region, ground.router, seen, routes=routes)
     vehicles = sum(not user.person for user in users)
-    return _fit(scenario, sumo_map, passages, source="planned", vehicles=vehicles)
+    return _fit_counts(scenario, sumo_map, passages, source="planned", vehicles=vehicles)
 
 
 def run_fit(scenario: Scenario, sumo_map: SumoMap, trajectories: pl.LazyFrame) -> CountFits:
     """Hold the traffic of a run against the counts of its scenario."""
     seen = observations(scenario.demand)
     passages, vehicles = seen_passages(trajectories, sumo_map, seen)
-    return _fit(scenario, sumo_map, passages, source="run", vehicles=vehicles)
+    return _fit_counts(scenario, sumo_map, passages, source="run", vehicles=vehicles)
 
 
-def _fit(
+def _fit_counts(
     scenario: Scenario,
     sumo_map: SumoMap,
     passages: Mapping[tuple[str, float, float], int],
@@ -193,7 +193,7 @@ def _fit(
             if not why and place not in passable:
                 why = "no route inside the region passes here"
             if not why:
-                why = _otherwise(modelled, counted, source)
+                why = _explain_difference(modelled, counted, source)
         rows.append(CountFit(name, place, begin, end, counted, modelled, value, why))
     return CountFits(source, tuple(rows), vehicles, problems)
 
@@ -210,14 +210,19 @@ def counts_apart(scenario: Scenario, sumo_map: SumoMap) -> CountsApart:
     opposed: dict[tuple[str, str, float, float], str] = {}
     problems: list[str] = []
     for part in scenario.demand.counts:
-        for one in contradictions(part, sumo_map.graph):
-            problems.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
-            for place in one.places:
-                opposed.setdefault((one.counts, place, one.begin, one.end), one.message)
+        for contradiction in contradictions(part, sumo_map.graph):
+            problems.append(
+                f"{contradiction.counts}, {contradiction.begin:g} to {contradiction.end:g} s: {contradiction.message}"
+            )
+            for place in contradiction.places:
+                opposed.setdefault(
+                    (contradiction.counts, place, contradiction.begin, contradiction.end),
+                    contradiction.message,
+                )
     return CountsApart(opposed, tuple(problems))
 
 
-def _otherwise(modelled: float, counted: float, source: str) -> str:
+def _explain_difference(modelled: float, counted: float, source: str) -> str:
     if source == "run":
         return "vehicles were late" if modelled < counted else "vehicles of another slice came late"
     if modelled > counted:
@@ -233,10 +238,10 @@ class _Passable:
         self._map = sumo_map
 
     def __contains__(self, place: str) -> bool:
-        return place in self._places
+        return place in self._passable_places
 
     @cached_property
-    def _places(self) -> set[str]:
+    def _passable_places(self) -> set[str]:
         region = Region.of(self._map.graph, self._scenario.roi)
         ground = TripEnds(region, usable_places(self._map))
         found: set[str] = set()

@@ -129,16 +129,18 @@ class LightDemand:
         self._turns = turns_of(light, sumo_map)
         nothing = TurnVolume(0.0, 0.0)
         self._volumes = {turn: volumes.get(turn, nothing) for turn in self._turns}
-        self.lanes = self._lanes()
+        self.lanes = self._load_lanes()
 
     @property
     def movements(self) -> tuple[MovementVolume, ...]:
         """Volume of each movement of vehicles."""
         found = []
         for turn, links in self._turns.items():
-            one = self._view.movements[links[0]]
+            movement = self._view.movements[links[0]]
             volume = self._volumes[turn]
-            found.append(MovementVolume(one.name, one.turn, volume.vehicles, volume.heavy))
+            found.append(
+                MovementVolume(movement.name, movement.turn, volume.vehicles, volume.heavy)
+            )
         return tuple(found)
 
     def needs(self) -> tuple[LaneNeed, ...]:
@@ -167,14 +169,16 @@ class LightDemand:
             found.append(LaneNeed(lane.ratio, green))
         return tuple(found)
 
-    def _lanes(self) -> tuple[LaneLoad, ...]:
+    def _load_lanes(self) -> tuple[LaneLoad, ...]:
         """Divide movements among their lanes: each part takes the lane of least ratio."""
         work: dict[str, float] = defaultdict(float)
         cars: dict[str, float] = defaultdict(float)
         links: dict[str, set[int]] = defaultdict(set)
-        for stream in sorted(self._streams(), key=lambda one: (len(one.links), one.turn)):
+        for stream in sorted(
+            self._list_streams(), key=lambda stream: (len(stream.links), stream.turn)
+        ):
             weight = 1.0 + (HEAVY - 1.0) * stream.heavy / stream.vehicles
-            needs = {n: weight * self._equivalent(n) / self._base for n in stream.links}
+            needs = {n: weight * self._through_equivalent(n) / self._base for n in stream.links}
             for _ in range(_SHARES):
                 n = min(needs, key=lambda n: (work[self._light.links[n].source] + needs[n], n))
                 lane = self._light.links[n].source
@@ -190,11 +194,15 @@ class LightDemand:
             for lane in sorted(cars, key=lambda lane: min(links[lane]))
         ]  # fmt: skip
         return tuple(
-            replace(load, blocked=self._blocked(load, loads), gaps=self._gaps(load))
+            replace(
+                load,
+                blocked=self._blocked_flow_ratio(load, loads),
+                gaps=self._share_through_gaps(load),
+            )
             for load in loads
         )
 
-    def _streams(self) -> list[_Stream]:
+    def _list_streams(self) -> list[_Stream]:
         """Vehicles by the lanes that are open to them: bicycles take theirs, if there is one."""
         found = []
         for turn, own in self._turns.items():
@@ -206,41 +214,41 @@ class LightDemand:
                 _Stream(driven or own, turn, volume.vehicles - apart, volume.heavy),
                 _Stream(beside, turn, apart, 0.0),
             ]
-        return [one for one in found if one.vehicles > 0.0]
+        return [stream for stream in found if stream.vehicles > 0.0]
 
-    def _gaps(self, load: LaneLoad) -> float | None:
+    def _share_through_gaps(self, load: LaneLoad) -> float | None:
         """What a lane of protected-permissive turns alone carries through gaps, as a share."""
-        if not all(self._both(n) for n in load.links):
+        if not all(self._is_protected_permissive(n) for n in load.links):
             return None
-        across = max(self._opposing(n) for n in load.links)
+        across = max(self._opposing_flow(n) for n in load.links)
         return PROTECTED_LEFT / left_turn_equivalent(across, self._base)
 
-    def _blocked(self, load: LaneLoad, loads: Sequence[LaneLoad]) -> float:
+    def _blocked_flow_ratio(self, load: LaneLoad, loads: Sequence[LaneLoad]) -> float:
         """Flow ratio of the queue that a lane of turns through gaps alone waits for."""
-        if not all(self._permissive(n) or self._both(n) for n in load.links):
+        if not all(self._is_permissive(n) or self._is_protected_permissive(n) for n in load.links):
             return 0.0
         before = {other for n in load.links for other in self._given_way(n)}
-        return max((one.ratio for one in loads if before & set(one.links)), default=0.0)
+        return max((load.ratio for load in loads if before & set(load.links)), default=0.0)
 
-    def _equivalent(self, link: int) -> float:
+    def _through_equivalent(self, link: int) -> float:
         turn = self._view.movements[link].turn
         if turn == "straight":
             return 1.0
         if turn == self._near_side:
             return RIGHT_TURN
-        if not self._permissive(link):
+        if not self._is_permissive(link):
             return PROTECTED_LEFT
-        return left_turn_equivalent(self._opposing(link), self._base)
+        return left_turn_equivalent(self._opposing_flow(link), self._base)
 
-    def _permissive(self, link: int) -> bool:
+    def _is_permissive(self, link: int) -> bool:
         """Whether a turn across has the green that gives way in all of its stages."""
-        return self._letters(link) == {"g"}
+        return self._green_letters(link) == {"g"}
 
-    def _both(self, link: int) -> bool:
+    def _is_protected_permissive(self, link: int) -> bool:
         """Whether a turn across gives way in some of its stages and is protected in others."""
-        return self._letters(link) == {"g", "G"}
+        return self._green_letters(link) == {"g", "G"}
 
-    def _letters(self, link: int) -> set[str]:
+    def _green_letters(self, link: int) -> set[str]:
         """Greens of a turn across in its stages; none of other movements."""
         if self._view.movements[link].turn in {"straight", self._near_side}:
             return set()
@@ -256,7 +264,7 @@ class LightDemand:
         }
         return {n for n in before if any(state[n] in "Gg" for state in greens)}
 
-    def _opposing(self, link: int) -> float:
+    def _opposing_flow(self, link: int) -> float:
         """Vehicles an hour that a permissive movement gives way to while both have green."""
         before = self._given_way(link)
         return sum(

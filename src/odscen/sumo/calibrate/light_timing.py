@@ -284,7 +284,7 @@ def retimed(
 
 def timing_of(scenario: Scenario, junctions: Sequence[str]) -> JunctionTiming | None:
     """What a scenario says of the light of these junctions."""
-    own = (one for one in scenario.signals.junctions if one.junction in junctions)
+    own = (junction for junction in scenario.signals.junctions if junction.junction in junctions)
     return next(own, None)
 
 
@@ -307,6 +307,6 @@ def _retimed_plan(
 def with_timings(scenario: Scenario, timings: Sequence[JunctionTiming]) -> Scenario:
     """Return a scenario in which lights have these entries in place of their own."""
     new = {timing.junction: timing for timing in timings}
-    kept = tuple(new.pop(one.junction, one) for one in scenario.signals.junctions)
+    kept = tuple(new.pop(junction.junction, junction) for junction in scenario.signals.junctions)
     signals = scenario.signals.model_copy(update={"junctions": (*kept, *new.values())})
     return scenario.model_copy(update={"signals": signals})

@@ -109,10 +109,10 @@ def pair_passages(
     """
     region = Region.of(sumo_map.graph, scenario.roi)
     ground = TripEnds(region, usable_places(sumo_map))
-    places = [one.place for one in observations(scenario.demand)]
+    places = [observation.place for observation in observations(scenario.demand)]
     passing = Passing(region.graph, places)
     until = scenario.simulation.duration
-    named, sampled = _sampled(scenario)
+    named, sampled = _sample_matrices(scenario)
     users, _ = all_road_users(sampled, sumo_map, region, until=until)
     pairs = {user.id: pair for user in users if (pair := named.get(_row_name(user.id)))}
     trips: dict[Pair, int] = defaultdict(int)
@@ -157,9 +157,9 @@ def corrected(
     if not seen or not cells:
         what = "counts" if not seen else "matrix of vehicles"
         raise InputError(f"the scenario has no {what} to correct a matrix by")
-    others = _others(scenario, sumo_map, seen)
+    others = _count_other_vehicles(scenario, sumo_map, seen)
     shares = share_matrix(cells, seen, passages)
-    counted = np.array([one.counted for one in seen])
+    counted = np.array([observation.counted for observation in seen])
     prior = np.array([cell.prior for cell in cells])
     rest = np.maximum(counted - others, 0.0)
     found = prior
@@ -173,7 +173,7 @@ def corrected(
         modelled = others + shares @ numbers
         used = np.asarray(shares.sum(axis=1)) > 0.0
         rows = tuple(
-            _fit(one, number, passable, apart.by_count)
+            _fit_of_count(one, number, passable, apart.by_count)
             for one, number, passable in zip(seen, modelled.tolist(), used.tolist(), strict=True)
         )
         return CountFits("planned", rows, round(float(numbers.sum())), apart.words)
@@ -199,7 +199,7 @@ def prior_cells(scenario: Scenario) -> list[MatrixCell]:
     lengths = {round(end - begin, 6) for begin, end in slices}
     if len(lengths) > 1:
         raise InputError(
-            f"slices of the counts are {', '.join(f'{one:g}' for one in sorted(lengths))} s long"
+            f"slices of the counts are {', '.join(f'{length:g}' for length in sorted(lengths))} s long"
         )
     cells = []
     for index, matrix in enumerate(scenario.demand.matrices):
@@ -312,10 +312,10 @@ def with_more_trips(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"demand": demand})
 
 
-def _sampled(scenario: Scenario) -> tuple[dict[str, Pair], Scenario]:
+def _sample_matrices(scenario: Scenario) -> tuple[dict[str, Pair], Scenario]:
     """Keep the matrices of vehicles, with more trips; which row each name is of."""
     more = with_more_trips(scenario).demand
-    matrices = tuple(one for one in more.matrices if Category.PEDESTRIAN not in one.mix)
+    matrices = tuple(matrix for matrix in more.matrices if Category.PEDESTRIAN not in matrix.mix)
     named = {f"{matrix.id}.{a}-{b}": (a, b) for matrix in matrices for a, b, _ in matrix.trips}
     demand = more.model_copy(
         update={"matrices": matrices, "inputs": (), "background": (), "counts": ()}
@@ -327,7 +327,9 @@ def _row_name(trip: str) -> str:
     return trip.rpartition(".")[0]
 
 
-def _others(scenario: Scenario, sumo_map: SumoMap, seen: Sequence[Observation]) -> FloatArray:
+def _count_other_vehicles(
+    scenario: Scenario, sumo_map: SumoMap, seen: Sequence[Observation]
+) -> FloatArray:
     """Vehicles of the rest of the scenario in each count, shape ``(counts,)``."""
     region = Region.of(sumo_map.graph, scenario.roi)
     demand = scenario.demand.model_copy(update={"matrices": (), "counts": ()})
@@ -336,25 +338,41 @@ def _others(scenario: Scenario, sumo_map: SumoMap, seen: Sequence[Observation]) 
     ground = TripEnds(region, usable_places(sumo_map))
     routes = RoutesOfDemand(rest, region, ground.router)
     passages = planned_passages(users, region, ground.router, seen, routes=routes)
-    return np.array([float(passages.get((one.place, one.begin, one.end), 0)) for one in seen])
+    return np.array(
+        [
+            float(passages.get((observation.place, observation.begin, observation.end), 0))
+            for observation in seen
+        ]
+    )
 
 
-def _fit(
-    one: Observation,
+def _fit_of_count(
+    observation: Observation,
     modelled: float,
     passable: bool,
     apart: Mapping[tuple[str, str, float, float], str],
 ) -> CountFit:
-    value = geh(modelled, one.counted, one.end - one.begin)
+    value = geh(modelled, observation.counted, observation.end - observation.begin)
     why = ""
     if value > GOOD:
-        why = apart.get((one.counts, one.place, one.begin, one.end), "")
+        why = apart.get(
+            (observation.counts, observation.place, observation.begin, observation.end), ""
+        )
         if not why and not passable:
             why = "no trip of the matrix passes here at that time"
         if not why:
             why = "other counts on the routes past this place, or the prior matrix, oppose it"
     number = round(modelled)
-    return CountFit(one.counts, one.place, one.begin, one.end, one.counted, number, value, why)
+    return CountFit(
+        observation.counts,
+        observation.place,
+        observation.begin,
+        observation.end,
+        observation.counted,
+        number,
+        value,
+        why,
+    )
 
 
 def _with_trips(scenario: Scenario, cells: Sequence[MatrixCell], trips: FloatArray) -> Scenario:
@@ -377,6 +395,6 @@ def _with_trips(scenario: Scenario, cells: Sequence[MatrixCell], trips: FloatArr
             )
             for number, (when, own) in enumerate(sorted(rows[index].items()), start=1)
         ]  # fmt: skip
-    counts = tuple(one.model_copy(update={"use": "compare"}) for one in scenario.demand.counts)
+    counts = tuple(count.model_copy(update={"use": "compare"}) for count in scenario.demand.counts)
     demand = scenario.demand.model_copy(update={"matrices": tuple(matrices), "counts": counts})
     return scenario.model_copy(update={"demand": demand})

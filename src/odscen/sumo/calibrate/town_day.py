@@ -98,7 +98,7 @@ def town_day(
     InputError
         If no trips are possible on the map.
     """
-    users, uses, capacity, places = _sampled(scenario, sumo_map, TOWN_MIX)
+    users, uses, capacity, places = _sample_day(scenario, sumo_map, TOWN_MIX)
     share = peak_share(day)
     weights = balanced(uses, SPARE * capacity, trips * share)
     while weights is None:
@@ -131,7 +131,7 @@ def carried_background(
     InputError
         If no trips are possible in the region.
     """
-    users, uses, capacity, _ = _sampled(scenario, sumo_map, mix)
+    users, uses, capacity, _ = _sample_day(scenario, sumo_map, mix)
     passed = uses.sum(axis=0) / len(users)
     return SPARE * float(np.min(capacity[passed > 0] / passed[passed > 0], initial=_MOST))
 
@@ -149,7 +149,7 @@ class _Sampled(NamedTuple):
     places: Sequence[str]
 
 
-def _sampled(scenario: Scenario, sumo_map: SumoMap, mix: Mapping[Any, float]) -> _Sampled:
+def _sample_day(scenario: Scenario, sumo_map: SumoMap, mix: Mapping[Any, float]) -> _Sampled:
     region = Region.of(sumo_map.graph, scenario.roi)
     carried = approach_capacities(sumo_map)
     passing = Passing(sumo_map.graph, sorted(carried))

@@ -123,19 +123,19 @@ def turning_volumes(
         Seconds; without both the hour with most passages, or all of a shorter scenario.
     """
     if begin is None and end is None:
-        begin = _busiest(vehicles, duration)
+        begin = _busiest_hour(vehicles, duration)
         end = min(begin + HOUR, duration)
     begin, end = begin or 0.0, duration if end is None else end
     every: Counter[Turn] = Counter()
     heavy: Counter[Turn] = Counter()
     bicycles: Counter[Turn] = Counter()
-    for one in vehicles:
-        if begin <= one.depart < end:
-            every.update(one.turns)
-            if one.category in HEAVY_CATEGORIES:
-                heavy.update(one.turns)
-            elif one.category == Category.BICYCLE:
-                bicycles.update(one.turns)
+    for vehicle in vehicles:
+        if begin <= vehicle.depart < end:
+            every.update(vehicle.turns)
+            if vehicle.category in HEAVY_CATEGORIES:
+                heavy.update(vehicle.turns)
+            elif vehicle.category == Category.BICYCLE:
+                bicycles.update(vehicle.turns)
     hours = (end - begin) / HOUR
     found = {
         turn: TurnVolume(every[turn] / hours, heavy[turn] / hours, bicycles[turn] / hours)
@@ -144,11 +144,11 @@ def turning_volumes(
     return Volumes(begin, end, found)
 
 
-def _busiest(vehicles: Sequence[PlannedVehicle], duration: float) -> float:
+def _busiest_hour(vehicles: Sequence[PlannedVehicle], duration: float) -> float:
     if duration <= HOUR:
         return 0.0
     passages = np.zeros(math.ceil(duration / _STEP))
-    for one in vehicles:
-        passages[min(int(one.depart // _STEP), len(passages) - 1)] += len(one.turns)
+    for vehicle in vehicles:
+        passages[min(int(vehicle.depart // _STEP), len(passages) - 1)] += len(vehicle.turns)
     sums = np.convolve(passages, np.ones(int(HOUR / _STEP)), mode="valid")
     return float(sums.argmax()) * _STEP if len(sums) else 0.0

@@ -35,26 +35,26 @@ def tidy_conflicts(folder: Path, plan: Plan) -> None:
     log = folder / SSM_FILE
     if not log.is_file():
         return
-    rows = [*logged_conflicts(log, net_offset=plan.net_offset), *_walking(folder, plan)]
+    rows = [*logged_conflicts(log, net_offset=plan.net_offset), *_walking_conflicts(folder, plan)]
     conflict_table(rows).write_parquet(folder / CONFLICTS_FILE)
     log.unlink()
 
 
-def _walking(folder: Path, plan: Plan) -> list[dict[str, object]]:
+def _walking_conflicts(folder: Path, plan: Plan) -> list[dict[str, object]]:
     """Conflicts of people on foot; none if not every step was recorded."""
     import polars as pl
 
     file = folder / TRAJECTORIES_FILE
     if not file.is_file() or not any(actor.person for actor in plan.actors):
         return []
-    traces = _traces(pl.scan_parquet(file), plan.net_offset)
+    traces = _read_traces(pl.scan_parquet(file), plan.net_offset)
     steps = traces["time"].unique().sort().diff().drop_nulls()
     if not len(steps) or float(steps.median() or 0.0) > 1.5 * plan.step_length:  # type: ignore[arg-type]
         return []
     return walking_conflicts(traces, plan.actors)
 
 
-def _traces(rows: pl.LazyFrame, offset: tuple[float, float]) -> pl.DataFrame:
+def _read_traces(rows: pl.LazyFrame, offset: tuple[float, float]) -> pl.DataFrame:
     import polars as pl
 
     return (

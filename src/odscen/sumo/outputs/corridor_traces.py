@@ -51,7 +51,7 @@ def corridor_traces(run: Path, sumo_map: SumoMap, corridor: Corridor) -> Corrido
     if "vehicle_lane" not in table.collect_schema().names():
         return "The trajectories do not say on which lanes vehicles were, so there is no diagram."
     on_corridor = table.filter(pl.col("vehicle_lane").is_in(list(row_of)))
-    window = _busiest(on_corridor)
+    window = _busiest_stretch(on_corridor)
     if window is None:
         return "No vehicle drove along this corridor."
     begin, end = window
@@ -66,13 +66,13 @@ def corridor_traces(run: Path, sumo_map: SumoMap, corridor: Corridor) -> Corrido
         .sort("id", "time")
         .collect(engine="streaming")
     )
-    rows = _placed(rows, sumo_map, nodes, along)
+    rows = _place_records(rows, sumo_map, nodes, along)
     back = (pl.col("along").diff() < -_NEAR) | (pl.col("time").diff() > _AWAY)
     new = back | (pl.col("id") != pl.col("id").shift())
     rows = rows.with_columns(new.fill_null(value=False).cum_sum().alias("piece"))
     return CorridorTraces(
         segments=corridor.segments,
-        junctions=junctions_of(corridor, _kinds(sumo_map, corridor)),
+        junctions=junctions_of(corridor, _segment_kinds(sumo_map, corridor)),
         length=corridor.length,
         begin=begin,
         end=end,
@@ -84,13 +84,13 @@ def corridor_traces(run: Path, sumo_map: SumoMap, corridor: Corridor) -> Corrido
     )
 
 
-def _kinds(sumo_map: SumoMap, corridor: Corridor) -> list[str]:
+def _segment_kinds(sumo_map: SumoMap, corridor: Corridor) -> list[str]:
     segments = sumo_map.graph.segments
     kind_of = dict(zip(map(str, segments.ids), segments.kinds, strict=True))
     return [kind_of[name] for name in corridor.segments]
 
 
-def _busiest(on_corridor: pl.LazyFrame) -> tuple[float, float] | None:
+def _busiest_stretch(on_corridor: pl.LazyFrame) -> tuple[float, float] | None:
     """Begin and end of the busiest stretch that is not too full to be drawn."""
     import polars as pl
 
@@ -121,7 +121,7 @@ def _busiest(on_corridor: pl.LazyFrame) -> tuple[float, float] | None:
     return begin * _GRAIN, min((begin + size) * _GRAIN, max(last_time, begin * _GRAIN + 1.0))
 
 
-def _placed(
+def _place_records(
     rows: pl.DataFrame, sumo_map: SumoMap, nodes: Int32Array, along: FloatArray
 ) -> pl.DataFrame:
     """Add ``along``; records on the same lanes beside the corridor are left out."""

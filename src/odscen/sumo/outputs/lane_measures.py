@@ -80,10 +80,10 @@ def lane_table(
         schema={"lane": pl.String, "length": pl.Float64},
     )
     # SUMO leads teleported vehicles over the first lane of an edge, be it a sidewalk.
-    rows = _named(lanes, lengths).join(own, on="lane")
+    rows = _rename_columns(lanes, lengths).join(own, on="lane")
     entered: tuple[pl.Expr, ...] = ()
     if emissions is not None:
-        measured = _named(emissions, lengths).select("begin", "lane", *_emitted())
+        measured = _rename_columns(emissions, lengths).select("begin", "lane", *_emission_columns())
         rows = rows.join(measured, on=["begin", "lane"], how="left")
     if present:
         here = pl.LazyFrame({"lane": list(present.keys()), "present": list(present.values())})
@@ -91,7 +91,7 @@ def lane_table(
         there = pl.when(first).then("present").otherwise(0).fill_null(0)
         rows = rows.join(here, on="lane", how="left").with_columns(present=there)
         entered = ((pl.col("entered") - pl.col("present")).clip(0),)
-    seconds, time_loss, waiting, kept = _measures(emissions=emissions is not None)
+    seconds, time_loss, waiting, kept = _measure_columns(emissions=emissions is not None)
     return (
         rows.with_columns(seconds)
         .with_columns(time_loss, waiting, *entered)
@@ -103,7 +103,7 @@ def lane_table(
 
 
 @cache
-def _measures(*, emissions: bool) -> tuple[pl.Expr, pl.Expr, pl.Expr, tuple[pl.Expr, ...]]:
+def _measure_columns(*, emissions: bool) -> tuple[pl.Expr, pl.Expr, pl.Expr, tuple[pl.Expr, ...]]:
     """Seconds; with them, time loss and waiting; then all columns. Made once for all runs."""
     import polars as pl
 
@@ -142,13 +142,13 @@ def _measures(*, emissions: bool) -> tuple[pl.Expr, pl.Expr, pl.Expr, tuple[pl.E
     return seconds, time_loss.alias("time_loss"), waiting.alias("waiting"), kept
 
 
-def _named(file: Path, lengths: Mapping[str, Mapping[str, float]]) -> pl.LazyFrame:
+def _rename_columns(file: Path, lengths: Mapping[str, Mapping[str, float]]) -> pl.LazyFrame:
     """Rows of a file of lane data; columns lose their prefix, times become numbers."""
     import polars as pl
 
     rows = pl.read_parquet(file)
     if "edge_id" not in rows.columns:  # no vehicle was there, and SUMO had no columns to write
-        return _nothing()
+        return _empty_measures()
     renamed = {name: name.removeprefix("lane_").removeprefix("edge_") for name in rows.columns}
     renamed |= {"edge_id": "edge", "lane_id": "lane"}
     lazy = rows.lazy()
@@ -166,7 +166,7 @@ def _named(file: Path, lengths: Mapping[str, Mapping[str, float]]) -> pl.LazyFra
     )
 
 
-def _nothing() -> pl.LazyFrame:
+def _empty_measures() -> pl.LazyFrame:
     import polars as pl
 
     from odscen.sumo.realize.measure_files import LANE_ATTRIBUTES
@@ -179,7 +179,7 @@ def _nothing() -> pl.LazyFrame:
 
 
 @cache
-def _emitted() -> tuple[pl.Expr, ...]:
+def _emission_columns() -> tuple[pl.Expr, ...]:
     return tuple(map(_in_units, EMISSIONS))
 
 

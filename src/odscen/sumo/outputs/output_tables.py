@@ -108,13 +108,15 @@ def tidy_outputs(
             emissions.unlink(missing_ok=True)
         stays = _tidy_stops(folder, plan, last=last)
         if tripinfo.is_file():
-            trips = trip_table(tripinfo, parked=_parked(plan, stays, parked), unfinished=last)
+            trips = trip_table(
+                tripinfo, parked=_find_parked_cars(plan, stays, parked), unfinished=last
+            )
             if trips.height:
                 trips.write_parquet(folder / TRIPS_FILE)
             tripinfo.unlink()
             return _trips_of(trips)
     except (etree.XMLSyntaxError, PolarsError) as error:
-        raise _torn(error) from error
+        raise _torn_file_error(error) from error
     return {}
 
 
@@ -190,7 +192,7 @@ def tidy_positions(folder: Path, run: Path) -> None:
                 pl.read_parquet(lanes, columns=list(INTERVAL)).unique().sort("begin"),
             )
         except pl.exceptions.PolarsError as error:
-            raise _torn(error) from error
+            raise _torn_file_error(error) from error
         if found is not None and found.height:
             found.write_parquet(folder / LANE_SEGMENTS_FILE)
     positions.unlink(missing_ok=True)
@@ -210,13 +212,13 @@ def _tidy_stops(folder: Path, plan: Plan, *, last: bool) -> pl.DataFrame | None:
     if visits.height or not plan.parking:
         visits.write_parquet(folder / VISITS_FILE)
     if plan.parking:
-        stays = stay_table(stopinfo, (one.id for one in plan.parking), unfinished=last)
+        stays = stay_table(stopinfo, (parking.id for parking in plan.parking), unfinished=last)
         stays.write_parquet(folder / STAYS_FILE)
     stopinfo.unlink()
     return stays
 
 
-def _parked(
+def _find_parked_cars(
     plan: Plan, stays: pl.DataFrame | None, before: Collection[str]
 ) -> dict[str, ParkedCar]:
     """Cars whose trips begin or end parked, with what is known of their stays."""
@@ -226,9 +228,11 @@ def _parked(
         (actor, begins): Stay(came, left) for actor, _, begins, came, left in stays.iter_rows()
     }
     return {
-        one.id: ParkedCar(known.get((one.id, True)), known.get((one.id, False)), one.id in before)
-        for one in plan.actors
-        if one.begins_in is not None or one.ends_in is not None
+        actor.id: ParkedCar(
+            known.get((actor.id, True)), known.get((actor.id, False)), actor.id in before
+        )
+        for actor in plan.actors
+        if actor.begins_in is not None or actor.ends_in is not None
     }
 
 
@@ -246,7 +250,7 @@ def _trips_of(table: pl.DataFrame) -> dict[str, Trip]:
     return {name: Trip(*values) for name, *values in rows}
 
 
-def _torn(error: Exception) -> SimulationError:
+def _torn_file_error(error: Exception) -> SimulationError:
     msg = f"SUMO has not written its measurements to the end; the disk may be full: {error}"
     return SimulationError(msg)
 

@@ -59,7 +59,7 @@ def tidy_signals(folder: Path) -> None:
             table.select(order).write_parquet(folder / LIGHT_STATES_FILE)
             log.unlink()
         if calls:
-            found = [row for file in calls for row in _calls(file)]
+            found = [row for file in calls for row in _read_calls(file)]
             table = pl.DataFrame(
                 sorted(found),
                 schema={"detector": pl.String, "begin": pl.Float64, "end": pl.Float64},
@@ -81,7 +81,7 @@ def _call_logs(folder: Path) -> list[Path]:
     return found
 
 
-def _calls(file: Path) -> Iterator[tuple[str, float, float]]:
+def _read_calls(file: Path) -> Iterator[tuple[str, float, float]]:
     """Times in which each detector saw somebody."""
     names: list[str] = []
     begins: dict[str, float] = {}

@@ -42,12 +42,12 @@ def logged_conflicts(
 
     try:
         for conflict in elements(file, "conflict"):
-            yield _row(conflict, net_offset)
+            yield _conflict_row(conflict, net_offset)
     except etree.XMLSyntaxError as error:
         raise SimulationError(f"{file.name} is not whole: {error}") from error
 
 
-def _row(conflict: etree._Element, net_offset: tuple[float, float]) -> dict[str, object]:
+def _conflict_row(conflict: etree._Element, net_offset: tuple[float, float]) -> dict[str, object]:
     row: dict[str, object] = {
         "begin": float(conflict.get("begin", "nan")),
         "end": float(conflict.get("end", "nan")),

@@ -108,16 +108,16 @@ def logged_trips(tripinfo: Path, parked: Mapping[str, ParkedCar]) -> Iterator[tu
     """
     for element in elements(tripinfo, "tripinfo", "personinfo"):
         if element.tag == "personinfo":
-            yield _walk(element)
+            yield _walk_row(element)
             continue
         car = parked.get(element.get("id") or "")
         if car is None or not car.left_out:
-            yield _drive(element, car)
+            yield _drive_row(element, car)
 
 
-def _drive(trip: Any, car: ParkedCar | None) -> tuple[Any, ...]:
+def _drive_row(trip: Any, car: ParkedCar | None) -> tuple[Any, ...]:
     value = trip.get
-    depart, arrival = float(value("depart")), _known(value("arrival"))
+    depart, arrival = float(value("depart")), _known_number(value("arrival"))
     duration = float(value("duration"))
     if car is not None:
         depart, arrival, duration = _between_stays(trip, car, depart, arrival, duration)
@@ -148,25 +148,25 @@ def _between_stays(
     return round((over if end is None else end.came) - driven, 4), arrival, round(driven, 4)
 
 
-def _walk(person: Any) -> tuple[Any, ...]:
+def _walk_row(person: Any) -> tuple[Any, ...]:
     """Of a person with one walk, as all of ours."""
     walk = person.find("walk")
-    arrival = None if walk is None else _known(walk.get("arrival"))
+    arrival = None if walk is None else _known_number(walk.get("arrival"))
     source = person if walk is None else walk
     return (
         person.get("id"),
         True,
         float(person.get("depart")),
         arrival,
-        _known(source.get("duration")),
-        None if walk is None else _known(walk.get("routeLength")),
+        _known_number(source.get("duration")),
+        None if walk is None else _known_number(walk.get("routeLength")),
         float(person.get("waitingTime")),
         None,
         None if arrival is None else float(person.get("timeLoss")),
     )
 
 
-def _known(text: str) -> float | None:
+def _known_number(text: str) -> float | None:
     """SUMO writes -1 for what is not known."""
     value = float(text)
     return None if value < 0.0 else value

@@ -80,7 +80,7 @@ def counted_trips(
         (place, begin, end, max(0.0, number - others.get((place, begin, end), 0.0)))
         for place, begin, end, number in counts.rows
     ]
-    chosen = _choose(list(kinds), passing, wanted, seed=scenario.seed) if kinds else []
+    chosen = _choose_routes(list(kinds), passing, wanted, seed=scenario.seed) if kinds else []
     rng = stream(scenario.seed, "counts", counts.id)
     uniform = rng.random((len(chosen), 3))
     categories = drawn_categories(counts.mix, uniform[:, 0])
@@ -88,15 +88,15 @@ def counted_trips(
         kinds[kind][int(number * len(kinds[kind]))]
         for (kind, _), number in zip(chosen, uniform[:, 1].tolist(), strict=True)
     ]
-    times = np.array([time for _, time in chosen]) - np.array([one.lead for one in routes]) / (
+    times = np.array([time for _, time in chosen]) - np.array([route.lead for route in routes]) / (
         USUAL_SPEED
     )
     yield Trips(
         name=counts.id,
         part=counts.id,
         categories=categories,
-        starts=_starts(ground, counts, routes, uniform[:, 2]),
-        goals=np.array([one.goal for one in routes], dtype=np.int32),
+        starts=_draw_starts(ground, counts, routes, uniform[:, 2]),
+        goals=np.array([route.goal for route in routes], dtype=np.int32),
         departs=np.maximum(np.round(times, 2), FIRST),
     )
 
@@ -106,7 +106,7 @@ def routes_past(
 ) -> dict[PassedStations, list[StationRoute]]:
     """Ways through the region that pass a place of counting, by the places that they pass."""
     segment = ground.region.graph.lanes.segment
-    usual = max(counts.mix, key=lambda one: counts.mix[one])
+    usual = max(counts.mix, key=lambda category: counts.mix[category])
     ends, first = ground.ends(usual), _stretch_starts(ground, ground.starts(usual))
     kinds: dict[PassedStations, list[StationRoute]] = {}
     often: dict[PassedStations, int] = defaultdict(int)
@@ -133,10 +133,10 @@ def routes_past(
                     middle = entered[found[len(found) // 2][1]]
                     lead = paths.distance(np.array([start, middle]))
                     kept.append(StationRoute(start, goal, segments, float(lead[0] - lead[1])))
-    return {kind: kinds[kind] for kind in _selected(often, len(passing.places))}
+    return {kind: kinds[kind] for kind in _select_kinds(often, len(passing.places))}
 
 
-def _selected(often: Mapping[PassedStations, int], places: int) -> list[PassedStations]:
+def _select_kinds(often: Mapping[PassedStations, int], places: int) -> list[PassedStations]:
     """Kinds of routes to choose from, sorted: for each place the most frequent and the shortest."""
     of_place: list[list[PassedStations]] = [[] for _ in range(places)]
     for kind in sorted(often):
@@ -150,7 +150,7 @@ def _selected(often: Mapping[PassedStations, int], places: int) -> list[PassedSt
     return sorted(kept)
 
 
-def _choose(
+def _choose_routes(
     kinds: Sequence[PassedStations],
     passing: Passing,
     wanted: Sequence[tuple[str, float, float, float]],
@@ -210,12 +210,12 @@ def _stretch_starts(ground: TripEnds, starts: Int32Array) -> Int32Array:
     return starts[np.sort(first)]
 
 
-def _starts(
+def _draw_starts(
     ground: TripEnds, counts: Counts, routes: Sequence[StationRoute], uniform: np.ndarray
 ) -> Int32Array:
     """Draw a start for each route: on its stretch of lane, of the same route through segments."""
     lanes = ground.region.graph.lanes
-    usual = max(counts.mix, key=lambda one: counts.mix[one])
+    usual = max(counts.mix, key=lambda category: counts.mix[category])
     starts = ground.starts(usual)
     of_goal: dict[int, set[StationRoute]] = defaultdict(set)
     for route in routes:

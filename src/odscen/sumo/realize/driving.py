@@ -159,14 +159,14 @@ def kind_of(user: RoadUser, drivers: Drivers, seed: int) -> DriverKind:
     name = user.design.style
     if user.flow is not None and drivers.shares:
         name = draw_key(drivers.shares, stream(seed, "driving style", user.id))
-    for one in drivers.sets:
-        if one.id == name:
+    for driver_set in drivers.sets:
+        if driver_set.id == name:
             drawn = {
                 parameter: round(values.draw(stream(seed, parameter, user.id)), 4)
-                for parameter, values in one.parameters.items()
+                for parameter, values in driver_set.parameters.items()
             }
-            model = one.car_following
-            return DriverKind(one.style, drawn, "" if model == "Krauss" else model)
+            model = driver_set.car_following
+            return DriverKind(driver_set.style, drawn, "" if model == "Krauss" else model)
     for style in STYLES:
         if style == name:
             return DriverKind(style)
@@ -227,7 +227,7 @@ def driver(
     category, speed = user.category, user.speed
     if category is Category.PEDESTRIAN:
         speed = KINDS[category].max_speed * factor if speed is None else speed
-        return _walker(user, body, speed=speed)
+        return _make_walker(user, body, speed=speed)
     traits = KINDS[category]
     max_speed = traits.max_speed
     if speed is not None:
@@ -236,12 +236,12 @@ def driver(
             factor = max(factor, speed / limit)
     max_speed = min(max_speed * weather.speed, weather.sight_speed)
     factor *= weather.speed
-    values = _values(category, kind, drivers)
+    values = _driver_parameters(category, kind, drivers)
     accel = values.pop("accel") * weather.grip
     attributes = (
         ("vClass", traits.vclass),
         ("guiShape", traits.shape),
-        *_body(body),
+        *_body_attributes(body),
         *((("carFollowModel", kind.car_following),) if kind.car_following else ()),
         ("maxSpeed", number(max_speed)),
         ("speedDev", "0"),
@@ -260,7 +260,7 @@ def driver(
     return Driver(attributes, max_speed, round(factor, 4), accel)
 
 
-def _values(category: Category, kind: DriverKind, drivers: Drivers) -> dict[str, float]:
+def _driver_parameters(category: Category, kind: DriverKind, drivers: Drivers) -> dict[str, float]:
     """SUMO's parameters of a driver before weather; what is SUMO's default is left out."""
     traits, style = KINDS[category], STYLES[kind.style]
     two_wheeler = category in (Category.MOTORCYCLE, Category.BICYCLE)
@@ -296,11 +296,11 @@ def _gaps_and_changes(style: Style, drivers: Drivers) -> dict[str, float]:
     return found | ({"lcSpeedGain": eagerness} if eagerness != 1.0 else {})
 
 
-def _walker(user: RoadUser, body: Body, *, speed: float) -> Driver:
+def _make_walker(user: RoadUser, body: Body, *, speed: float) -> Driver:
     attributes = (
         ("vClass", "pedestrian"),
         ("guiShape", "pedestrian"),
-        *_body(body),
+        *_body_attributes(body),
         ("maxSpeed", number(speed)),
         ("desiredMaxSpeed", number(speed)),
         ("speedFactor", "1"),
@@ -312,7 +312,7 @@ def _walker(user: RoadUser, body: Body, *, speed: float) -> Driver:
     return Driver(attributes, speed, 1.0, KINDS[Category.PEDESTRIAN].accel)
 
 
-def _body(body: Body) -> tuple[tuple[str, str], ...]:
+def _body_attributes(body: Body) -> tuple[tuple[str, str], ...]:
     return (
         ("length", number(body.length)),
         ("width", number(body.width)),

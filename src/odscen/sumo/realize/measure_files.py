@@ -29,11 +29,11 @@ def interval_of(
 
     ``analysed`` are times that figures begin at or are given over: whole multiples of it.
     """
-    fine = (one for one in INTERVALS if until / one <= MOST_INTERVALS)
+    fine = (value for value in INTERVALS if until / value <= MOST_INTERVALS)
     found = min(next(fine, INTERVALS[-1]), slice_length or until)
-    if all(math.isclose(one % found, 0.0, abs_tol=1e-6) for one in analysed):
+    if all(math.isclose(value % found, 0.0, abs_tol=1e-6) for value in analysed):
         return found
-    return float(math.gcd(round(found), *(round(one) for one in analysed)))
+    return float(math.gcd(round(found), *(round(value) for value in analysed)))
 
 
 def measures_xml(

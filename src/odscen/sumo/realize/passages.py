@@ -50,7 +50,7 @@ def planned_passages(
     routes
         Those that trips choose; the shortest if not given.
     """
-    passing = Passing(region.graph, [one.place for one in seen])
+    passing = Passing(region.graph, [observation.place for observation in seen])
     clock = _Slices(seen)
     found: Passages = Counter()
     for _, passed in each_passing(users, region, drivable, passing, routes=routes):
@@ -82,7 +82,7 @@ def each_passing(
         if len(path):
             segment = lanes.segment[path]
             first = np.flatnonzero(np.diff(segment, prepend=-1))
-            times = _times(lanes, path)[first] + vehicles[index].depart
+            times = _times_along(lanes, path)[first] + vehicles[index].depart
             passed = passing.of(segment[first].tolist())
             yield vehicles[index], [(place, float(times[step])) for place, step in passed]
 
@@ -106,7 +106,7 @@ def seen_passages(
     """
     import polars as pl
 
-    passing = Passing(sumo_map.graph, [one.place for one in seen])
+    passing = Passing(sumo_map.graph, [observation.place for observation in seen])
     clock = _Slices(seen)
     found: Passages = Counter()
     segments = _segment_of_lane(sumo_map)
@@ -144,8 +144,8 @@ class _Slices:
 
     def __init__(self, seen: Sequence[Observation]) -> None:
         self._of_place: dict[str, list[tuple[float, float]]] = defaultdict(list)
-        for one in seen:
-            self._of_place[one.place].append((one.begin, one.end))
+        for observation in seen:
+            self._of_place[observation.place].append((observation.begin, observation.end))
         for slices in self._of_place.values():
             slices[:] = sorted(set(slices))
 
@@ -175,13 +175,13 @@ class _Between:
         for segment, time in zip(route[1:], times[1:], strict=True):
             gap = whole[-1], segment
             if gap not in self._known:
-                self._known[gap] = self._shortest(*gap)
+                self._known[gap] = self._shortest_between(*gap)
             steps = (*self._known[gap], segment)
             whole += steps
             moments += [time] * len(steps)
         return whole, moments
 
-    def _shortest(self, one: int, other: int) -> tuple[int, ...]:
+    def _shortest_between(self, one: int, other: int) -> tuple[int, ...]:
         """Segments between two on the shortest sequence; none if there are several of a length."""
         fronts: list[dict[int, list[int]]] = [{one: []}]
         reached = {one}
@@ -203,7 +203,7 @@ class _Between:
         return tuple(steps[-2:0:-1])
 
 
-def _times(lanes: LaneGraph, path: np.ndarray) -> np.ndarray:
+def _times_along(lanes: LaneGraph, path: np.ndarray) -> np.ndarray:
     """Seconds after departure at each node of a path, at the limit."""
     limit = lanes.speed_limit[path[:-1]]
     limit = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)

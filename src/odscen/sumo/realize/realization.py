@@ -255,7 +255,7 @@ def _run_files(
         lateral_resolution=own.lateral_resolution,
         pedestrians=own.pedestrians,
     )
-    analysed = [one for one in (plan.warm_up, plan.interval) if one]
+    analysed = [value for value in (plan.warm_up, plan.interval) if value]
     interval = interval_of(plan.until, plan.slice_length, analysed=analysed)
     files = {
         CONFIG_FILE: sumo_config(sumocfg),

@@ -101,12 +101,12 @@ class RoadNet:
     def followers(self, edge: str, vclass: str) -> tuple[str, ...]:
         """Edges that one can drive to from ``edge``, sorted."""
         key = edge, vclass
-        if key not in self._followers:
-            self._followers[key] = tuple(sorted(set(self._find_followers(edge, vclass))))
-        return self._followers[key]
+        if key not in self._known_followers:
+            self._known_followers[key] = tuple(sorted(set(self._find_followers(edge, vclass))))
+        return self._known_followers[key]
 
     @cached_property
-    def _followers(self) -> dict[tuple[str, str], tuple[str, ...]]:
+    def _known_followers(self) -> dict[tuple[str, str], tuple[str, ...]]:
         return {}
 
     def _find_followers(self, edge: str, vclass: str) -> Iterable[str]:
@@ -146,7 +146,7 @@ class RoadNet:
         """Metres that the centre of ``lane`` lies left of that of ``other``, on the same edge."""
         low, high = sorted((lane.index, other.index))
         lanes = self.edge_lanes[lane.edge][low : high + 1]
-        apart = sum(one.width for one in lanes) - (lanes[0].width + lanes[-1].width) / 2.0
+        apart = sum(lane.width for lane in lanes) - (lanes[0].width + lanes[-1].width) / 2.0
         inwards = 1.0 if lane.index >= other.index else -1.0
         return -inwards * apart if self.lefthand else inwards * apart
 
@@ -237,13 +237,16 @@ class RoadNet:
     def _is_joint(self, edge: str) -> bool:
         """Whether no two edges at the end of an edge lead to the same one, and none to several."""
         junction = self.ends.get(edge, ("", ""))[1]
-        targets = [self._targets.get(other, frozenset()) for other in self._into.get(junction, ())]
-        return all(len(one) <= 1 for one in targets) and len(frozenset().union(*targets)) == sum(
-            map(len, targets)
-        )
+        targets = [
+            self._targets_of_edges.get(other, frozenset())
+            for other in self._edges_into_junctions.get(junction, ())
+        ]
+        return all(len(target) <= 1 for target in targets) and len(
+            frozenset().union(*targets)
+        ) == sum(map(len, targets))
 
     @cached_property
-    def _into(self) -> dict[str, tuple[str, ...]]:
+    def _edges_into_junctions(self) -> dict[str, tuple[str, ...]]:
         """Edges that lead to each junction."""
         found: dict[str, list[str]] = {}
         for edge, (_, junction) in self.ends.items():
@@ -251,7 +254,7 @@ class RoadNet:
         return {junction: tuple(edges) for junction, edges in found.items()}
 
     @cached_property
-    def _targets(self) -> dict[str, frozenset[str]]:
+    def _targets_of_edges(self) -> dict[str, frozenset[str]]:
         """Normal edges that each edge has links to."""
         found: dict[str, set[str]] = {}
         for link in self.links:

@@ -81,7 +81,7 @@ def each_path(
         for index in group:
             path = paths.get(index, _NOWHERE)
             routers = (region.walk_router,) if person else (drivable, region.router)
-            yield index, _through(path, users[index].places, routers) if len(path) else path
+            yield index, _path_through(path, users[index].places, routers) if len(path) else path
     ways = quickest or CostRouter(drivable, region.graph.lanes)
     yield from _paths_of_trips(users, by_goal, region, ways, bodies)
 
@@ -164,7 +164,7 @@ def _joined_paths(one: Int32Array, other: Int32Array) -> Int32Array:
     return np.concatenate([one, other[1:]])
 
 
-def _through(
+def _path_through(
     path: Int32Array, places: Sequence[int], routers: Sequence[Router | WalkRouter]
 ) -> Int32Array:
     """A path to the first of some places, and on to the others; empty if there is none.
@@ -173,7 +173,7 @@ def _through(
     """
     for here, there in pairwise(places):
         found = (router.path(here, there) for router in routers)
-        further = next((one for one in found if len(one)), _NOWHERE)
+        further = next((array for array in found if len(array)), _NOWHERE)
         if not len(further):
             return _NOWHERE
         path = _joined_paths(path, further)
@@ -232,7 +232,7 @@ def _from_spawn(
         return {}
     begun = {index: leads.of(spawn, bodies[index], router.mask) for index in goals}
     chosen = {
-        index: _best(
+        index: _choose_best_lead(
             goals[index],
             mine,
             [router.distance(lead.nodes[-1], goals[index]) for lead in mine[:-1]],
@@ -240,7 +240,7 @@ def _from_spawn(
         for index, mine in begun.items()
     }
     paths = {
-        index: _joined(lead, router.path(lead.nodes[-1], goals[index]))
+        index: _join_lead(lead, router.path(lead.nodes[-1], goals[index]))
         for index, lead in sorted(chosen.items(), key=lambda pair: pair[1].nodes[-1])
     }
     return {index: path for index, path in paths.items() if len(path)}
@@ -250,12 +250,12 @@ def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: PathsTo) -> lis
     """Ways of trips to one goal; empty where there is none."""
     ends = [lead.nodes[-1] for leads in begun for lead in leads[:-1]]
     costs = iter(there.distance(np.array(ends, dtype=np.int32)).tolist())
-    chosen = [_best(goal, leads, [next(costs) for _ in leads[:-1]]) for leads in begun]
+    chosen = [_choose_best_lead(goal, leads, [next(costs) for _ in leads[:-1]]) for leads in begun]
     paths = there.paths(np.array([lead.nodes[-1] for lead in chosen], dtype=np.int32))
-    return [_joined(lead, path) for lead, path in zip(chosen, paths, strict=True)]
+    return [_join_lead(lead, path) for lead, path in zip(chosen, paths, strict=True)]
 
 
-def _best(goal: int, leads: Sequence[_Lead], onwards: Sequence[float]) -> _Lead:
+def _choose_best_lead(goal: int, leads: Sequence[_Lead], onwards: Sequence[float]) -> _Lead:
     """Lead with the best path in all; the last, which is no lead, where no other leads there.
 
     ``onwards`` is the cost from the end of each but the last, for which nobody needs to search.
@@ -269,6 +269,6 @@ def _best(goal: int, leads: Sequence[_Lead], onwards: Sequence[float]) -> _Lead:
     return ahead[min(fit)[1]] if fit else none
 
 
-def _joined(lead: _Lead, path: Int32Array) -> Int32Array:
+def _join_lead(lead: _Lead, path: Int32Array) -> Int32Array:
     before = np.array(lead.nodes[:-1], dtype=np.int32)
     return np.concatenate([before, path]) if len(path) else path

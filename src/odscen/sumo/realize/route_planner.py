@@ -142,15 +142,15 @@ class RoutePlanner:
         NoRouteError
             If the SUMO network has no way along the path, or the class may not use it.
         """
-        edges, repairs = connected(self._net, self._edges(path, vclass), vclass)
+        edges, repairs = connected(self._net, self._edges_of_path(path, vclass), vclass)
         # The arrival first: it may add the edge that the front stands on the way to.
-        edges, arrival_lane, arrival_pos = self._arrival(edges, path, vclass, length)
-        edges, start, pos = self._anchor(path, edges, vclass)
+        edges, arrival_lane, arrival_pos = self._place_arrival(edges, path, vclass, length)
+        edges, start, pos = self._anchor_spawn(path, edges, vclass)
         ahead = length / 2.0 * self._places.scales[start.id]
-        if pos + ahead > start.length + CLAMP and not self._next(start, edges):
-            edges, told = self._along(start, edges, vclass)
+        if pos + ahead > start.length + CLAMP and not self._next_lanes(start, edges):
+            edges, told = self._leave_along_link(start, edges, vclass)
             repairs += told
-        edges, lane, front = self._front(edges, start, pos + ahead)
+        edges, lane, front = self._place_front(edges, start, pos + ahead)
         if not lane.allows(vclass):
             raise NoRouteError(f"lane {lane.id} of the SUMO network does not admit {vclass}")
         if len(edges) == 1:  # there and back again is not meant: stop where it has just started
@@ -158,7 +158,7 @@ class RoutePlanner:
         lateral = self._net.pos_lat(lateral_offset)
         return Route(edges, lane.index, front, lateral, arrival_lane, arrival_pos, repairs)
 
-    def _edges(self, path: Int32Array, vclass: str) -> list[str]:
+    def _edges_of_path(self, path: Int32Array, vclass: str) -> list[str]:
         """Return normal edges that the path runs over, in order, each run of equal ones once."""
         rows = self._places.lane[path]
         rows = rows[rows >= 0]
@@ -169,16 +169,20 @@ class RoutePlanner:
         edges: list[str] = []
         for row in rows[changed].tolist():
             lane = self._net.lanes[self._places.lanes[row]]
-            if not lane.internal and lane.edge not in edges[-1:] and self._admits(lane, vclass):
+            if (
+                not lane.internal
+                and lane.edge not in edges[-1:]
+                and self._edge_admits(lane, vclass)
+            ):
                 edges.append(lane.edge)
         if edges:
             return edges
-        return [self._leaving(self._net.lanes[self._places.lanes[int(rows[0])]])[-1].edge]
+        return [self._lanes_leaving(self._net.lanes[self._places.lanes[int(rows[0])]])[-1].edge]
 
-    def _admits(self, lane: RoadNetLane, vclass: str) -> bool:
+    def _edge_admits(self, lane: RoadNetLane, vclass: str) -> bool:
         return any(other.allows(vclass) for other in self._net.edge_lanes[lane.edge])
 
-    def _anchor(
+    def _anchor_spawn(
         self, path: Int32Array, edges: tuple[str, ...], vclass: str
     ) -> tuple[tuple[str, ...], RoadNetLane, float]:
         """Edges, lane and position of the spawn; the position may lie beyond the lane's end.
@@ -213,7 +217,7 @@ class RoutePlanner:
         self, lane: RoadNetLane, edges: tuple[str, ...], vclass: str
     ) -> tuple[str, ...]:
         """Put the internal edges before ``edges`` that lead there from an internal lane."""
-        leaving = self._leaving(lane)
+        leaving = self._lanes_leaving(lane)
         between = self._net.path(leaving[-1].edge, edges[0], vclass)
         if between is None:
             raise NoRouteError(
@@ -221,19 +225,19 @@ class RoutePlanner:
             )
         return (lane.edge, *between, *edges[1:])
 
-    def _leaving(self, lane: RoadNetLane) -> tuple[RoadNetLane, ...]:
+    def _lanes_leaving(self, lane: RoadNetLane) -> tuple[RoadNetLane, ...]:
         leaving = self._net.leaving(lane.id)
         if not leaving:
             raise NoRouteError(f"lane {lane.id} of the SUMO network leads nowhere")
         return leaving
 
-    def _front(
+    def _place_front(
         self, edges: tuple[str, ...], start: RoadNetLane, pos: float
     ) -> tuple[tuple[str, ...], RoadNetLane, float]:
         """Follow the route from ``start`` to ``pos``: the edges left, the lane, and where on it."""
         lane = start
         while pos > lane.length:
-            passage = self._next(lane, edges)
+            passage = self._next_lanes(lane, edges)
             if not passage:  # another lane of the edge goes there; it changes lanes at its end
                 return edges, lane, lane.length
             ground = (pos - lane.length) / self._places.scales[lane.id]
@@ -244,7 +248,7 @@ class RoutePlanner:
             edges = (*inside, *edges[edges.index(passage[-1].edge) :])
         return edges, lane, max(pos, 0.0)
 
-    def _along(
+    def _leave_along_link(
         self, lane: RoadNetLane, edges: tuple[str, ...], vclass: str
     ) -> tuple[tuple[str, ...], tuple[RouteRepair, ...]]:
         """Leave by a link of the lane that the body is on, as its front is beyond the end.
@@ -264,13 +268,13 @@ class RoutePlanner:
         )
         return (edges[0], *best), (repair,)
 
-    def _next(self, lane: RoadNetLane, edges: tuple[str, ...]) -> tuple[RoadNetLane, ...]:
+    def _next_lanes(self, lane: RoadNetLane, edges: tuple[str, ...]) -> tuple[RoadNetLane, ...]:
         """Return the lanes from the next one on to the next normal one, on the route."""
         if lane.internal:
             return self._net.leaving(lane.id)
         return (self._net.passage(lane.id, edges[1]) if len(edges) > 1 else None) or ()
 
-    def _arrival(
+    def _place_arrival(
         self, edges: tuple[str, ...], path: Int32Array, vclass: str, length: float
     ) -> tuple[tuple[str, ...], int | None, float]:
         """Edges, lane and position of the arrival: body centre on the goal as far as the edge goes.
@@ -326,14 +330,16 @@ def connected(
             RouteRepair.of(RepairKind.PUT_IN, edges=put_in, before=between[0], edge=edge)
         )
     if len(edges) > 1 and edges[-1] not in net.next_edges(route[-1], vclass):
-        route, repair = _ended(net, route, edges[-1], vclass)
+        route, repair = _end_route(net, route, edges[-1], vclass)
         repairs.append(repair)
     elif len(edges) > 1:
         route.append(edges[-1])
     return tuple(route), tuple(repairs)
 
 
-def _ended(net: RoadNet, route: list[str], last: str, vclass: str) -> tuple[list[str], RouteRepair]:
+def _end_route(
+    net: RoadNet, route: list[str], last: str, vclass: str
+) -> tuple[list[str], RouteRepair]:
     """Lead a route to its last edge from the latest place where that is possible."""
     for kept in range(len(route), 0, -1):
         between = net.path(route[kept - 1], last, vclass)

@@ -102,31 +102,31 @@ class RoutesFile:
         entry = "max" if stretch > FAR and not held else "avg"
         attributes = [
             ("id", user.id),
-            ("type", self._type(user.category.value, driver)),
+            ("type", self._type_name(user.category.value, driver)),
             ("depart", number(appears)),
             ("departLane", str(route.depart_lane)),
             ("departPos", "stop" if user.begins else number(route.depart_pos, digits=4)),
             # That of the vehicles ahead: a free lane then takes what HCM gives it. With "max" a
             # lane of a motorway takes a tenth less at steps of 1 s.
-            ("departSpeed", entry if user.entering else number(_bounded(begin), digits=4)),
+            ("departSpeed", entry if user.entering else number(_round_speed_down(begin), digits=4)),
             ("departPosLat", number(route.depart_pos_lat, digits=4)),
             ("arrivalLane", "current" if route.arrival_lane is None else str(route.arrival_lane)),
             ("arrivalPos", number(route.arrival_pos, digits=4)),
             ("speedFactor", number(driver.speed_factor, digits=4)),
         ]
         if held:
-            attributes.append(("mostSpeed", number(_bounded(most), digits=4)))
+            attributes.append(("mostSpeed", number(_round_speed_down(most), digits=4)))
             self.held[user.id] = HeldActor(tuple(route.edges), dict(attributes))
             return
         if user.depart == 0.0:
             attributes.append(("insertionChecks", "none"))
         lines = [
-            f"    <vehicle{_xml(attributes)}>",
+            f"    <vehicle{_xml_attributes(attributes)}>",
             f'        <route edges="{" ".join(route.edges)}"/>',
             *_first_stay(user),
-            *(_stop(visit, bay=visit.stop in bays) for visit in user.visits),
+            *(_stop_element(visit, bay=visit.stop in bays) for visit in user.visits),
             *_last_stay(user),
-            *_rerouting(looks_every),
+            *_rerouting_parameters(looks_every),
             "    </vehicle>",
         ]
         self._lines.append((appears, user.id, lines))
@@ -139,7 +139,7 @@ class RoutesFile:
         """Add a person that walks ``walk``."""
         person = [
             ("id", user.id),
-            ("type", self._type(user.category.value, driver)),
+            ("type", self._type_name(user.category.value, driver)),
             ("depart", number(user.depart)),
             ("departPos", number(walk.depart_pos, digits=4)),
         ]
@@ -152,7 +152,11 @@ class RoutesFile:
             own = dict([*person, *stage[1:]])
             self.held[user.id] = HeldActor(tuple(walk.edges), own, person=True)
             return
-        lines = [f"    <person{_xml(person)}>", f"        <walk{_xml(stage)}/>", "    </person>"]
+        lines = [
+            f"    <person{_xml_attributes(person)}>",
+            f"        <walk{_xml_attributes(stage)}/>",
+            "    </person>",
+        ]
         self._lines.append((user.depart, user.id, lines))
 
     def add_breakdown(self, vehicle: Breakdown) -> None:
@@ -178,16 +182,16 @@ class RoutesFile:
         return tuple(f"{category.value}.{n}" for n in range(self._counts.get(category.value, 0)))
 
     def _type_lines(self, name: str, attributes: tuple[tuple[str, str], ...]) -> list[str]:
-        start = f'    <vType id="{name}"{_xml(attributes)}'
+        start = f'    <vType id="{name}"{_xml_attributes(attributes)}'
         if not self._parameters or name in self._on_foot:
             return [f"{start}/>"]
         inside = [
-            f"        <param{_xml([('key', key), ('value', value)])}/>"
+            f"        <param{_xml_attributes([('key', key), ('value', value)])}/>"
             for key, value in self._parameters
         ]
         return [f"{start}>", *inside, "    </vType>"]
 
-    def _type(self, category: str, driver: Driver) -> str:
+    def _type_name(self, category: str, driver: Driver) -> str:
         """Name of the vType with these attributes: category and a running number."""
         name = self._types.get(driver.attributes)
         if name is None:
@@ -199,21 +203,24 @@ class RoutesFile:
         return name
 
 
-def _rerouting(period: float | None) -> list[str]:
+def _rerouting_parameters(period: float | None) -> list[str]:
     """Parameters of a vehicle with SUMO's rerouting device; they outlive a saved state."""
     if period is None:
         return []
     given = (("has.rerouting.device", "true"), ("device.rerouting.period", f"{period:g}"))
-    return [f"        <param{_xml([('key', key), ('value', value)])}/>" for key, value in given]
+    return [
+        f"        <param{_xml_attributes([('key', key), ('value', value)])}/>"
+        for key, value in given
+    ]
 
 
-def _stop(visit: StopVisit, *, bay: bool) -> str:
+def _stop_element(visit: StopVisit, *, bay: bool) -> str:
     attributes = [("busStop", visit.stop), ("duration", number(visit.dwell))]
     if visit.scheduled is not None:
         attributes.append(("until", number(visit.scheduled)))
     if bay:
         attributes.append(("parking", "true"))
-    return f"        <stop{_xml(attributes)}/>"
+    return f"        <stop{_xml_attributes(attributes)}/>"
 
 
 def _first_stay(user: RoadUser) -> list[str]:
@@ -224,20 +231,20 @@ def _first_stay(user: RoadUser) -> list[str]:
         ("duration", "0"),
         ("until", number(user.depart)),
     )
-    return [f"        <stop{_xml(given)}/>"]
+    return [f"        <stop{_xml_attributes(given)}/>"]
 
 
 def _last_stay(user: RoadUser) -> list[str]:
     if user.ends is None:
         return []
     given = (("parkingArea", user.ends.area), ("duration", number(user.ends.seconds)))
-    return [f"        <stop{_xml(given)}/>"]
+    return [f"        <stop{_xml_attributes(given)}/>"]
 
 
-def _bounded(speed: float) -> float:
+def _round_speed_down(speed: float) -> float:
     """Round down: SUMO ends a run in which a vehicle departs faster than its lane allows."""
     return math.floor(speed * 1e4) / 1e4
 
 
-def _xml(attributes: Iterable[tuple[str, str]]) -> str:
+def _xml_attributes(attributes: Iterable[tuple[str, str]]) -> str:
     return "".join(f" {name}={quoteattr(value)}" for name, value in attributes)

@@ -101,7 +101,7 @@ class RunMap:
                 appears_at=until if user.id in later else None,
             )
             if found:
-                routes[index] = _route(self.graph, user, path, motion)
+                routes[index] = _make_route(self.graph, user, path, motion)
         analysis = settings.analysis(scenario)
         plan = Plan(
             scenario=scenario.name,
@@ -129,7 +129,7 @@ class RunMap:
         )
 
 
-def _route(graph: MapGraph, user: RoadUser, path: Int32Array, motion: Motion) -> Route:
+def _make_route(graph: MapGraph, user: RoadUser, path: Int32Array, motion: Motion) -> Route:
     nodes = graph.walks if user.person else graph.lanes
     name = walk_node_id if user.person else node_id
     x, y = nodes.x[path], nodes.y[path]

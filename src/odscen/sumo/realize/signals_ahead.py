@@ -34,9 +34,9 @@ def lights_at(sumo_map: SumoMap, logs: Mapping[str, LightLog], time: float) -> L
     """
     view = no_lights(len(sumo_map.graph.lanes.lanes.keys))
     for light in sumo_map.lights:
-        shown = [one for one in logs.get(light.id, []) if one[0] <= time + 1e-6]
+        shown = [log for log in logs.get(light.id, []) if log[0] <= time + 1e-6]
         for lane in _lit_lanes(sumo_map, light) if shown else ():
-            states = [(since, _seen(state, lane.links)) for since, state in shown]
+            states = [(since, _signal_seen(state, lane.links)) for since, state in shown]
             now = states[-1][1]
             began = next(
                 (after[0] for before, after in _pairs_back(states) if before[1] != now),
@@ -52,7 +52,7 @@ def lights_at_start(sumo_map: SumoMap) -> LightView:
 
     For how long they have shown it is counted as if the programs had been running before.
     """
-    return lights_at(sumo_map, {one.id: _before_start(one) for one in sumo_map.lights}, 0.0)
+    return lights_at(sumo_map, {light.id: _before_start(light) for light in sumo_map.lights}, 0.0)
 
 
 def _before_start(light: SumoLight) -> LightLog:
@@ -69,7 +69,7 @@ def _before_start(light: SumoLight) -> LightLog:
     starts = [0.0, *ends[:-1]]
     log = [(start - place, phase.state) for start, phase in zip(starts, phases, strict=True)]
     log += [(time - cycle, state) for time, state in log]
-    return sorted(one for one in log if one[0] <= 0.0)
+    return sorted(pair for pair in log if pair[0] <= 0.0)
 
 
 def _lit_lanes(sumo_map: SumoMap, light: SumoLight) -> Iterable[_LitLane]:
@@ -83,7 +83,7 @@ def _lit_lanes(sumo_map: SumoMap, light: SumoLight) -> Iterable[_LitLane]:
     return [_LitLane(row, tuple(links)) for row, links in found.items()]
 
 
-def _seen(state: str, links: Sequence[int]) -> SignalAhead:
+def _signal_seen(state: str, links: Sequence[int]) -> SignalAhead:
     letters = {state[link] for link in links if link < len(state)}
     for wanted, shown in (("Gg", SignalAhead.GREEN), ("yYu", SignalAhead.YELLOW)):
         if letters & set(wanted):

@@ -60,12 +60,12 @@ def lane_places(sumo_map: SumoMap) -> LanePlaces:
     that crosses no junction of the map, and is too short for a node, is in the segment that it is
     entered from.
     """
-    net, junctions = sumo_map.net, _junctions(sumo_map)
+    net, junctions = sumo_map.net, _junction_segments(sumo_map)
     parts = _road_parts(sumo_map, junctions)
-    chains = list(_chains(net))
-    parts |= _inside(chains, parts, junctions, net)
-    connections = list(_connections(chains, parts, junctions))
-    control = _controls(sumo_map)
+    chains = list(_lane_chains(net))
+    parts |= _places_inside(chains, parts, junctions, net)
+    connections = list(_junction_paths(chains, parts, junctions))
+    control = _junction_controls(sumo_map)
     movements = {connection.movement: connection.junction for connection in connections}
     lengths: dict[str, list[float]] = defaultdict(list)
     for connection in connections:
@@ -90,11 +90,11 @@ def lane_places(sumo_map: SumoMap) -> LanePlaces:
 @lru_cache(maxsize=4)
 def lane_segments(sumo_map: SumoMap) -> dict[str, tuple[str, ...]]:
     """Segments in which each lane lies that has nodes, or lies beside one; in driving direction."""
-    parts = _road_parts(sumo_map, _junctions(sumo_map))
+    parts = _road_parts(sumo_map, _junction_segments(sumo_map))
     return {lane: tuple(part.segment for part in some) for lane, some in parts.items()}
 
 
-def _junctions(sumo_map: SumoMap) -> set[str]:
+def _junction_segments(sumo_map: SumoMap) -> set[str]:
     segments = sumo_map.graph.segments
     return {
         str(name)
@@ -104,11 +104,11 @@ def _junctions(sumo_map: SumoMap) -> set[str]:
 
 
 def _road_parts(sumo_map: SumoMap, junctions: set[str]) -> _Parts:
-    parts = dict(_parts(sumo_map, junctions))
-    return parts | _beside(parts, sumo_map.net)
+    parts = dict(_parts_of_lanes(sumo_map, junctions))
+    return parts | _places_beside(parts, sumo_map.net)
 
 
-def _parts(
+def _parts_of_lanes(
     sumo_map: SumoMap, junctions: set[str]
 ) -> Iterator[tuple[str, tuple[_SegmentShare, ...]]]:
     """Segments of the lanes with nodes, in driving direction."""
@@ -126,7 +126,7 @@ def _parts(
             yield lane.id, tuple(_SegmentShare(name, number / len(names)) for name, number in found)
 
 
-def _beside(parts: _Parts, net: RoadNet) -> _Parts:
+def _places_beside(parts: _Parts, net: RoadNet) -> _Parts:
     """Places of lanes without nodes beside a lane that has some: lanes of bicycles."""
     return {
         lane.id: beside
@@ -137,7 +137,7 @@ def _beside(parts: _Parts, net: RoadNet) -> _Parts:
     }
 
 
-def _chains(net: RoadNet) -> Iterator[_LaneChain]:
+def _lane_chains(net: RoadNet) -> Iterator[_LaneChain]:
     for link in net.links:
         source = net.lanes[link.source]
         if source.internal or not _for_vehicles(source):
@@ -148,7 +148,7 @@ def _chains(net: RoadNet) -> Iterator[_LaneChain]:
             yield _LaneChain(source, (net.lanes[link.via], *onwards[:-1]), onwards[-1])
 
 
-def _inside(
+def _places_inside(
     chains: Sequence[_LaneChain], parts: _Parts, junctions: set[str], net: RoadNet
 ) -> _Parts:
     """Places of lanes inside of SUMO junctions that have no node, or only nodes of roads.
@@ -178,7 +178,7 @@ def _inside(
     return found
 
 
-def _connections(
+def _junction_paths(
     chains: Sequence[_LaneChain], parts: _Parts, junctions: set[str]
 ) -> Iterator[_JunctionPath]:
     """Connections that cross a junction of the map."""
@@ -190,7 +190,7 @@ def _connections(
             yield _JunctionPath(source, inside, junction, ">".join(ends))
 
 
-def _controls(sumo_map: SumoMap) -> dict[str, JunctionControl]:
+def _junction_controls(sumo_map: SumoMap) -> dict[str, JunctionControl]:
     """How each junction is controlled, by its segment."""
     graph = sumo_map.graph
     lit = {name for light in sumo_map.lights for name in light.junctions}
@@ -220,13 +220,19 @@ def _connection_rows(
     connections: Sequence[_JunctionPath], net: RoadNet
 ) -> Iterator[tuple[str | None, ...]]:
     inside = {
-        lane.id: (one.junction, one.source.edge, one.source.id, one.inside[0].id, one.movement)
-        for one in reversed(connections)
-        for lane in one.inside
+        lane.id: (
+            connection.junction,
+            connection.source.edge,
+            connection.source.id,
+            connection.inside[0].id,
+            connection.movement,
+        )
+        for connection in reversed(connections)
+        for lane in connection.inside
     }
     for name, row in sorted(inside.items()):
         yield name, *row
-    ahead = {one.source.edge: one.junction for one in reversed(connections)}
+    ahead = {connection.source.edge: connection.junction for connection in reversed(connections)}
     for edge, last in sorted(_last_edges(ahead, inside, net).items()):
         for lane in net.edge_lanes[edge]:
             if _for_vehicles(lane):

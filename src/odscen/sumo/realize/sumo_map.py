@@ -84,13 +84,13 @@ class SumoMap:
             Roadside(*key) if beside else key
             for key, beside in zip(walks.lane_keys, walks.roadside, strict=True)
         ]
-        places = _places(table, lanes.lanes.keys, lanes.lane, lanes.s, lanes.x, lanes.y)
+        places = _node_positions(table, lanes.lanes.keys, lanes.lane, lanes.s, lanes.x, lanes.y)
         return cls(
             graph=graph,
             net=net,
             lane_places=with_gaps(places, lanes, net),
             walk_places=_all_scaled(
-                _places(table, walk_keys, walks.lane, walks.s, walks.x, walks.y)
+                _node_positions(table, walk_keys, walks.lane, walks.s, walks.x, walks.y)
             ),
             net_offset=table.net_offset,
             elevation=table.elevation,
@@ -100,7 +100,7 @@ class SumoMap:
         )
 
 
-def _places(
+def _node_positions(
     table: LaneTable,
     keys: Sequence[LaneKey | Roadside],
     lane: Int32Array,

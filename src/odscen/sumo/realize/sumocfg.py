@@ -133,7 +133,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
         inputs["additional-files"] = ",".join(additional)
     sections: dict[str, dict[str, str]] = {
         "input": inputs,
-        "output": _outputs(settings),
+        "output": _output_options(settings),
         "time": {
             "begin": "0",
             "end": f"{settings.until:g}",
@@ -148,8 +148,8 @@ def sumo_config(settings: SumocfgSettings) -> str:
             "pedestrian.model": settings.pedestrians,
             "pedestrian.striping.jamtime": f"{SQUEEZE:g}",
             "time-to-teleport": f"{settings.time_to_teleport or -1.0:g}",
-            **_optional("default.action-step-length", settings.action_step),
-            **_optional("lateral-resolution", settings.lateral_resolution),
+            **_optional_value("default.action-step-length", settings.action_step),
+            **_optional_value("lateral-resolution", settings.lateral_resolution),
         },
         "random_number": {"seed": str(settings.seed)},
         "report": {
@@ -182,11 +182,11 @@ def sumo_config(settings: SumocfgSettings) -> str:
     return "\n".join([*lines, "</sumoConfiguration>"]) + "\n"
 
 
-def _optional(option: str, value: float | None) -> dict[str, str]:
+def _optional_value(option: str, value: float | None) -> dict[str, str]:
     return {} if value is None else {option: f"{value:g}"}
 
 
-def _outputs(settings: SumocfgSettings) -> dict[str, str]:
+def _output_options(settings: SumocfgSettings) -> dict[str, str]:
     recording = settings.recording
     trips = {
         "tripinfo-output": TRIPINFO_FILE,

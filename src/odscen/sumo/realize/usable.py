@@ -39,21 +39,25 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     """
     graph = sumo_map.graph
     lanes, walks = graph.lanes, graph.walks
-    admitted = _admitted(sumo_map, sumo_map.lane_places, "passenger")
-    exact = admitted & _near(sumo_map.lane_places) & ~_at_dead_end(sumo_map, sumo_map.lane_places)
+    admitted = _mask_of_admitted(sumo_map, sumo_map.lane_places, "passenger")
+    exact = (
+        admitted
+        & _mask_of_near(sumo_map.lane_places)
+        & ~_at_dead_end(sumo_map, sumo_map.lane_places)
+    )
     reach = int(np.ceil(REACH / lanes.spacing))
     walked = np.array(
         [
             not lane.internal and sumo_map.net.walked_lane(lane.edge) is lane
-            for lane in _lanes(sumo_map, sumo_map.walk_places)
+            for lane in _lanes_of_places(sumo_map, sumo_map.walk_places)
         ],
         dtype=np.bool_,
     )
     inside = np.array(
-        [lane.internal for lane in _lanes(sumo_map, sumo_map.lane_places)], dtype=np.bool_
+        [lane.internal for lane in _lanes_of_places(sumo_map, sumo_map.lane_places)], dtype=np.bool_
     )
-    on_foot = _admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
-    on_foot &= walked[sumo_map.walk_places.lane] & _near(sumo_map.walk_places)
+    on_foot = _mask_of_admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
+    on_foot &= walked[sumo_map.walk_places.lane] & _mask_of_near(sumo_map.walk_places)
     return Usable(
         spawnable=_all_around(exact, lanes, reach),
         drivable=sumo_map.drivable,
@@ -62,25 +66,27 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     )
 
 
-def _lanes(sumo_map: SumoMap, places: NodePositions) -> list[RoadNetLane]:
+def _lanes_of_places(sumo_map: SumoMap, places: NodePositions) -> list[RoadNetLane]:
     return [sumo_map.net.lanes[name] for name in places.lanes]
 
 
-def _admitted(sumo_map: SumoMap, places: NodePositions, vclass: str) -> BoolArray:
+def _mask_of_admitted(sumo_map: SumoMap, places: NodePositions, vclass: str) -> BoolArray:
     """Nodes on a SUMO lane that a vehicle class may use, shape ``(N,)``."""
-    allowed = np.array([lane.allows(vclass) for lane in _lanes(sumo_map, places)], dtype=np.bool_)
+    allowed = np.array(
+        [lane.allows(vclass) for lane in _lanes_of_places(sumo_map, places)], dtype=np.bool_
+    )
     return (places.lane >= 0) & allowed[places.lane]
 
 
 def _at_dead_end(sumo_map: SumoMap, places: NodePositions) -> BoolArray:
     """Nodes close to the end of a SUMO lane without links: a front could not reach over it."""
-    lanes = _lanes(sumo_map, places)
+    lanes = _lanes_of_places(sumo_map, places)
     dead = np.array([not sumo_map.net.links_from.get(lane.id) for lane in lanes], dtype=np.bool_)
     length = np.array([lane.length for lane in lanes])
     return dead[places.lane] & (places.pos > length[places.lane] - REACH)
 
 
-def _near(places: NodePositions) -> BoolArray:
+def _mask_of_near(places: NodePositions) -> BoolArray:
     return np.less_equal(places.deviation, DEVIATION)  # false for NaN
 
 

@@ -61,22 +61,22 @@ class WalkPlanner:
         NoRouteError
             If the SUMO network has no path to walk there.
         """
-        start = self._place(int(path[0]), "spawn")
-        end = self._place(int(path[-1]), "goal")
-        edges, repairs = connected(self._net, self._edges(path), PEDESTRIAN)
-        onwards = self._onwards(start, end, edges)
+        start = self._place_on_lane(int(path[0]), "spawn")
+        end = self._place_on_lane(int(path[-1]), "goal")
+        edges, repairs = connected(self._net, self._edges_of_path(path), PEDESTRIAN)
+        onwards = self._direction_of_start(start, end, edges)
         front = start[1] + length / 2.0 * onwards * self._places.scales[start[0].id]
         walked = self._net.walked_lane(start[0].edge) or start[0]
         aside = self._net.left_of(start[0], walked)
         return Walk(
             edges=edges,
             depart_pos=min(max(front, 0.0), start[0].length),
-            depart_pos_lat=aside + lateral_offset * self._along(int(path[0]), start),
+            depart_pos_lat=aside + lateral_offset * self._direction_along(int(path[0]), start),
             arrival_pos=min(max(end[1], 0.0), end[0].length),
             repairs=repairs,
         )
 
-    def _place(self, node: int, what: str) -> tuple[RoadNetLane, float]:
+    def _place_on_lane(self, node: int, what: str) -> tuple[RoadNetLane, float]:
         place = self._places.of(node)
         if place is None:
             raise NoRouteError(f"the SUMO network has nothing to walk on at the {what}")
@@ -87,7 +87,7 @@ class WalkPlanner:
             )
         return lane, place[1]
 
-    def _edges(self, path: Int32Array) -> list[str]:
+    def _edges_of_path(self, path: Int32Array) -> list[str]:
         """Return the edges that the path walks along, in order.
 
         An edge that is only touched, at a corner between two crosswalks, is left out: SUMO would
@@ -108,7 +108,7 @@ class WalkPlanner:
                 edges.append(lane.edge)
         return edges
 
-    def _along(self, node: int, start: tuple[RoadNetLane, float]) -> float:
+    def _direction_along(self, node: int, start: tuple[RoadNetLane, float]) -> float:
         """Return 1 if the SUMO lane at a node runs with growing s, -1 if against it."""
         row = int(self._graph.lane[node])
         first, end = (int(n) for n in self._graph.first_node[row : row + 2])
@@ -118,7 +118,7 @@ class WalkPlanner:
                 return float(np.sign(place[1] - start[1])) * (other - node)
         return 1.0
 
-    def _onwards(
+    def _direction_of_start(
         self,
         start: tuple[RoadNetLane, float],
         end: tuple[RoadNetLane, float],

@@ -76,9 +76,15 @@ def weather_effect(parameters: Mapping[str, float]) -> WeatherEffect:
     - fog or dust of density ``d`` (0 to 1): sight ``V = 10 km (50 m / 10 km)^d``, plus the distance
       at which the fog begins; ``v REACTION + v^2 / (2 BRAKING grip) = V``.
     """
-    rain = _share(parameters, "precipitation")
-    wet = max(_share(parameters, "wetness"), _share(parameters, "precipitation_deposits"))
-    haze = max(_share(parameters, "fog_density"), _share(parameters, "dust_storm"))
+    rain = _share_of_parameter(parameters, "precipitation")
+    wet = max(
+        _share_of_parameter(parameters, "wetness"),
+        _share_of_parameter(parameters, "precipitation_deposits"),
+    )
+    haze = max(
+        _share_of_parameter(parameters, "fog_density"),
+        _share_of_parameter(parameters, "dust_storm"),
+    )
     grip = 1.0 - (1.0 - WET_GRIP) * wet
     loss = RAIN_SPEED_LOSS + (HEAVY_SPEED_LOSS - RAIN_SPEED_LOSS) * rain if rain > 0 else 0.0
     sight_speed = math.inf
@@ -94,7 +100,10 @@ def weather_effect(parameters: Mapping[str, float]) -> WeatherEffect:
 
 def visibility(parameters: Mapping[str, float]) -> float:
     """Metres one sees, as :func:`weather_effect` has it."""
-    haze = max(_share(parameters, "fog_density"), _share(parameters, "dust_storm"))
+    haze = max(
+        _share_of_parameter(parameters, "fog_density"),
+        _share_of_parameter(parameters, "dust_storm"),
+    )
     return CLEAR * math.pow(DENSE / CLEAR, haze) + max(0.0, parameters.get("fog_distance", 0.0))
 
 
@@ -107,5 +116,5 @@ def stopping_speed(sight: float, *, grip: float = 1.0) -> float:
     return b * (math.sqrt(REACTION**2 + 2.0 * sight / b) - REACTION)
 
 
-def _share(parameters: Mapping[str, float], name: str) -> float:
+def _share_of_parameter(parameters: Mapping[str, float], name: str) -> float:
     return min(1.0, max(0.0, parameters.get(name, 0.0) / 100.0))

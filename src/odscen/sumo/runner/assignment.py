@@ -163,7 +163,9 @@ def assign_routes(
             if ended.sim_seconds is None:
                 raise SimulationError(f"iteration {iteration} of the assignment: {ended.error}")
             times = search.measured(folder)
-            outcome = _outcome(folder, vehicles=sum(not one.person for one in prepared.plan.actors))
+            outcome = _read_outcome(
+                folder, vehicles=sum(not actor.person for actor in prepared.plan.actors)
+            )
         wanting = search.compare(times)
         travel_time, *counts = outcome
         steps.append(AssignmentStep(iteration, round(search.gap, 6), travel_time, changed, *counts))
@@ -255,7 +257,7 @@ class _Search:
         """
         rows = times.row(self._departs)
         own = path_costs(times, self._steps, rows)
-        quick = [self._edges.of(path) for path in self._quickest(times, rows)]
+        quick = [self._edges.of(path) for path in self._quickest_paths(times, rows)]
         best = np.minimum(own, path_costs(times, quick, rows))
         self.gap = float((own - best)[self._real].sum() / max(best[self._real].sum(), 1e-9))
         self._iterations += 1
@@ -264,13 +266,13 @@ class _Search:
         else:
             more = (times.costs - self._mean.costs) / self._iterations
             self._mean = TravelTimes(times.interval, self._mean.costs + more)
-        for known, path in zip(self._known, self._quickest(self._mean, rows), strict=True):
+        for known, path in zip(self._known, self._quickest_paths(self._mean, rows), strict=True):
             known.learn(path, self._edges)
-        return self._want(path_costs(self._mean, self._steps, rows), self._mean, rows)
+        return self._mean_wish(path_costs(self._mean, self._steps, rows), self._mean, rows)
 
-    def _want(self, own: FloatArray, times: TravelTimes, rows: Int32Array) -> float:
+    def _mean_wish(self, own: FloatArray, times: TravelTimes, rows: Int32Array) -> float:
         counts = [len(known.steps) for known in self._known]
-        steps = [one for known in self._known for one in known.steps]
+        steps = [step for known in self._known for step in known.steps]
         costs = path_costs(times, steps, np.repeat(rows, counts))
         of_each = np.split(costs, np.cumsum(counts)[:-1]) if counts else []
         for index, seconds in enumerate(of_each):
@@ -299,7 +301,7 @@ class _Search:
             self._paths[index], self._steps[index] = known.paths[wanted], known.steps[wanted]
         return len(changing)
 
-    def _quickest(self, times: TravelTimes, rows: Int32Array) -> list[Int32Array]:
+    def _quickest_paths(self, times: TravelTimes, rows: Int32Array) -> list[Int32Array]:
         groups: dict[int, dict[int, dict[int, int]]] = defaultdict(lambda: defaultdict(dict))
         for index, row in enumerate(rows.tolist()):
             groups[row][self._trips[index].goal][index] = self._trips[index].spawn
@@ -315,13 +317,13 @@ class _Search:
         return found
 
 
-def _outcome(folder: Path, *, vehicles: int) -> tuple[float | None, int, int, int]:
+def _read_outcome(folder: Path, *, vehicles: int) -> tuple[float | None, int, int, int]:
     """Mean travel time, seconds, and how many arrived, were teleported and were not inserted."""
     import polars as pl
 
     table = read_trips(folder)
     events = events_from_json((folder / EVENTS_FILE).read_text(encoding="utf-8"))
-    teleported = {one.actor for one in events if one.kind is EventKind.TELEPORT_START}
+    teleported = {event.actor for event in events if event.kind is EventKind.TELEPORT_START}
     if table is None:
         return None, 0, 0, vehicles
     trips = table.filter(~pl.col("person"))

@@ -54,7 +54,7 @@ class ElevationLookup:
     def __init__(self, graph: MapGraph, table: LaneTable) -> None:
         lanes, walks = graph.lanes, graph.walks
         walk_lane = walks.lane.astype(np.int64) + len(lanes.lanes.keys)
-        walk_pitch = _slopes(walk_lane, walks.s, walks.z)
+        walk_pitch = _walk_slopes(walk_lane, walks.s, walks.z)
         self._lane = np.concatenate([lanes.lane.astype(np.int64), walk_lane])
         self._xy = np.column_stack(
             [np.concatenate([lanes.x, walks.x]), np.concatenate([lanes.y, walks.y])]
@@ -106,11 +106,11 @@ class ElevationLookup:
         # NaN compares as false: without a height to go by, every node will do.
         elsewhere = off > _STOREY + _STEEP * np.where(known, far, 0.0)
         cost = np.where(known, far + np.where(elsewhere, 1e3 + off, 0.0), np.inf)
-        cost += _turned(hdg[:, None], self._hdg[node])
+        cost += _direction_cost(hdg[:, None], self._hdg[node])
         cost += np.where(self._walk[node] != walks[:, None], _ASTRAY, 0.0)
         best = np.argmin(cost, axis=1)
         own = node[np.arange(len(x)), best]
-        lie = self._between(own, x, y, hdg)
+        lie = self._interpolate_between(own, x, y, hdg)
         lost = ~known.any(axis=1)
         return Lie(
             np.where(lost, np.where(np.isnan(near_z), 0.0, near_z), lie.z),
@@ -136,7 +136,7 @@ class ElevationLookup:
         )
         return XodrPose(pose.x, pose.y, lie.z, pose.hdg, lie.pitch)
 
-    def _between(
+    def _interpolate_between(
         self, node: NDArray[np.int64], x: FloatArray, y: FloatArray, hdg: FloatArray
     ) -> Lie:
         """Between a node and the next one on the same lane, that way or the other."""
@@ -162,7 +162,7 @@ class ElevationLookup:
         return Lie(z, np.arctan(np.tan(slope) * np.cos(turn)))
 
 
-def _turned(one: FloatArray, other: FloatArray) -> FloatArray:
+def _direction_cost(one: FloatArray, other: FloatArray) -> FloatArray:
     """Metres that a direction costs: of two lanes that cross, the one along is meant.
 
     Lanes of opposite direction are the same ground.
@@ -170,7 +170,7 @@ def _turned(one: FloatArray, other: FloatArray) -> FloatArray:
     return 2.0 * np.abs(np.sin(one - other))
 
 
-def _slopes(lane: NDArray[np.int64], s: FloatArray, z: FloatArray) -> FloatArray:
+def _walk_slopes(lane: NDArray[np.int64], s: FloatArray, z: FloatArray) -> FloatArray:
     """Slope at nodes of walks, from the heights of their neighbours."""
     pitch = np.zeros(len(z))
     if len(z) < 2:

@@ -85,8 +85,8 @@ def forecast(
         change[min(int(actor.depart / _MINUTE), minutes)] += 1
         change[min(int((actor.depart + spent) / _MINUTE) + 1, minutes)] -= 1
     running = most = 0
-    for one in change:
-        running += one
+    for number in change:
+        running += number
         most = max(most, running)
     rows = seconds / max(every or 0.0, plan.step_length) if plan.trajectories else 0.0
     slices = plan.until / plan.slice_length if plan.slice_length else 0.0
@@ -94,7 +94,7 @@ def forecast(
     intervals = plan.until / interval_of(
         plan.until,
         plan.slice_length,
-        analysed=[one for one in (plan.warm_up, plan.interval) if one],
+        analysed=[value for value in (plan.warm_up, plan.interval) if value],
     )
     measured = LANE_ROW * lanes * intervals if seconds else 0.0
     disk = written + ROW * rows + measured + ACTOR * len(plan.actors) + STATE * slices * most

@@ -63,7 +63,7 @@ class ForkedWorker:
         reading, stdout = os.pipe()
         self.stdout: BinaryIO = os.fdopen(reading, "rb")
         try:
-            self.pid, self._said = _forked(plan, (stdout, stderr, *keep), raw=raw)
+            self.pid, self._said = _fork_process(plan, (stdout, stderr, *keep), raw=raw)
         except BaseException:
             self.stdout.close()
             raise
@@ -181,7 +181,7 @@ def _ready_server() -> _Server:
     return _server
 
 
-def _forked(plan: Path, descriptors: tuple[int, ...], *, raw: bool) -> tuple[int, BinaryIO]:
+def _fork_process(plan: Path, descriptors: tuple[int, ...], *, raw: bool) -> tuple[int, BinaryIO]:
     """Have a process forked; its number, and where its end is said."""
     try:
         folder = str(Path.cwd())

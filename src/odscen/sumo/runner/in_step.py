@@ -132,7 +132,7 @@ class InStep:
     def attach(self, process: subprocess.Popen[bytes]) -> None:
         """Let the worker make its first step."""
         self._stdin = process.stdin
-        self._say(Command("step"))
+        self._send_command(Command("step"))
 
     def take(self, message: Message, payload: bytes) -> None:
         """Work on a step."""
@@ -140,15 +140,15 @@ class InStep:
             return
         waited = self._waits
         if not waited and not self._stopped:
-            self._say(Command("step"))
-        step = self._step(message, payload)
+            self._send_command(Command("step"))
+        step = self._make_step(message, payload)
         if self._stopped:
             return
         driven = self._on_step(step)
         if driven is not None:
-            self._say(driven)
+            self._send_command(driven)
         if waited and not self._stopped:
-            self._say(Command("step"))
+            self._send_command(Command("step"))
 
     def detach(self) -> None:
         """Close the way to the worker, which has ended."""
@@ -162,7 +162,7 @@ class InStep:
         self.failure = self.failure or failure
         if not self._stopped:
             self._stopped = True
-            self._say(Command("stop"))
+            self._send_command(Command("stop"))
 
     def show_outside(self, outside: Outside) -> None:
         """Let SUMO see what other programs drive and switch; it waits for that from now on.
@@ -171,20 +171,20 @@ class InStep:
         that, unless it waits already.
         """
         self._waits = True
-        self._say(outside)
+        self._send_command(outside)
 
     def add_rules(self, story: str) -> None:
         """Give the worker rules, the text of a story file, while it waits for the next step."""
-        self._say(MoreRules(story))
+        self._send_command(MoreRules(story))
 
-    def _say(self, command: Command | EgoPose | Outside | MoreRules) -> None:
+    def _send_command(self, command: Command | EgoPose | Outside | MoreRules) -> None:
         if self._stdin is None:
             return
         with suppress(OSError, ValueError):  # the worker has just ended
             self._stdin.write(encode(command).encode())
             self._stdin.flush()
 
-    def _step(self, state: State, payload: bytes) -> Step:
+    def _make_step(self, state: State, payload: bytes) -> Step:
         self._lanes += state.lanes
         self._lights |= state.lights
         rows = np.frombuffer(payload, dtype="<f8").reshape(-1, COLUMNS)

@@ -140,7 +140,7 @@ class Live:
                 if not self._ended:
                     self._early.append(command)
                 return
-            _write(self._process.stdin, command)
+            _write_command(self._process.stdin, command)
 
     def kill(self) -> None:
         """End the worker at once."""
@@ -155,7 +155,7 @@ class Live:
         with self._lock:
             self._process = process
             for command in self._early:
-                _write(process.stdin, command)
+                _write_command(process.stdin, command)
             self._early.clear()
 
     def take(self, message: Message, payload: bytes) -> None:
@@ -197,7 +197,7 @@ class Live:
             wake()
 
 
-def _write(stdin: IO[bytes] | None, command: Command) -> None:
+def _write_command(stdin: IO[bytes] | None, command: Command) -> None:
     if stdin is None:
         return
     with suppress(OSError, ValueError):  # the worker has just ended

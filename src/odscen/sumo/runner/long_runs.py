@@ -84,7 +84,7 @@ def run_long(
         _write_settings(prepared, folder)
         write_status(folder, prepared.plan, None)
         seal_start(folder)
-    with disk_errors(f"run folder {out}", advice=_again(out)):
+    with disk_errors(f"run folder {out}", advice=_resume_hint(out)):
         return _resume_from(prepared, out, lock, reporter, finish, live)
 
 
@@ -123,12 +123,12 @@ def resume(
         If it is driven by code that is named in its folder alone, or by another than is named now.
     """
     _refuse_absent(folder)
-    with disk_errors(f"run folder {folder}", advice=_again(folder)), run_lock(folder) as lock:
+    with disk_errors(f"run folder {folder}", advice=_resume_hint(folder)), run_lock(folder) as lock:
         _refuse_absent(folder)
         clear_leftovers(folder.parent)
         check_run_files(folder)
         unsealed(folder / layout.STATUS_FILE)
-        prepared = _restore(folder, time_limit)
+        prepared = _restore_prepared(folder, time_limit)
         _refuse_unnamed_code(folder, behaviour)
         number, problems = survey(folder)
         for problem in problems:
@@ -176,7 +176,7 @@ def _resume_from(
     )
     clear_parts(folder)  # a torn one takes room that what follows may need
     summary = make_summary(prepared, folder, ended)
-    summary["slices"] = _slices(folder)
+    summary["slices"] = _describe_slices(folder)
     if ended.sim_seconds is None:
         kept = summary["slices"]["time"]
         summary["error"] = (
@@ -191,11 +191,11 @@ def _resume_from(
         seal_interrupted(folder)
     else:
         seal_run(folder)
-        _clear(folder)
+        _clear_resuming_files(folder)
     return Run(folder, summary)
 
 
-def _again(folder: Path) -> str:
+def _resume_hint(folder: Path) -> str:
     return f"then: odscen resume {folder}"
 
 
@@ -208,25 +208,25 @@ def _refuse_absent(folder: Path) -> None:
     raise NotFoundError("interrupted run", folder.name, interrupted(folder.parent))
 
 
-def _slices(folder: Path) -> dict[str, Any]:
+def _describe_slices(folder: Path) -> dict[str, Any]:
     """What ``summary.json`` says of the slices: each one's end, and what it took."""
     done = [read_checkpoint(folder, n) for n in range(1, last_number(folder) + 1)]
     return {
         "time": done[-1].time if done else 0.0,
         "done": [
             {
-                "time": one.time,
-                "running": one.running,
-                "steps": one.steps,
-                "wall_seconds": round(one.wall_seconds, 3),
-                "memory_mb": round(one.memory / 1e6, 1),
+                "time": checkpoint.time,
+                "running": checkpoint.running,
+                "steps": checkpoint.steps,
+                "wall_seconds": round(checkpoint.wall_seconds, 3),
+                "memory_mb": round(checkpoint.memory / 1e6, 1),
             }
-            for one in done
+            for checkpoint in done
         ],
     }
 
 
-def _clear(folder: Path) -> None:
+def _clear_resuming_files(folder: Path) -> None:
     """Remove what was there only to go on from; the run has ended."""
     (folder / layout.STATUS_FILE).unlink(missing_ok=True)
     (folder / layout.SETTINGS_FILE).unlink(missing_ok=True)
@@ -241,7 +241,7 @@ def _write_settings(prepared: SumoPreparedRun, folder: Path) -> None:
         "problems": list(prepared.problems),
         "notes": list(prepared.notes),
         "about": dict(prepared.about),
-        "expectations": [one.text for one in prepared.settings.expectations],
+        "expectations": [expectation.text for expectation in prepared.settings.expectations],
     }
     text = json.dumps(settings, indent=2, ensure_ascii=False) + "\n"
     (folder / layout.SETTINGS_FILE).write_text(text, encoding="utf-8")
@@ -274,7 +274,7 @@ def _refuse_unnamed_code(folder: Path, named: BehaviourDoor | None) -> None:
         )
 
 
-def _restore(folder: Path, time_limit: float | None) -> SumoPreparedRun:
+def _restore_prepared(folder: Path, time_limit: float | None) -> SumoPreparedRun:
     """Read what is left to know of the run; all else is in its files."""
     path = folder / layout.SETTINGS_FILE
     try:

@@ -30,7 +30,7 @@ def place_fit(scenario: Scenario, sumo_map: SumoMap) -> Iterator[Problem]:
             place = place_of(sumo_map.graph, one.spawn)
             if place is None:
                 continue
-            where, aside = f"{kind}[{index}].spawn", _aside(sumo_map, place)
+            where, aside = f"{kind}[{index}].spawn", _distance_aside(sumo_map, place)
             if np.isnan(aside):
                 message = (
                     f"{one.id!r} starts on {one.spawn!r}, where the SUMO network of the map has no "
@@ -45,7 +45,7 @@ def place_fit(scenario: Scenario, sumo_map: SumoMap) -> Iterator[Problem]:
                 yield warning("sumo_lane_aside", where, message, nodes=[one.spawn])
 
 
-def _aside(sumo_map: SumoMap, place: NodePlace) -> float:
+def _distance_aside(sumo_map: SumoMap, place: NodePlace) -> float:
     """Metres between a node and its SUMO lane; NaN without one."""
     places = sumo_map.walk_places if place.walk else sumo_map.lane_places
     return float(places.deviation[place.node])
@@ -59,9 +59,13 @@ def route_fit(scenario: Scenario, sumo_map: SumoMap) -> Iterator[Problem]:
     """
     own = scenario.model_copy(update={"flows": (), "demand": Demand()})
     planned = realize(own, sumo_map).plan.actors
-    reasons = {one.id: one.problem for one in planned if one.problem}
+    reasons = {actor.id: actor.problem for actor in planned if actor.problem}
     for index, actor in enumerate(scenario.actors):
         place = place_of(sumo_map.graph, actor.spawn)
-        if actor.id in reasons and place is not None and not np.isnan(_aside(sumo_map, place)):
+        if (
+            actor.id in reasons
+            and place is not None
+            and not np.isnan(_distance_aside(sumo_map, place))
+        ):
             message = f"{actor.id!r} will not be inserted: {reasons[actor.id]}"
             yield warning("no_sumo_route", f"actors[{index}]", message, nodes=[actor.spawn])

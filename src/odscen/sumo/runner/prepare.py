@@ -83,7 +83,7 @@ def prepare(
             "map_sha256": scenario.map.sha256,
             "meso": settings.meso,
         }
-        | _driver(settings.behaviour),
+        | _describe_driver(settings.behaviour),
         expected=forecast(
             plan,
             realization.files,
@@ -93,7 +93,7 @@ def prepare(
     )
 
 
-def _driver(door: BehaviourDoor | None) -> dict[str, Any]:
+def _describe_driver(door: BehaviourDoor | None) -> dict[str, Any]:
     """What the summary says of a behaviour model."""
     if door is None:
         return {}

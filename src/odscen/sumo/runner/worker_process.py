@@ -106,7 +106,7 @@ def run_worker(
     # Python's own words (a traceback before the worker has opened its log) belong in the log too.
     with (
         (folder / LOG_FILE).open("ab") as log,
-        _started(
+        _start_process(
             folder / PLAN_FILE,
             log.fileno(),
             live,
@@ -121,9 +121,9 @@ def run_worker(
                 import polars as pl  # its import takes longer than a short simulation
 
                 del pl
-            last = _follow(process, progress, live)
+            last = _follow_process(process, progress, live)
         except BaseException:  # an interrupt, or the caller's progress function
-            _kill(process)
+            _kill_process(process)
             raise
         finally:
             if timer is not None:
@@ -168,7 +168,7 @@ def _with_results(done: Done, make: Callable[[Left], None]) -> Done | Failed:
     return done
 
 
-def _started(
+def _start_process(
     plan: Path,
     log: int,
     live: Companion | None,
@@ -196,7 +196,7 @@ def _started(
     )
 
 
-def _follow(
+def _follow_process(
     process: subprocess.Popen[bytes] | ForkedWorker,
     progress: Callable[[Progress], None] | None,
     live: Companion | None,
@@ -246,7 +246,7 @@ def _kill_after(
 
     def kill() -> None:
         late.set()
-        _kill(process)
+        _kill_process(process)
 
     timer = threading.Timer(seconds, kill)
     timer.daemon = True
@@ -254,7 +254,7 @@ def _kill_after(
     return timer
 
 
-def _kill(process: subprocess.Popen[bytes] | ForkedWorker) -> None:
+def _kill_process(process: subprocess.Popen[bytes] | ForkedWorker) -> None:
     """End the worker and whatever it has started: its session is its own."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)

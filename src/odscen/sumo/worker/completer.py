@@ -95,7 +95,7 @@ def main() -> int:
     outcomes = Outcomes(plan)
     gc.freeze()  # plan and outcomes stay, and need not be gone through again and again
     for number in range(1, last_number(run) + 1):
-        outcomes.hear(*_happened(run, number))
+        outcomes.hear(*_read_slice(run, number))
     while True:
         outcomes.settle()  # while the worker simulates
         try:
@@ -107,7 +107,7 @@ def main() -> int:
                 _write_results(run, outcomes)
             else:
                 written.complete(plan, run)
-                outcomes.hear(*_happened(run, written.checkpoint.number))
+                outcomes.hear(*_read_slice(run, written.checkpoint.number))
         except (OdscenError, OSError) as error:
             connection.send(error)
             return 1
@@ -116,7 +116,7 @@ def main() -> int:
             return 0
 
 
-def _happened(run: Path, number: int) -> tuple[Iterator[Event], dict[str, Trip]]:
+def _read_slice(run: Path, number: int) -> tuple[Iterator[Event], dict[str, Trip]]:
     """Events and trips of a complete slice, from its files: the same in a run that was resumed."""
     lines = _event_lines(run, number)
     return map(event_from_line, lines), trips_in(recorded_part(run, layout.TRIPS_FILE, number))

@@ -61,7 +61,7 @@ class Completion:
         SimulationError, OSError
             If it could not be completed.
         """
-        self._ask(written)
+        self._ask_completer(written)
 
     def write_results(self) -> None:
         """Write the outcome of every actor.
@@ -71,13 +71,13 @@ class Completion:
         SimulationError, OSError
             If that could not be done.
         """
-        self._ask(None)
+        self._ask_completer(None)
 
     def gone(self) -> CompleterGoneError:
         """Say how the process has ended that this one has started."""
         return CompleterGoneError(self._process.wait())
 
-    def _ask(self, what: Written | None) -> None:
+    def _ask_completer(self, what: Written | None) -> None:
         try:
             self._connection.send(what)
             error = self._connection.recv()

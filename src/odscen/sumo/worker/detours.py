@@ -46,7 +46,7 @@ class Detours:
             self._closed, self._known = closed, {}
         key = source, goal, vclass
         if key not in self._known:
-            self._known[key] = self._search(source, goal, vclass, closed)
+            self._known[key] = self._search_detour(source, goal, vclass, closed)
         return self._known[key]
 
     def by_stops(
@@ -64,7 +64,9 @@ class Detours:
         rest = self.find(route[-1], goals[-1], vclass, closed)
         return None if rest is None else route + rest[1:]
 
-    def _search(self, source: str, goal: str, vclass: str, closed: Pairs) -> tuple[str, ...] | None:
+    def _search_detour(
+        self, source: str, goal: str, vclass: str, closed: Pairs
+    ) -> tuple[str, ...] | None:
         onwards = self._onwards.get(vclass, {})
         queue = [(0.0, source, "")]
         before: dict[str, str] = {}

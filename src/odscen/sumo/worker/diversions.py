@@ -32,12 +32,14 @@ class Diversions:
         self._offset = plan.net_offset
         self._last = plan.until
         moments = {one.begin for one in plan.closed} | {one.end for one in plan.closed}
-        moments |= {one.begin for one in plan.measures} | {one.end for one in plan.measures}
+        moments |= {measure.begin for measure in plan.measures} | {
+            measure.end for measure in plan.measures
+        }
         self._moments = sorted(moments)
-        vehicles = sorted((one.depart, one.id) for one in plan.actors if not one.person)
+        vehicles = sorted((actor.depart, actor.id) for actor in plan.actors if not actor.person)
         self._departs = [depart for depart, _ in vehicles]
         self._names = [name for _, name in vehicles]
-        self._informed = frozenset(one.id for one in plan.actors if one.informed)
+        self._informed = frozenset(actor.id for actor in plan.actors if actor.informed)
         self._pairs: Mapping[str, Pairs] = {}
         self._detours: Detours | None = None
         self._inside: set[str] = set()
@@ -52,7 +54,7 @@ class Diversions:
         if self._closed and self._detours is None:  # as long as no lane is closed
             self._detours = Detours(session.lanes.links())
         if changed or not self._begun:
-            self._close(begin + length)
+            self._update_closed(begin + length)
         events += self._strand_departed(session, begin)
         if self._pairs:
             # Right after a state is loaded as well: who was inside a junction was not led around.
@@ -60,10 +62,10 @@ class Diversions:
             concerned = session.vehicles() if everyone else ()
             waiting = session.waiting_vehicles() if everyone else ()
             # SUMO inserts in the first step that begins after the departure.
-            departing = self._departing(begin - length, begin + length)
+            departing = self._departing_between(begin - length, begin + length)
             # SUMO's rerouting knows no closed turns, and may have led those over one.
             looking = self._informed.intersection(session.vehicles()) if self._informed else ()
-            events += self._divert(
+            events += self._divert_vehicles(
                 session, {*concerned, *waiting, *departing, *looking, *self._inside}, begin
             )
         self._begun = True
@@ -72,30 +74,37 @@ class Diversions:
     def last_events(self, now: float) -> list[Event]:
         """Ends of the measures that last to the end of the run."""
         return [
-            Event(now, EventKind.MEASURE_END, one.id, detail=one.words)
-            for one in self._measures
-            if one.begin < now <= one.end and (one.end > now or one.end >= self._last)
+            Event(now, EventKind.MEASURE_END, measure.id, detail=measure.words)
+            for measure in self._measures
+            if measure.begin < now <= measure.end
+            and (measure.end > now or measure.end >= self._last)
         ]
 
     def _begun_and_ended(self, begin: float, end: float) -> list[Event]:
         found = []
-        for one in self._measures:
-            if begin <= one.end < end and one.end < self._last:
-                found.append(Event(one.end, EventKind.MEASURE_END, one.id, detail=one.words))
-            if begin <= one.begin < end:
-                found.append(Event(one.begin, EventKind.MEASURE_BEGIN, one.id, detail=one.words))
+        for measure in self._measures:
+            if begin <= measure.end < end and measure.end < self._last:
+                found.append(
+                    Event(measure.end, EventKind.MEASURE_END, measure.id, detail=measure.words)
+                )
+            if begin <= measure.begin < end:
+                found.append(
+                    Event(measure.begin, EventKind.MEASURE_BEGIN, measure.id, detail=measure.words)
+                )
         return sorted(found, key=lambda event: event.time)
 
-    def _close(self, end: float) -> None:
+    def _update_closed(self, end: float) -> None:
         """Know what is closed in the step that ends at ``end``."""
         active = [one for one in self._closed if one.begin < end and one.end >= end]
         self._pairs = {one.vclass: frozenset(one.pairs) for one in active}
         self._inside = set()
 
-    def _departing(self, begin: float, end: float) -> list[str]:
+    def _departing_between(self, begin: float, end: float) -> list[str]:
         return self._names[bisect_left(self._departs, begin) : bisect_left(self._departs, end)]
 
-    def _divert(self, session: Session, vehicles: Iterable[str], time: float) -> list[Event]:
+    def _divert_vehicles(
+        self, session: Session, vehicles: Iterable[str], time: float
+    ) -> list[Event]:
         events = []
         for name in sorted(vehicles):
             self._inside.discard(name)
@@ -115,7 +124,7 @@ class Diversions:
             if route is not None and session.set_route(name, ahead.start + route):
                 continue
             if session.has_departed(name):
-                events.append(self._strand(session, name, time))
+                events.append(self._strand_vehicle(session, name, time))
             else:  # SUMO does not bear that a vehicle is taken out before it has departed
                 session.set_route(name, ahead.start + ahead.edges[:last])
                 self._cut_off.add(name)
@@ -125,9 +134,9 @@ class Diversions:
         """Take out those who found no route when they were to depart, and have departed now."""
         departed = [name for name in sorted(self._cut_off) if session.has_departed(name)]
         self._cut_off.difference_update(departed)
-        return [self._strand(session, name, time) for name in departed]
+        return [self._strand_vehicle(session, name, time) for name in departed]
 
-    def _strand(self, session: Session, name: str, time: float) -> Event:
+    def _strand_vehicle(self, session: Session, name: str, time: float) -> Event:
         front = session.vehicle_front(name)
         session.take_out(name)
         if front is None:

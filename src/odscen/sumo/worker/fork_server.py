@@ -78,13 +78,13 @@ class _Children:
                 if self._ended in ready:
                     with suppress(BlockingIOError):
                         os.read(self._ended, _MOST_BYTES)
-                self._reap()
+                self._reap_children()
                 if control in ready:
                     return True
                 if not ready and not self._said_to:
                     return False
 
-    def _reap(self) -> None:
+    def _reap_children(self) -> None:
         while self._said_to:
             pid, status = os.waitpid(-1, os.WNOHANG)
             if not pid:
@@ -106,13 +106,13 @@ class _Children:
                 os.close(other)
             signal.set_wakeup_fd(-1)
             control.detach()  # it is stdin, which is replaced
-            _work(request, said_to, stdout, stderr, kept)
+            _work_as_simulation(request, said_to, stdout, stderr, kept)
         self._said_to[pid] = said_to
         for descriptor in descriptors[1:]:
             os.close(descriptor)
 
 
-def _work(
+def _work_as_simulation(
     request: dict[str, Any], said_to: int, stdout: int, stderr: int, kept: list[int]
 ) -> NoReturn:
     """Become the process of a simulation."""

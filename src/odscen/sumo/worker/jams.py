@@ -89,42 +89,46 @@ class JamWatch:
         """Jams that have begun or ended since the last look."""
         self.due = time + PERIOD
         queues: dict[str, list[StoppedVehicle]] = {}
-        for one in session.stopped.longer_than(WATCHED):
-            queues.setdefault(one.lane, []).append(one)
+        for vehicle in session.stopped.longer_than(WATCHED):
+            queues.setdefault(vehicle.lane, []).append(vehicle)
         jammed = {lane for lane, queue in queues.items() if max(q.waited for q in queue) >= JAMMED}
         self._seen.update((lane, time) for lane in self._since.keys() & queues.keys())
         over = [lane for lane, seen in self._seen.items() if time - seen >= RELEASE]
-        events = [self._end(time, lane) for lane in sorted(over)]
+        events = [self._end_jam(time, lane) for lane in sorted(over)]
         before, self.stops = self.stops, {}
         known: dict[str, Ahead | None] = {}
         for lane, queue in sorted(queues.items()):
-            first = max(queue, key=lambda one: (one.pos, one.vehicle))
+            first = max(queue, key=lambda vehicle: (vehicle.pos, vehicle.vehicle))
             reason: StopReason | str
             reason, head = explain(session.stopped, first.vehicle, known)
             if reason in (StopReason.RED, StopReason.UNKNOWN) and first.vehicle in before:
                 reason = before[first.vehicle].reason
-            for one in queue:
-                self.stops[one.vehicle] = self._place(session, one, time, reason)
+            for vehicle in queue:
+                self.stops[vehicle.vehicle] = self._last_stop(session, vehicle, time, reason)
             if lane in jammed and lane not in self._since:
                 self._since[lane] = time - first.waited
                 self._seen[lane] = time
-                events.append(self._begin(time, first, len(queue), head))
+                events.append(self._begin_jam(time, first, len(queue), head))
         return events
 
     def road_is_empty(self, time: float) -> list[Event]:
         """Jams that are over because the road is empty."""
-        return [self._end(time, lane) for lane in sorted(self._since)]
+        return [self._end_jam(time, lane) for lane in sorted(self._since)]
 
-    def _place(
-        self, session: Session, one: StoppedVehicle, time: float, reason: StopReason | str
+    def _last_stop(
+        self,
+        session: Session,
+        stopped_vehicle: StoppedVehicle,
+        time: float,
+        reason: StopReason | str,
     ) -> LastStop:
-        front = session.vehicle_front(one.vehicle)
+        front = session.vehicle_front(stopped_vehicle.vehicle)
         dx, dy = self._offset
         x = None if front is None else front.x - dx
         y = None if front is None else front.y - dy
-        return LastStop(one.lane, x, y, time - one.waited, reason)
+        return LastStop(stopped_vehicle.lane, x, y, time - stopped_vehicle.waited, reason)
 
-    def _begin(self, time: float, first: StoppedVehicle, queue: int, head: str) -> Event:
+    def _begin_jam(self, time: float, first: StoppedVehicle, queue: int, head: str) -> Event:
         stop = self.stops[first.vehicle]
         return Event(
             time,
@@ -139,7 +143,7 @@ class JamWatch:
             queue=queue,
         )
 
-    def _end(self, time: float, lane: str) -> Event:
+    def _end_jam(self, time: float, lane: str) -> Event:
         lasted = self._seen.pop(lane) - self._since.pop(lane)
         return Event(time, EventKind.JAM_END, "", lane=lane, waited=lasted)
 
@@ -157,19 +161,21 @@ def explain(
     """
     known = {} if known is None else known
     head, seen = vehicle, {vehicle}
-    ahead = _ahead(stopped, vehicle, known)
+    ahead = _vehicle_ahead(stopped, vehicle, known)
     while ahead is not None and _own_reason(ahead) is None and ahead.leader:
         if ahead.leader in seen or len(seen) >= _HOPS:
             return StopReason.CIRCLE if ahead.leader in seen else StopReason.NO_ROOM, head
         head = ahead.leader
         seen.add(head)
-        ahead = _ahead(stopped, head, known)
+        ahead = _vehicle_ahead(stopped, head, known)
     if ahead is None:
         return StopReason.UNKNOWN, head
     return _own_reason(ahead) or StopReason.UNKNOWN, head
 
 
-def _ahead(stopped: StoppedVehicles, vehicle: str, known: dict[str, Ahead | None]) -> Ahead | None:
+def _vehicle_ahead(
+    stopped: StoppedVehicles, vehicle: str, known: dict[str, Ahead | None]
+) -> Ahead | None:
     if vehicle not in known:
         known[vehicle] = stopped.ahead(vehicle)
     return known[vehicle]

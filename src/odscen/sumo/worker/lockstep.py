@@ -88,7 +88,7 @@ class LockstepWatch:
         """Tell of the step just made and obey until the next; false if the run is to stop."""
         self.show(session, recorder)
         while True:
-            command = self._next()
+            command = self._next_command()
             if isinstance(command, EgoPose):
                 if self.placed is not None:
                     session.place(self.placed, command)
@@ -120,8 +120,8 @@ class LockstepWatch:
         vehicles = vehicles._replace(signals=vehicles.signals | doors)
         rows = np.concatenate(
             [
-                self._rows(vehicles, session.vehicle_places(vehicles.ids)),
-                self._rows(persons, session.person_places(persons.ids)),
+                self._rows_to_send(vehicles, session.vehicle_places(vehicles.ids)),
+                self._rows_to_send(persons, session.person_places(persons.ids)),
             ]
         ).tobytes()
         states = session.light_states()
@@ -139,7 +139,7 @@ class LockstepWatch:
         )
         self._send(state, rows)
 
-    def _rows(self, poses: Poses, places: list[tuple[str, float]]) -> np.ndarray:
+    def _rows_to_send(self, poses: Poses, places: list[tuple[str, float]]) -> np.ndarray:
         import numpy as np
 
         rows = np.empty((len(poses.ids), COLUMNS), dtype="<f8")
@@ -153,7 +153,7 @@ class LockstepWatch:
         rows[:, 7] = [pos for _, pos in places]
         return rows[(rows[:, 0] >= 0) & (np.abs(rows[:, 1]) < INVALID)]
 
-    def _next(self) -> Command | EgoPose | Outside | MoreRules:
+    def _next_command(self) -> Command | EgoPose | Outside | MoreRules:
         """Wait for the next command; to stop, once there is no one to give one."""
         while not self._queue:
             block = os.read(self._commands, _BLOCK)

@@ -231,10 +231,15 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 def encode(message: Message | Command | EgoPose | Outside | MoreRules) -> str:
     """One line, newline included."""
-    return json.dumps({"kind": _NAMES[type(message)], **_fields(message)}, default=_fields) + "\n"
+    return (
+        json.dumps(
+            {"kind": _NAMES[type(message)], **_shallow_fields(message)}, default=_shallow_fields
+        )
+        + "\n"
+    )
 
 
-def _fields(one: Any) -> dict[str, Any]:
+def _shallow_fields(one: Any) -> dict[str, Any]:
     """What ``asdict`` gives, one level; it would copy each text."""
     return {field.name: getattr(one, field.name) for field in fields(one)}
 

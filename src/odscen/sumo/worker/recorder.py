@@ -115,29 +115,29 @@ class Recorder:
         self._put_by: list[_EventfulStep] = []
 
     @cached_property
-    def _planned(self) -> dict[str, PlannedActor]:
+    def _planned_by_id(self) -> dict[str, PlannedActor]:
         return {actor.id: actor for actor in self._plan.actors}
 
     @cached_property
-    def _parks(self) -> _ParkedTrips:
+    def _parked_trips(self) -> _ParkedTrips:
         return _ParkedTrips(self._plan)
 
     @property
     def events(self) -> list[Event]:
         """Events since the last :meth:`drain`, in order of time."""
-        self._settle()
+        self._settle_steps()
         return self._events
 
     @property
     def departed(self) -> int:
         """How many vehicles and persons have departed so far."""
-        self._settle()
+        self._settle_steps()
         return self._departed
 
     @property
     def arrived(self) -> int:
         """How many vehicles and persons have arrived so far."""
-        self._settle()
+        self._settle_steps()
         return self._arrived
 
     def since(self, number: int) -> list[Event]:
@@ -157,10 +157,10 @@ class Recorder:
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
-        self._settle()
-        return self._state()
+        self._settle_steps()
+        return self._saved_state()
 
-    def _state(self) -> dict[str, Any]:
+    def _saved_state(self) -> dict[str, Any]:
         return {
             "drained": self.drained,
             "departed": self._departed,
@@ -169,8 +169,8 @@ class Recorder:
             "touching": sorted(self._touching),
             "stopping": sorted(self._stopping),
             "jams": self._jams.state(),
-            "left": sorted(self._parks.left),
-            "parked": sorted(self._parks.parked),
+            "left": sorted(self._parked_trips.left),
+            "parked": sorted(self._parked_trips.parked),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -182,7 +182,10 @@ class Recorder:
         self._touching = {(one, other) for one, other in state["touching"]}
         self._stopping = set(state["stopping"])
         self._jams.restore(state["jams"])
-        self._parks.left, self._parks.parked = set(state["left"]), set(state["parked"])
+        self._parked_trips.left, self._parked_trips.parked = (
+            set(state["left"]),
+            set(state["parked"]),
+        )
 
     def hand_over(self) -> dict[str, Any]:
         """What another process needs to go on as this one would, for JSON; nothing is gone through.
@@ -191,7 +194,7 @@ class Recorder:
         """
         return {
             "events": self._events,
-            "state": self._state(),
+            "state": self._saved_state(),
             "numbers": (self._number, self._settled),
             "put_by": self._put_by,
         }
@@ -199,7 +202,7 @@ class Recorder:
     def take_over(self, left: Mapping[str, Any]) -> None:
         """Inverse of :meth:`hand_over`."""
         self.restore(left["state"])
-        self._events = list(map(_event, left["events"]))
+        self._events = list(map(_read_event, left["events"]))
         self._number, self._settled = left["numbers"]
         self._put_by = [_eventful_step(*row) for row in left["put_by"]]
 
@@ -218,8 +221,8 @@ class Recorder:
 
     def arrive(self, time: float, name: str) -> None:
         """Record an arrival that SUMO does not report: at the goal that a rule has given."""
-        self._settle()
-        self._arrive(time, name)
+        self._settle_steps()
+        self._record_arrival(time, name)
 
     def lose(self, time: float, names: Iterable[str]) -> None:
         """Say that SUMO did not bring these back with a saved state."""
@@ -241,13 +244,13 @@ class Recorder:
         if jams:
             self._put_by.append(_EventfulStep(self._number, time, None, _NO_STOPS, jams))
 
-    def _settle(self) -> None:
+    def _settle_steps(self) -> None:
         """Go through the steps that were put by."""
         steps, self._put_by = self._put_by, []
         for number, time, lists, stops, jams in steps:
             if lists is not None:
                 self._quiet_before(number)
-                self._record(time, lists, stops)
+                self._record_step(time, lists, stops)
                 self._settled = number
             self._events.extend(jams)
         self._quiet_before(self._number + 1)
@@ -257,35 +260,35 @@ class Recorder:
         if self._settled < number - 1:
             self._touching, self._stopping = set(), set()
 
-    def _record(self, time: float, lists: StepLists, stops: Mapping[str, LastStop]) -> None:
+    def _record_step(self, time: float, lists: StepLists, stops: Mapping[str, LastStop]) -> None:
         fronts = lists.fronts
         self._departures_of(time, lists)
         for vehicle in lists.teleports_started:
-            self._teleport(time, vehicle, stops.get(vehicle))
+            self._record_teleport(time, vehicle, stops.get(vehicle))
         for vehicle in lists.teleports_ended:
-            self._place(time, EventKind.TELEPORT_END, vehicle, fronts[vehicle])
-        self._stops(time, lists.emergency_stops, fronts)
-        self._collisions(time, lists.collisions)
+            self._record_place(time, EventKind.TELEPORT_END, vehicle, fronts[vehicle])
+        self._record_emergency_stops(time, lists.emergency_stops, fronts)
+        self._record_collisions(time, lists.collisions)
         self._arrivals_of(time, lists)
 
     def _departures_of(self, time: float, lists: StepLists) -> None:
         fronts = lists.fronts
         for name in (*lists.departed, *lists.departed_persons):
-            if not self._parks.still_parked(name):
-                self._depart(time, name, fronts[name])
+            if not self._parked_trips.still_parked(name):
+                self._record_departure(time, name, fronts[name])
         for name in lists.unparked:
-            if self._parks.leaves(name):
-                self._depart(time, name, fronts[name])
+            if self._parked_trips.leaves(name):
+                self._record_departure(time, name, fronts[name])
 
     def _arrivals_of(self, time: float, lists: StepLists) -> None:
         for name in lists.parked:
-            if name in self._departures and self._parks.ends(name):
-                self._arrive(time, name)
+            if name in self._departures and self._parked_trips.ends(name):
+                self._record_arrival(time, name)
         for name in (*lists.arrived, *lists.arrived_persons):
-            if not self._parks.has_ended(name):
-                self._arrive(time, name)
+            if not self._parked_trips.has_ended(name):
+                self._record_arrival(time, name)
 
-    def _depart(self, time: float, name: str, front: Front | None) -> None:
+    def _record_departure(self, time: float, name: str, front: Front | None) -> None:
         if name in self._departures:  # back on the road after a teleport is no second departure
             return
         self._departures[name] = time
@@ -293,7 +296,7 @@ class Recorder:
         if front is None:
             self._events.append(Event(time, EventKind.DEPARTED, name))
             return
-        planned = self._planned.get(name)
+        planned = self._planned_by_id.get(name)
         length = planned.length if planned else 0.0
         x, y = body_centre(
             front.x, front.y, front.angle_deg, length=length, net_offset=self._offset
@@ -302,13 +305,13 @@ class Recorder:
         error = math.hypot(x - planned.x, y - planned.y) if planned and placed else None
         self._events.append(Event(time, EventKind.DEPARTED, name, x=x, y=y, error=error))
 
-    def _arrive(self, time: float, name: str) -> None:
+    def _record_arrival(self, time: float, name: str) -> None:
         self._arrived += 1
         departed = self._departures.pop(name, None)
         spent = None if departed is None else time - departed
         self._events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
 
-    def _teleport(self, time: float, vehicle: str, stop: LastStop | None) -> None:
+    def _record_teleport(self, time: float, vehicle: str, stop: LastStop | None) -> None:
         """Report where and why it was stopped until now, as it has no place any more."""
         if stop is None:
             self._events.append(Event(time, EventKind.TELEPORT_START, vehicle))
@@ -326,23 +329,23 @@ class Recorder:
             )
         )
 
-    def _place(self, time: float, kind: EventKind, name: str, front: Front | None) -> None:
+    def _record_place(self, time: float, kind: EventKind, name: str, front: Front | None) -> None:
         if front is None:
             self._events.append(Event(time, kind, name))
             return
         dx, dy = self._offset
         self._events.append(Event(time, kind, name, x=front.x - dx, y=front.y - dy))
 
-    def _stops(
+    def _record_emergency_stops(
         self, time: float, stopping: Sequence[str], fronts: Mapping[str, Front | None]
     ) -> None:
         """Report the first step only of each emergency stop."""
         for vehicle in stopping:
             if vehicle not in self._stopping:
-                self._place(time, EventKind.EMERGENCY_STOP, vehicle, fronts[vehicle])
+                self._record_place(time, EventKind.EMERGENCY_STOP, vehicle, fronts[vehicle])
         self._stopping = set(stopping)
 
-    def _collisions(self, time: float, collisions: Sequence[Collision]) -> None:
+    def _record_collisions(self, time: float, collisions: Sequence[Collision]) -> None:
         """Report a pair once, when it begins to touch."""
         touching = {(c.collider, c.victim) for c in collisions}
         for collision in collisions:
@@ -361,7 +364,7 @@ class Recorder:
         self._touching = touching
 
 
-def _event(row: Sequence[Any]) -> Event:
+def _read_event(row: Sequence[Any]) -> Event:
     """Event from its JSON."""
     time, kind, *values = row
     return Event(time, EventKind(kind), *values)
@@ -377,4 +380,4 @@ def _eventful_step(
     """Step from its JSON."""
     known = {name: LastStop.from_row(row) for name, row in stops.items()}
     found = None if lists is None else StepLists.from_row(lists)
-    return _EventfulStep(number, time, found, known, tuple(map(_event, jams)))
+    return _EventfulStep(number, time, found, known, tuple(map(_read_event, jams)))

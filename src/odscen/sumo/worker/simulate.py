@@ -105,12 +105,12 @@ def run_plan(plan_file: Path, how: Sequence[str] = (), *, raw: bool = False) -> 
         try:
             plan = _read_plan(plan_file)
             if plan.slice_length is None:
-                watch = _watch(plan, folder, how, send) if how else None
+                watch = _open_watch(plan, folder, how, send) if how else None
                 send(simulate(plan, folder, send, watch, raw=raw))
                 return 0
             end = _run_slices(plan, folder, send, how)
         except _FAILURES as error:
-            send(Failed(_words(error)))
+            send(Failed(_describe_error(error)))
             return FAILED
     if end.following is not None:
         _begin_anew(end.following)
@@ -147,13 +147,13 @@ def _run_slice(
     plan: Plan, folder: Path, send: Send, completion: Completion, how: Sequence[str]
 ) -> End:
     try:
-        watch = _watch(plan, folder, how, send) if how else None
-        with _stepper(plan, folder, send, watch) as stepper:
+        watch = _open_watch(plan, folder, how, send) if how else None
+        with _open_stepper(plan, folder, send, watch) as stepper:
             done = run_slice(plan, folder, stepper, completion)
     except CompleterGoneError:
         return End(COMPLETER_GONE)
     except _FAILURES as error:
-        send(Failed(_words(error)))
+        send(Failed(_describe_error(error)))
         return End(FAILED)
     if done is not None:
         send(done)
@@ -162,7 +162,7 @@ def _run_slice(
     return End(0, [encode(one) for one in following])
 
 
-def _words(error: Exception) -> str:
+def _describe_error(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return NO_MEMORY
     return system_words(error) if isinstance(error, OSError) else str(error)
@@ -191,7 +191,7 @@ def simulate(
     start = time.perf_counter()
     sumo = folder / SUMO_FOLDER
     arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(folder, sumo)]
-    with _stepper(plan, folder, send, watch) as stepper:
+    with _open_stepper(plan, folder, send, watch) as stepper:
         with open_session(arguments) as session:
             now = stepper.run(session, plan.until)
             lengths = session.lanes.lengths()
@@ -204,10 +204,10 @@ def simulate(
 
 
 @contextmanager
-def _stepper(
+def _open_stepper(
     plan: Plan, folder: Path, send: Send, watch: Watch | LockstepWatch | None
 ) -> Iterator[Stepper]:
-    stepper = Stepper(plan, send, watch, _story(plan, folder), _behaviour(plan, folder))
+    stepper = Stepper(plan, send, watch, _open_story(plan, folder), _open_behaviour(plan, folder))
     try:
         yield stepper
     finally:
@@ -215,7 +215,7 @@ def _stepper(
             stepper.behaviour.close()
 
 
-def _story(plan: Plan, folder: Path) -> StoryRun | None:
+def _open_story(plan: Plan, folder: Path) -> StoryRun | None:
     """Rules of the run; without any, nothing of theirs is imported."""
     if not (folder / SUMO_FOLDER / STORY_FILE).is_file():
         return None
@@ -224,7 +224,7 @@ def _story(plan: Plan, folder: Path) -> StoryRun | None:
     return StoryRun.in_folder(folder, plan)
 
 
-def _behaviour(plan: Plan, folder: Path) -> BehaviourRun | None:
+def _open_behaviour(plan: Plan, folder: Path) -> BehaviourRun | None:
     """What drives instead of SUMO; without it, nothing of it is imported."""
     if not (folder / SUMO_FOLDER / BEHAVIOUR_FILE).is_file():
         return None
@@ -240,7 +240,7 @@ def _begin_anew(following: Sequence[str]) -> None:
     os.execv(sys.executable, arguments)  # noqa: S606 - no shell is wanted
 
 
-def _watch(plan: Plan, folder: Path, how: Sequence[str], send: Send) -> Watch | LockstepWatch:
+def _open_watch(plan: Plan, folder: Path, how: Sequence[str], send: Send) -> Watch | LockstepWatch:
     start, *heard = map(decode, how)
     if isinstance(start, Lockstep):
         return LockstepWatch(plan, start, sys.stdin.fileno(), send)
@@ -250,14 +250,14 @@ def _watch(plan: Plan, folder: Path, how: Sequence[str], send: Send) -> Watch | 
         step_length=plan.step_length,
         heard=[command for command in heard if isinstance(command, Command)],
     )
-    return Watch(plan, steering, send, detectors=_detectors(folder))
+    return Watch(plan, steering, send, detectors=_read_detectors(folder))
 
 
-def _detectors(folder: Path) -> list[str]:
+def _read_detectors(folder: Path) -> list[str]:
     """SUMO's ids of the detectors that lights are shown with."""
     file = folder / LIGHTS_FILE
     lights = programs_from_json(file.read_text(encoding="utf-8")) if file.is_file() else ()
-    return [one.id for light in lights for one in light.detectors]
+    return [detector.id for light in lights for detector in light.detectors]
 
 
 if __name__ == "__main__":

@@ -102,8 +102,8 @@ class _RunningSlice:
         routes = part / layout.ROUTES_FILE
         offset = self._routes.cut(before.routes if before else 0, self._end, routes)
         more = self._end < self._plan.until and self._routes.more(offset)
-        with _session(self._arguments(part), self._number) as session:
-            self._compare(session, stepper)
+        with _open_slice_session(self._slice_arguments(part), self._number) as session:
+            self._compare_restored(session, stepper)
             now = stepper.run(session, self._end, more=more)
             last = self._is_last(session, stepper, now, more=more)
             present = session.present()
@@ -137,7 +137,7 @@ class _RunningSlice:
         parked = frozenset(before.recorder["parked"]) if before else frozenset()
         return Written(part, checkpoint, events, lengths, before.lanes if before else {}, parked)
 
-    def _arguments(self, part: Path) -> list[str]:
+    def _slice_arguments(self, part: Path) -> list[str]:
         sumo = self._run / layout.SUMO_FOLDER
         arguments = ["--configuration-file", str(sumo / layout.CONFIG_FILE)]
         arguments += ["--route-files", str(part / layout.ROUTES_FILE), *_SAVING]
@@ -147,7 +147,7 @@ class _RunningSlice:
             arguments += ["--load-state", str(state), "--begin", f"{self._before.time:g}"]
         return arguments
 
-    def _compare(self, session: Session, stepper: Stepper) -> None:
+    def _compare_restored(self, session: Session, stepper: Stepper) -> None:
         """Say who has not come back; none has ever been seen to be lost, but we look."""
         if self._before is None:
             return
@@ -164,7 +164,7 @@ class _RunningSlice:
 
 
 @contextmanager
-def _session(arguments: list[str], number: int) -> Iterator[Session]:
+def _open_slice_session(arguments: list[str], number: int) -> Iterator[Session]:
     try:
         with open_session(arguments) as session:
             yield session

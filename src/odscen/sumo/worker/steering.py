@@ -59,7 +59,9 @@ class Steering:
         for command in heard:
             self._queue.put(command)
         self._enough, self._no_more = os.pipe()
-        self._ear = threading.Thread(target=self._listen, args=(commands,), daemon=True)
+        self._ear = threading.Thread(
+            target=self._listen_for_commands, args=(commands,), daemon=True
+        )
         self._ear.start()
 
     def hand_over(self) -> list[Pace | Command]:
@@ -86,21 +88,21 @@ class Steering:
         idle
             Called before each wait with true, or once with false if there is no time to lose.
         """
-        self._drain()
+        self._drain_queue()
         while not self.stopped:
             if self._steps:
                 self._steps -= 1
                 idle(False)
                 return True
-            pause = None if self.paused else self._slack()
+            pause = None if self.paused else self._seconds_of_slack()
             if pause is not None and pause <= 0:
                 idle(False)
                 return True
             idle(True)
-            self._wait(pause)
+            self._wait_for_commands(pause)
         return False
 
-    def _slack(self) -> float:
+    def _seconds_of_slack(self) -> float:
         """Seconds until the next step is due; sets when the one after it is, once it is."""
         if self.speed is None:
             return 0.0
@@ -110,18 +112,18 @@ class Steering:
         self._due = max(self._due, now - MAX_LAG) + self._step_length / self.speed
         return 0.0
 
-    def _wait(self, seconds: float | None) -> None:
+    def _wait_for_commands(self, seconds: float | None) -> None:
         try:
-            self._obey(self._queue.get(timeout=seconds))
+            self._obey_command(self._queue.get(timeout=seconds))
         except Empty:
             return
-        self._drain()
+        self._drain_queue()
 
-    def _drain(self) -> None:
+    def _drain_queue(self) -> None:
         while not self._queue.empty():
-            self._obey(self._queue.get())
+            self._obey_command(self._queue.get())
 
-    def _obey(self, command: Command) -> None:
+    def _obey_command(self, command: Command) -> None:
         if command.do == "frame":
             self.frame_wanted = True
         elif command.do == "stop":
@@ -136,7 +138,7 @@ class Steering:
             self.paused = True
             self._steps = self._steps + 1 if command.do == "step" else 0
 
-    def _listen(self, commands: int) -> None:
+    def _listen_for_commands(self, commands: int) -> None:
         # os.read and not a file object: its lock, held by a thread that waits, would end the
         # interpreter with a fatal error.
         rest = b""

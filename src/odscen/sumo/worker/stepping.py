@@ -111,22 +111,22 @@ class Stepper:
             self._take_rules(session)
             if self.over:
                 break
-            now = self._step(session, now)
+            now = self._make_step(session, now)
             if clock() - self._sent >= MESSAGE_PAUSE:
                 self._sent = clock()
-                self._report(session, now, self._busy + self._sent - begin - waited)
+                self._report_progress(session, now, self._busy + self._sent - begin - waited)
         self._take_rules(session)
         self._busy += clock() - begin - waited
-        self._finish(session, now, more=more)
+        self._finish_run(session, now, more=more)
         return now
 
-    def _step(self, session: Session, now: float) -> float:
+    def _make_step(self, session: Session, now: float) -> float:
         """Make a step, with what measures and rules do before and after it; seconds then."""
         recorder = self.recorder
         if self._diversions is not None:
             recorder.add(self._diversions.before_step(session, now, self._plan.step_length))
         if self.behaviour is not None:
-            self.behaviour.before_step(session, self._taken())
+            self.behaviour.before_step(session, self._moved_by_others())
         after = session.step()
         recorder.record(session, now)
         if self.story is not None or self._led is not None:
@@ -136,7 +136,7 @@ class Stepper:
         self.steps += 1
         return after
 
-    def _taken(self) -> Collection[str]:
+    def _moved_by_others(self) -> Collection[str]:
         """Who is moved by rules or by another program."""
         moved = frozenset() if self.story is None else self.story.moved
         placed = self._watch.placed if isinstance(self._watch, LockstepWatch) else None
@@ -157,7 +157,7 @@ class Stepper:
             self.story.after_step(self._due, self.recorder)
         self._due = None
 
-    def _finish(self, session: Session, now: float, *, more: bool) -> None:
+    def _finish_run(self, session: Session, now: float, *, more: bool) -> None:
         """Say how it ends, if it does, and show it to who watches."""
         empty = not more and session.expected() == 0 and not self.waits
         if empty:
@@ -166,9 +166,9 @@ class Stepper:
             self.recorder.add(self._diversions.last_events(now))
         if self._watch is not None:
             self._watch.show_last(session, self.recorder)
-            self._report(session, now, self._busy)
+            self._report_progress(session, now, self._busy)
 
-    def _report(self, session: Session, now: float, busy: float) -> None:
+    def _report_progress(self, session: Session, now: float, busy: float) -> None:
         recorder, plan = self.recorder, self._plan
         self._send(
             Progress(

@@ -81,20 +81,20 @@ class Watch:
         if not self.steering.next_step(idle):
             return False
         self._step += 1
-        self._measure()
+        self._measure_pace()
         return True
 
     def show(self, session: Session, recorder: Recorder) -> None:
         """Send a frame if one is wanted and this step has none yet; and what has changed."""
         if self.steering.frame_wanted and self._framed != self._step:
-            self._show(session, recorder)
+            self._show_frame(session, recorder)
 
     def show_last(self, session: Session, recorder: Recorder) -> None:
         """Send the last frame, wanted or not: a user may ask for it later."""
         if self._framed != self._step:
-            self._show(session, recorder)
+            self._show_frame(session, recorder)
 
-    def _show(self, session: Session, recorder: Recorder) -> None:
+    def _show_frame(self, session: Session, recorder: Recorder) -> None:
         self.steering.frame_wanted = False
         self._framed = self._step
         start = time.monotonic()
@@ -135,7 +135,7 @@ class Watch:
         if rows:
             self._send(Incidents(rows), b"")
 
-    def _measure(self) -> None:
+    def _measure_pace(self) -> None:
         now, (then, step) = time.monotonic(), self._mark
         if now - then >= _WINDOW:
             self._factor = (self._step - step) * self._step_length / (now - then)

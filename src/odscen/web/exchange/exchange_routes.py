@@ -143,7 +143,7 @@ def import_files(
 ) -> JobStarted:
     """Make a scenario of a file of a foreign format, in the background; the result is its name."""
     options = _given_options(option, ego=ego)
-    sent = [SentFile(one.filename or "file", one.file.read()) for one in files]
+    sent = [SentFile(file.filename or "file", file.file.read()) for file in files]
 
     def work(progress: ProgressCallback) -> JobResult:
         progress("starting", 0.0)
@@ -163,7 +163,7 @@ def import_files(
 def import_report(name: str, shared: Shared) -> ImportInfo:
     """What became of each element of the file that a scenario was imported from."""
     row = shared.drafts.row(name)
-    about = json.loads(_kept(shared, name, _REPORT))
+    about = json.loads(_read_kept(shared, name, _REPORT))
     return ImportInfo(
         scenario=name,
         file=about["file"],
@@ -180,7 +180,7 @@ def import_report(name: str, shared: Shared) -> ImportInfo:
 def import_plan(name: str, shared: Shared) -> Response:
     """Plan of the sweep that the imported file describes, for ``odscen sweep --plan``."""
     headers = {"Content-Disposition": f'attachment; filename="{name}.sweep.json"'}
-    content = _kept(shared, name, _PLAN)
+    content = _read_kept(shared, name, _PLAN)
     return Response(content, media_type="application/json", headers=headers)
 
 
@@ -242,7 +242,7 @@ def _as_download(files: ExportedFiles, name: str, options: Mapping[str, str]) ->
     return Response(files.zipped(), media_type="application/zip", headers=headers)
 
 
-def _kept(shared: Services, name: str, file: str) -> str:
+def _read_kept(shared: Services, name: str, file: str) -> str:
     found = shared.drafts.kept(name, file)
     if found is None:
         what = "import report of scenario" if file == _REPORT else "plan of a sweep of scenario"

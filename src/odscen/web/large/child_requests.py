@@ -29,7 +29,7 @@ def answer_request(
 ) -> dict[str, Any]:
     """Answer a request that was written into a folder, there; a job of a child."""
     progress("working on the scenario", 0.0)
-    asyncio.run(_answer(_application(workspace), Path(folder)))
+    asyncio.run(_answer_request(_child_application(workspace), Path(folder)))
     return {}
 
 
@@ -58,12 +58,12 @@ def whole_day(
 
 def services_in_child(workspace: str) -> Services:
     """Services of a child, which has the large documents to itself."""
-    services: Services = _application(workspace).state.services
+    services: Services = _child_application(workspace).state.services
     return services
 
 
 @lru_cache(maxsize=1)
-def _application(workspace: str) -> FastAPI:
+def _child_application(workspace: str) -> FastAPI:
     app = create_app(Workspace.open(Path(workspace)), hosts=None, in_child=True)
 
     @app.exception_handler(MemoryError)
@@ -73,7 +73,7 @@ def _application(workspace: str) -> FastAPI:
     return app
 
 
-async def _answer(app: FastAPI, folder: Path) -> None:
+async def _answer_request(app: FastAPI, folder: Path) -> None:
     said = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
     body = (folder / BODY).read_bytes()
     scope = {

@@ -102,7 +102,7 @@ class LargeDocuments:
         folder = await run_sync(scratch.enter_context, scratch_folder())
         try:
             await _write_down(request, folder)
-            await run_sync(self._answered, folder, name, limiter=self._children)
+            await run_sync(self._hold_name, folder, name, limiter=self._children)
             response = await run_sync(_read_answer, folder, scratch)
         except BaseException:
             scratch.close()
@@ -111,7 +111,7 @@ class LargeDocuments:
             await run_sync(scratch.close)
         return response
 
-    def _answered(self, folder: Path, name: str | None) -> None:
+    def _hold_name(self, folder: Path, name: str | None) -> None:
         with self._names[name] if name and is_name(name) else nullcontext():
             sent = (folder / BODY).stat().st_size
             work_in_child(
@@ -187,14 +187,14 @@ def _read_answer(folder: Path, scratch: ExitStack) -> Response:
     if content.stat().st_size <= _PIECE:
         response = Response(content.read_bytes(), head["status"])
     else:
-        response = StreamingResponse(_pieces(folder, scratch), head["status"])
+        response = StreamingResponse(_read_pieces(folder, scratch), head["status"])
     response.raw_headers = [
         (name.encode("latin-1"), value.encode("latin-1")) for name, value in head["headers"]
     ]
     return response
 
 
-async def _pieces(folder: Path, scratch: ExitStack) -> AsyncIterator[bytes]:
+async def _read_pieces(folder: Path, scratch: ExitStack) -> AsyncIterator[bytes]:
     try:
         async with await anyio.open_file(folder / ANSWER, "rb") as content:
             while piece := await content.read(_PIECE):

@@ -66,26 +66,26 @@ class LargeRun:
             stderr=self._log,
             start_new_session=True,
         )
-        self._tell(
+        self._send_message(
             {
                 "workspace": str(workspace.root),
                 "scenario": str(scenario),
                 "name": name,
                 "settings": settings.to_dict(),
-                "introduction": str(self._introduction),
+                "introduction": str(self._introduction_file),
                 "paused": live.start.paused,
                 "speed": live.start.speed,
             }
         )
-        self.scenario: Scenario = loads(self._said()["scenario"])
+        self.scenario: Scenario = loads(self._read_answer()["scenario"])
 
     def introduction(self) -> str:
         """Text that introduces all road users to who watches the run, once it is prepared."""
-        return self._introduction.read_text(encoding="utf-8")
+        return self._introduction_file.read_text(encoding="utf-8")
 
     def end(self) -> None:
         """End it before it has begun."""
-        self._close()
+        self._close_process()
         self.forget()
 
     def forget(self) -> None:
@@ -119,11 +119,11 @@ class LargeRun:
         """
         failed: str | None = None
         try:
-            self._write(f"{name}\n".encode())
-            said = self._said()
+            self._write_line(f"{name}\n".encode())
+            said = self._read_answer()
             while "preparing" in said:
                 preparing(said["preparing"])
-                said = self._said()
+                said = self._read_answer()
             prepared(said["slice_length"])
             self._live.attach(self._process)
             for message, payload in messages(self._process):
@@ -134,22 +134,22 @@ class LargeRun:
                     failed = message.reason
         finally:
             self._live.detach()
-            self._close()
+            self._close_process()
         return failed
 
-    def _close(self) -> None:
+    def _close_process(self) -> None:
         with self._process:
             self._process.kill()
         self._log.close()
 
     @property
-    def _introduction(self) -> Path:
+    def _introduction_file(self) -> Path:
         return self._folder / "introduction.json"
 
-    def _tell(self, message: dict[str, Any]) -> None:
-        self._write(json.dumps(message).encode() + b"\n")
+    def _send_message(self, message: dict[str, Any]) -> None:
+        self._write_line(json.dumps(message).encode() + b"\n")
 
-    def _write(self, line: bytes) -> None:
+    def _write_line(self, line: bytes) -> None:
         stdin: IO[bytes] | None = self._process.stdin
         assert stdin is not None
         try:
@@ -158,20 +158,20 @@ class LargeRun:
         except BrokenPipeError:
             return  # why it has ended is asked next
 
-    def _said(self) -> dict[str, Any]:
+    def _read_answer(self) -> dict[str, Any]:
         """The next line of the process; its error is raised here."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         said: dict[str, Any] = json.loads(line) if line else {}
         if not said or "error" in said:
-            words = self._words()
+            words = self._read_log_end()
             self.end()
             if said:
                 raise error_from_data(said["error"])
             raise ToolError("the process of the run has ended without a result", output=words)
         return said
 
-    def _words(self) -> str:
+    def _read_log_end(self) -> str:
         self._log.seek(0)
         return self._log.read().decode("utf-8", "replace")[-2000:]
 

@@ -52,7 +52,7 @@ def make_day(
         )
         if not large:
             text = Path(scratch, "made").read_text(encoding="utf-8")
-            shared.drafts.change(name, wish.version, _label(wish), lambda _: loads(text))
+            shared.drafts.change(name, wish.version, _label_of_day(wish), lambda _: loads(text))
     return JobResult(name, day=DayMade(**day))
 
 
@@ -82,11 +82,11 @@ def day_made(
         scenario, sizing = sized(shared.workspace, scenario, only=wish.day, tell=tell)
         load, found = load.times(sizing.share), sizing.words
     if made is None:
-        shared.drafts.change(name, wish.version, _label(wish), lambda _: scenario)
+        shared.drafts.change(name, wish.version, _label_of_day(wish), lambda _: scenario)
     else:
         write_text(made, dumps(scenario))
     return DayMade(found=found, **load._asdict())
 
 
-def _label(wish: WholeDay) -> str:
+def _label_of_day(wish: WholeDay) -> str:
     return f"A {wish.day} of the whole town"

@@ -40,7 +40,7 @@ async def camera(run: str, shared: Shared) -> Response:
         raise NotFoundError("camera of run", run, [])
     kind = f"multipart/x-mixed-replace; boundary={_BOUNDARY}"
     return StreamingResponse(
-        _pictures(active), media_type=kind, headers={"Cache-Control": "no-store"}
+        _yield_pictures(active), media_type=kind, headers={"Cache-Control": "no-store"}
     )
 
 
@@ -50,7 +50,7 @@ def parity(run: str, shared: Shared) -> Response:
     return page_of_run(shared, run, layout.PARITY_FILE)
 
 
-async def _pictures(run: Active) -> AsyncIterator[bytes]:
+async def _yield_pictures(run: Active) -> AsyncIterator[bytes]:
     """Yield each newest picture; a slow client misses some."""
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
@@ -67,7 +67,7 @@ async def _pictures(run: Active) -> AsyncIterator[bytes]:
             shot = run.live.shot
             if shot.number > seen:
                 seen = shot.number
-                yield _part(shot.frame)
+                yield _multipart_part(shot.frame)
             if over:
                 return
             changed.clear()
@@ -77,6 +77,6 @@ async def _pictures(run: Active) -> AsyncIterator[bytes]:
         run.live.remove_watcher(wake)
 
 
-def _part(jpeg: bytes) -> bytes:
+def _multipart_part(jpeg: bytes) -> bytes:
     head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
     return head.encode() + jpeg + b"\r\n"

@@ -65,11 +65,11 @@ def entries(name: str, shared: Shared) -> list[EntryPlace]:
     graph = shared.map_of(scenario).sumo.graph
     return [
         EntryPlace(
-            segment=one.segment,
-            direction=one.direction,
-            lanes=[lane.lane for lane in one.lanes],
+            segment=entry.segment,
+            direction=entry.direction,
+            lanes=[lane.lane for lane in entry.lanes],
         )
-        for one in demands.find_entries(scenario, graph)
+        for entry in demands.find_entries(scenario, graph)
     ]
 
 

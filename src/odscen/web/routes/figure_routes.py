@@ -65,7 +65,10 @@ class InstalledFigureInfo(Answer):
 @router.get("/installed")
 def installed() -> list[InstalledFigureInfo]:
     """Figures that installed packages offer, for columns of sweeps."""
-    return [InstalledFigureInfo(**one._asdict()) for one in installed_figures()]
+    return [
+        InstalledFigureInfo(**installed_figure._asdict())
+        for installed_figure in installed_figures()
+    ]
 
 
 @router.get("")

@@ -69,13 +69,13 @@ _DRAWING = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 @router.get("/maps")
 def list_maps(shared: Shared) -> list[MapInfo]:
     """All maps of the catalogue that can be used, by name."""
-    return [found for found in _catalogue(shared) if isinstance(found, MapInfo)]
+    return [found for found in _list_catalogue(shared) if isinstance(found, MapInfo)]
 
 
 @router.get("/broken-maps")
 def list_broken_maps(shared: Shared) -> list[BrokenMapInfo]:
     """Maps whose folders are damaged, by name, and why; they can be removed or added again."""
-    return [found for found in _catalogue(shared) if isinstance(found, BrokenMapInfo)]
+    return [found for found in _list_catalogue(shared) if isinstance(found, BrokenMapInfo)]
 
 
 @router.get("/maps/{name}")
@@ -90,7 +90,7 @@ def show_map(name: str, shared: Shared) -> MapDetails:
             green=list(seen.green),
             signals=[list(names) for names in light.signals],
             paths=[list(link.path) for link in light.links],
-            walks=[one.walk for one in seen.movements],
+            walks=[movement.walk for movement in seen.movements],
         )
         for light, seen in zip(loaded.sumo.lights, loaded.lights, strict=True)
     ]
@@ -136,7 +136,7 @@ def add_map(
     """Add a map; it is built in the background, with a network by the converter of that name."""
     given = Path(file.filename or "map.xodr")
     name = name_from_file(given) if name is None else check_name(name)
-    importing = ImportSettings(importer, _options(options))
+    importing = ImportSettings(importer, _parse_options(options))
     suffix = given.suffix if re.fullmatch(r"\.[A-Za-z0-9]{1,16}", given.suffix) else ""
     # Without a name on disk: nothing is left of it, however the server ends.
     kept = tempfile.TemporaryFile()  # noqa: SIM115 - closed by the work
@@ -223,28 +223,28 @@ def assets(shared: Shared) -> AssetsInfo:
         ],
         blueprints=[
             BlueprintInfo(
-                id=one.id,
-                category=one.category,
-                special_type=one.special_type,
-                age=one.age,
-                **one.body._asdict(),
+                id=blueprint.id,
+                category=blueprint.category,
+                special_type=blueprint.special_type,
+                age=blueprint.age,
+                **blueprint.body._asdict(),
             )
-            for one in known.blueprints.values()
+            for blueprint in known.blueprints.values()
         ],
         weather=[
             WeatherInfo(
-                name=one.name,
-                kind=one.kind,
-                time_of_day=one.time_of_day,
-                parameters=dict(one.parameters),
+                name=preset.name,
+                kind=preset.kind,
+                time_of_day=preset.time_of_day,
+                parameters=dict(preset.parameters),
             )
-            for one in known.presets.values()
+            for preset in known.presets.values()
         ],
         day_profiles={name: list(shares) for name, shares in BUILT_IN.items()},
     )
 
 
-def _options(text: str | None) -> dict[str, OptionValue]:
+def _parse_options(text: str | None) -> dict[str, OptionValue]:
     """Options of an importer, as a form has them."""
     if not text:
         return {}
@@ -272,18 +272,18 @@ def _refuse_other(shared: Shared, name: str, content: IO[bytes]) -> None:
         )
 
 
-def _catalogue(shared: Shared) -> Iterator[MapInfo | BrokenMapInfo]:
+def _list_catalogue(shared: Shared) -> Iterator[MapInfo | BrokenMapInfo]:
     """All maps; one that is damaged does not hide the others."""
     entries, broken = shared.workspace.catalogue()
     for entry in entries:
         try:
             yield _map_info(entry)
         except (AttributeError, KeyError, TypeError, ValueError):
-            yield _rebuilt(shared, entry)
+            yield _rebuild_or_report(shared, entry)
     yield from (BrokenMapInfo(name=one.name, problem=one.problem) for one in broken)
 
 
-def _rebuilt(shared: Shared, entry: MapEntry) -> MapInfo | BrokenMapInfo:
+def _rebuild_or_report(shared: Shared, entry: MapEntry) -> MapInfo | BrokenMapInfo:
     """A map that does not say what is listed: rebuilt if it is too old for that, else damaged."""
     if is_outdated(entry):
         try:

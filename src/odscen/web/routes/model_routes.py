@@ -20,13 +20,13 @@ router = APIRouter(prefix="/api")
 @router.get("/generators")
 def list_generators() -> list[OfferedInfo]:
     """Generators that are installed, for the edit ``fill_roi``: the one that ships is the first."""
-    return [OfferedInfo.of(one) for one in installed_generators()]
+    return [OfferedInfo.of(installed_generator) for installed_generator in installed_generators()]
 
 
 @router.get("/behaviours")
 def list_behaviours() -> list[OfferedInfo]:
     """Behaviour models that are installed, for a new run: those that ship are the first."""
-    return [OfferedInfo.of(one) for one in installed_behaviours()]
+    return [OfferedInfo.of(installed_behaviour) for installed_behaviour in installed_behaviours()]
 
 
 @router.get("/simulators")

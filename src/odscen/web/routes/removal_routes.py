@@ -47,65 +47,65 @@ class RemovedRow(RemovedInfo):
 @router.get("/maps/{name}/removal")
 def map_removal(name: str, shared: Shared) -> RemovalInfo:
     """What depends on a map."""
-    return _facts(shared, "map", name)
+    return _facts_of_removal(shared, "map", name)
 
 
 @router.get("/scenarios/{name}/removal")
 def scenario_removal(name: str, shared: Shared) -> RemovalInfo:
     """What depends on a scenario."""
-    return _facts(shared, "scenario", name)
+    return _facts_of_removal(shared, "scenario", name)
 
 
 @router.get("/runs/{run}/removal")
 def run_removal(run: str, shared: Shared) -> RemovalInfo:
     """Whether a run can be removed."""
-    return _facts(shared, "run", run)
+    return _facts_of_removal(shared, "run", run)
 
 
 @router.delete("/maps/{name}")
 def remove_map(name: str, shared: Shared) -> RemovedInfo:
     """Move a map into the wastebasket; scenarios made on it stay."""
-    return _info(remove(shared.workspace, "map", name))
+    return _info_of_item(remove(shared.workspace, "map", name))
 
 
 @router.delete("/scenarios/{name}")
 def remove_scenario(name: str, shared: Shared) -> RemovedInfo:
     """Move a scenario and its history into the wastebasket; its runs stay."""
-    return _info(shared.drafts.remove(name))
+    return _info_of_item(shared.drafts.remove(name))
 
 
 @router.delete("/runs/{run}")
 def remove_run(run: str, shared: Shared) -> RemovedInfo | None:
     """Move a finished run into the wastebasket; null if it has left nothing to keep."""
     item = shared.runs.remove(run)
-    return None if item is None else _info(item)
+    return None if item is None else _info_of_item(item)
 
 
 @router.get("/trash")
 def list_trash(shared: Shared) -> list[RemovedRow]:
     """Everything in the wastebasket, removed last first."""
     items = Wastebasket(shared.workspace).items()
-    return [RemovedRow(**dict(_info(item)), size=item.size()) for item in items]
+    return [RemovedRow(**dict(_info_of_item(item)), size=item.size()) for item in items]
 
 
 @router.post("/trash/{item}/restore")
 def restore(item: str, shared: Shared) -> RemovedInfo:
     """Put an item back where it was; 409 if something of that name is there now."""
-    return _info(shared.drafts.restore(item))
+    return _info_of_item(shared.drafts.restore(item))
 
 
 @router.delete("/trash/{item}")
 def delete_item(item: str, shared: Shared) -> RemovedInfo:
     """Delete an item for good."""
-    return _info(Wastebasket(shared.workspace).delete(item))
+    return _info_of_item(Wastebasket(shared.workspace).delete(item))
 
 
-def _facts(shared: Services, kind: RemovedKind, name: str) -> RemovalInfo:
+def _facts_of_removal(shared: Services, kind: RemovedKind, name: str) -> RemovalInfo:
     found = removal_facts(shared.workspace, kind, name, runs=shared.runs.known())
     return RemovalInfo(**asdict(found))
 
 
-def _info(item: RemovedItem) -> RemovedInfo:
+def _info_of_item(item: RemovedItem) -> RemovedInfo:
     return RemovedInfo(
         id=item.id,
         kind=item.kind,

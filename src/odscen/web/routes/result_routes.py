@@ -54,7 +54,7 @@ def fit(run: str, shared: Shared) -> RunFit:
         rows=rows,
         met=sum(row.met for row in found.rows),
         hours=len(found.hours),
-        hours_met=sum(one.met for one in found.hours),
+        hours_met=sum(hour.met for hour in found.hours),
         rmse=found.rmse,
         contradictions=list(found.contradictions),
     )

@@ -130,13 +130,13 @@ def report(run: str, shared: Shared) -> Response:
 def page_of_run(shared: Shared, run: str, name: str) -> Response:
     """Answer with a page of a finished run that holds everything that it needs."""
     headers = {"Content-Security-Policy": _REPORT}
-    return FileResponse(_kept(shared, run, name), media_type="text/html", headers=headers)
+    return FileResponse(_finished_file(shared, run, name), media_type="text/html", headers=headers)
 
 
 @router.get("/{run}/summary")
 def summary(run: str, shared: Shared) -> RunSummary:
     """Key figures of a finished run: its ``summary.json``."""
-    _kept(shared, run, layout.SUMMARY_FILE)
+    _finished_file(shared, run, layout.SUMMARY_FILE)
     found = shared.runs.kept.summary(run)
     if found is None:
         raise NotFoundError("summary of run", run, [])
@@ -152,11 +152,11 @@ def content(run: str, shared: Shared) -> RunContent:
 @router.get("/{run}/events")
 def events(run: str, shared: Shared) -> RunEvents:
     """What went wrong on the road in a finished run: the first thousands of incidents."""
-    path = _kept(shared, run, layout.EVENTS_FILE)
-    with _named(path.parent):
+    path = _finished_file(shared, run, layout.EVENTS_FILE)
+    with _name_run_in_errors(path.parent):
         found = [
             event_row(event)
-            for event in events_from_json(_text(path))
+            for event in events_from_json(_read_text(path))
             if event.kind not in (EventKind.DEPARTED, EventKind.ARRIVED)
         ]
         rows = [IncidentInfo(**row) for row in found[:MOST_EVENTS]]
@@ -166,9 +166,9 @@ def events(run: str, shared: Shared) -> RunEvents:
 @router.get("/{run}/egos")
 def egos(run: str, shared: Shared) -> RunEgos:
     """What became of the vehicles under test of a finished run."""
-    path = _kept(shared, run, layout.ACTORS_FILE)
-    with _named(path.parent):
-        found = [one for one in actors_from_json(_text(path)) if one.ego]
+    path = _finished_file(shared, run, layout.ACTORS_FILE)
+    with _name_run_in_errors(path.parent):
+        found = [one for one in actors_from_json(_read_text(path)) if one.ego]
     names = EgoOutcome.model_fields
     return RunEgos(egos=[EgoOutcome(**{n: getattr(one, n) for n in names}) for one in found])
 
@@ -176,15 +176,18 @@ def egos(run: str, shared: Shared) -> RunEgos:
 @router.get("/{run}/curves")
 def curves(run: str, shared: Shared) -> RunCurves:
     """How many were where, and how fast, over time."""
-    table, plan, _ = _recorded(shared, run)
-    path, end = _kept(shared, run, layout.ACTORS_FILE), summary(run, shared).sim_seconds or 0.0
-    with _named(path.parent):
-        actors = actors_from_json(_text(path))
+    table, plan, _ = _read_recorded(shared, run)
+    path, end = (
+        _finished_file(shared, run, layout.ACTORS_FILE),
+        summary(run, shared).sim_seconds or 0.0,
+    )
+    with _name_run_in_errors(path.parent):
+        actors = actors_from_json(_read_text(path))
         found = run_curves(plan, actors, table, end=end)
     return RunCurves(
-        counts=RunCurve(**_lists(found.counts)),
-        speeds=RunSpeeds(**_lists(found.speeds)),
-        shares=RunShares(**_lists(found.shares)),
+        counts=RunCurve(**_column_lists(found.counts)),
+        speeds=RunSpeeds(**_column_lists(found.speeds)),
+        shares=RunShares(**_column_lists(found.shares)),
     )
 
 
@@ -199,43 +202,43 @@ def trajectories(
     ] = None,
 ) -> Response:
     """Where road users were, as columns; see ``docs/server.md``."""
-    table, plan, read = _recorded(shared, run)
+    table, plan, read = _read_recorded(shared, run)
     if most is not None:
         every = max(every, math.ceil(table.height * read / most))
-    with _named(shared.runs.kept.folder(run)):
+    with _name_run_in_errors(shared.runs.kept.folder(run)):
         columns = replay_columns(table, plan, every=max(1, every // read))
     names = tuple(ReplayActor.model_fields)
-    columns["actors"] = [{name: getattr(one, name) for name in names} for one in plan.actors]
+    columns["actors"] = [{name: getattr(actor, name) for name in names} for actor in plan.actors]
     return answer(request, pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY)))
 
 
-def _kept(shared: Shared, run: str, name: str) -> Path:
+def _finished_file(shared: Shared, run: str, name: str) -> Path:
     return shared.runs.kept.finished_file(run, name)
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     return path.read_text(encoding="utf-8", errors="replace")
 
 
 @contextmanager
-def _named(run: Path) -> Iterator[None]:
+def _name_run_in_errors(run: Path) -> Iterator[None]:
     """Say of which run a file is that cannot be read, or does not fit the others."""
     with in_file(str(run)), tables(str(run)):
         yield
 
 
-def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
+def _read_recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
     """Trajectories, the plan, and every how manyth record was read."""
-    path = _kept(shared, run, layout.PLAN_FILE)
-    with _named(path.parent):
-        plan = Plan.from_json(_text(path))
+    path = _finished_file(shared, run, layout.PLAN_FILE)
+    with _name_run_in_errors(path.parent):
+        plan = Plan.from_json(_read_text(path))
     recorded = read_trajectories(path.parent, most=REPLAY_ROWS)
     if recorded is None:
         raise NotFoundError("trajectories of run", run, [])
     return recorded.rows, plan, recorded.every
 
 
-def _lists(columns: ActorCounts | SpeedCurve | SpeedShares) -> dict[str, list[float | None]]:
+def _column_lists(columns: ActorCounts | SpeedCurve | SpeedShares) -> dict[str, list[float | None]]:
     """Columns to four digits, as JSON has them: no number is null."""
     return {
         name: [None if math.isnan(v) else round(v, 4) for v in column.tolist()]

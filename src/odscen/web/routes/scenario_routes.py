@@ -186,7 +186,7 @@ def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
 def problems(name: str, shared: Shared) -> ScenarioProblems:
     """What is wrong with a scenario as it is now."""
     draft = shared.drafts.get(name)
-    found = _problems(shared, draft.scenario)
+    found = _problem_infos(shared, draft.scenario)
     return ScenarioProblems(version=draft.history.version, problems=found)
 
 
@@ -198,14 +198,14 @@ def edit(
 
     def change(scenario: Scenario) -> Scenario:
         loaded = shared.map_of(scenario)
-        for one in request.edits:
-            scenario = apply_edit(one, scenario, loaded)
+        for edit in request.edits:
+            scenario = apply_edit(edit, scenario, loaded)
         return scenario
 
     changed = shared.drafts.change(
         name, request.version, request.step_label, change, edits=request.edits
     )
-    return _changed(shared, changed, changes=changes)
+    return _answer_change(shared, changed, changes=changes)
 
 
 @router.post("/{name}/undo")
@@ -213,7 +213,7 @@ def undo(
     name: str, request: OfVersion, shared: Shared, changes: OnlyChanges = False
 ) -> ScenarioState | ScenarioPatch:
     """Take the last edit back."""
-    return _changed(shared, shared.drafts.undo(name, request.version), changes=changes)
+    return _answer_change(shared, shared.drafts.undo(name, request.version), changes=changes)
 
 
 @router.post("/{name}/redo")
@@ -221,7 +221,7 @@ def redo(
     name: str, request: OfVersion, shared: Shared, changes: OnlyChanges = False
 ) -> ScenarioState | ScenarioPatch:
     """Make the edit again that was taken back last."""
-    return _changed(shared, shared.drafts.redo(name, request.version), changes=changes)
+    return _answer_change(shared, shared.drafts.redo(name, request.version), changes=changes)
 
 
 @router.post("/{name}/copy", status_code=201)
@@ -238,7 +238,10 @@ def goals(name: str, spawn: str, shared: Shared) -> Goals:
     scenario = shared.drafts.get(name).scenario
     graph = shared.map_of(scenario).sumo.graph
     with shared.search:
-        region, start = _region(shared, scenario), _place(shared, scenario, spawn)
+        region, start = (
+            _region_of_scenario(shared, scenario),
+            _required_place(shared, scenario, spawn),
+        )
         found = region.candidates(start)
     names = [name_of(graph, GraphPlace(start.walk, node)) for node in found.tolist()]
     return Goals(spawn=spawn, goals=list(names))
@@ -250,13 +253,13 @@ def path(name: str, spawn: str, goal: str, shared: Shared) -> Path:
     scenario = shared.drafts.get(name).scenario
     sumo = shared.map_of(scenario).sumo
     graph = sumo.graph
-    start, end = _place(shared, scenario, spawn), _place(shared, scenario, goal)
+    start, end = _required_place(shared, scenario, spawn), _required_place(shared, scenario, goal)
     if start.walk != end.walk:
         raise InputError(
             f"no path leads from {spawn!r} to {goal!r}: one is for vehicles, one for pedestrians"
         )
     with shared.search:
-        region = _region(shared, scenario)
+        region = _region_of_scenario(shared, scenario)
         category = Category.PEDESTRIAN if start.walk else Category.CAR
         user = RoadUser("user", category, start.node, end.node, depart=0.0)
         drivable = region.router_over(sumo.drivable)
@@ -275,11 +278,13 @@ def plan(name: str, request: Request, shared: Shared) -> Response:
     scenario = shared.drafts.get(name).scenario
     sumo, assets = shared.map_of(scenario).sumo, shared.workspace.assets()
     with shared.search:
-        found = planned_positions(scenario, sumo, _region(shared, scenario), assets)
-    return answer(request, pack(orjson.dumps(_columns(found), option=orjson.OPT_SERIALIZE_NUMPY)))
+        found = planned_positions(scenario, sumo, _region_of_scenario(shared, scenario), assets)
+    return answer(
+        request, pack(orjson.dumps(_rounded_columns(found), option=orjson.OPT_SERIALIZE_NUMPY))
+    )
 
 
-def _columns(found: PlannedPositions) -> dict[str, object]:
+def _rounded_columns(found: PlannedPositions) -> dict[str, object]:
     """Times to 1/100 s, places to the centimetre, headings to 1e-3 rad, which no screen shows."""
     return {
         "users": [
@@ -335,14 +340,16 @@ def state_of(shared: Services, draft: Draft) -> ScenarioState:
         name=draft.name,
         version=history.version,
         document=draft.scenario,
-        problems=_problems(shared, draft.scenario),
+        problems=_problem_infos(shared, draft.scenario),
         label=history.label,
         undo=history.undo,
         redo=history.redo,
     )
 
 
-def _changed(shared: Services, draft: Draft, *, changes: bool) -> ScenarioState | ScenarioPatch:
+def _answer_change(
+    shared: Services, draft: Draft, *, changes: bool
+) -> ScenarioState | ScenarioPatch:
     """Answer with a scenario that was just changed, or with what has changed."""
     if not changes or draft.before is None:
         return state_of(shared, draft)
@@ -358,11 +365,13 @@ def _changed(shared: Services, draft: Draft, *, changes: bool) -> ScenarioState 
     )
 
 
-def _problems(shared: Services, scenario: Scenario) -> list[ProblemInfo]:
-    return [ProblemInfo(**asdict(one)) for one in _found(shared, scenario)]
+def _problem_infos(shared: Services, scenario: Scenario) -> list[ProblemInfo]:
+    return [
+        ProblemInfo(**asdict(all_problem)) for all_problem in _find_all_problems(shared, scenario)
+    ]
 
 
-def _found(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
+def _find_all_problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
     try:
         loaded = shared.map_of(scenario)
     except InputError as error:  # a scenario whose map was removed can still be looked at
@@ -380,11 +389,11 @@ def _found(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
     return (*found, *criteria_problems(scenario), *place_fit(scenario, loaded.sumo))
 
 
-def _region(shared: Services, scenario: Scenario) -> Region:
+def _region_of_scenario(shared: Services, scenario: Scenario) -> Region:
     return region_of(shared.map_of(scenario), scenario.roi)
 
 
-def _place(shared: Services, scenario: Scenario, node: str) -> GraphPlace:
+def _required_place(shared: Services, scenario: Scenario, node: str) -> GraphPlace:
     place = place_of(shared.map_of(scenario).sumo.graph, node)
     if place is None:
         raise NotFoundError("node", node, [])

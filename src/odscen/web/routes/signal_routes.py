@@ -91,11 +91,13 @@ def of_scenario(name: str, junction: str, shared: Shared) -> LightProgramInfo:
     scenario = shared.drafts.get(name).scenario
     lights = signal_programs(shared.workspace, scenario, whole_day=True)
     light = chosen_lights(lights, [junction])[0]
-    info = _program(light, scenario, shared, {})
+    info = _program_info(light, scenario, shared, {})
     loaded = shared.map_of(scenario)
     view = find_light(loaded.lights, light.junctions[0])
     return (
-        info if view is None else info.model_copy(update=_editable(light, view, scenario, loaded))
+        info
+        if view is None
+        else info.model_copy(update=_editable_fields(light, view, scenario, loaded))
     )
 
 
@@ -182,25 +184,25 @@ def export_programs(name: str, shared: Shared) -> Response:
 def of_run(run: str, request: Request, shared: Shared) -> Response:
     """What the lights of a finished run showed, and when."""
     states = read_light_states(shared.runs.kept.whole(run))
-    lights = [] if states is None else list(_shown(states))
+    lights = [] if states is None else list(_shown_states(states))
     return answer(request, pack(orjson.dumps({"lights": lights})))
 
 
 @router.get("/runs/{run}/signals/{junction}")
 def light_of_run(run: str, junction: str, shared: Shared) -> LightProgramInfo:
     """What a light is told to show in a run; of a finished one with the calls of its detectors."""
-    folder = _finished(run, shared)
+    folder = _finished_run_folder(run, shared)
     if folder is None:
         scenario = shared.runs.active(run).scenario
         lights = signal_programs(shared.workspace, scenario)
-        return _program(chosen_lights(lights, [junction])[0], scenario, shared, {})
+        return _program_info(chosen_lights(lights, [junction])[0], scenario, shared, {})
     scenario = read_scenario(folder / layout.SCENARIO_FILE)
     text = (folder / layout.LIGHTS_FILE).read_text(encoding="utf-8")
     light = chosen_lights(programs_from_json(text), [junction])[0]
-    return _program(light, scenario, shared, _calls(light, folder))
+    return _program_info(light, scenario, shared, _detector_calls(light, folder))
 
 
-def _finished(run: str, shared: Services) -> Path | None:
+def _finished_run_folder(run: str, shared: Services) -> Path | None:
     """Folder of a run that has its lights in it; ``None`` if it is still under way here."""
     with suppress(NotFoundError):
         folder = shared.runs.kept.folder(run)
@@ -210,7 +212,7 @@ def _finished(run: str, shared: Services) -> Path | None:
     return None
 
 
-def _program(
+def _program_info(
     light: LightProgram, scenario: Scenario, shared: Services, calls: _Calls
 ) -> LightProgramInfo:
     drawing: MapDrawing | None = None
@@ -228,25 +230,28 @@ def _program(
         origin=program_origin(light, scenario.signals, converter),
         groups=[
             LightGroupInfo(
-                id=one.id, movements=list(one.movements), links=list(one.links), walk=one.walk
+                id=group.id,
+                movements=list(group.movements),
+                links=list(group.links),
+                walk=group.walk,
             )
-            for one in light.groups
+            for group in light.groups
         ],
-        plans=[_plan(light, plan, pictures, times.get(plan.id, [])) for plan in light.plans],
+        plans=[_plan_info(light, plan, pictures, times.get(plan.id, [])) for plan in light.plans],
         detectors=[
             DetectorInfo(
-                id=one.id,
-                label=detector_label(light, one),
-                stages=list(one.stages),
-                call=one.call,
-                bus=one.bus,
-                ahead=one.ahead,
-                length=one.length,
-                gap=one.gap,
-                calls=calls.get(one.id, []),
-                place=list(one.place),
+                id=detector.id,
+                label=detector_label(light, detector),
+                stages=list(detector.stages),
+                call=detector.call,
+                bus=detector.bus,
+                ahead=detector.ahead,
+                length=detector.length,
+                gap=detector.gap,
+                calls=calls.get(detector.id, []),
+                place=list(detector.place),
             )
-            for one in light.detectors
+            for detector in light.detectors
         ],
         turns=[],
         movements=[],
@@ -261,35 +266,40 @@ def _program(
     )
 
 
-def _editable(
+def _editable_fields(
     light: LightProgram, view: Light, scenario: Scenario, loaded: LoadedMap
 ) -> dict[str, Any]:
     """What is needed to change a program: fields of a message that are empty in a run."""
     timings = scenario.signals.junctions
-    own = next((one for one in timings if one.stages and one.junction in view.names), None)
-    group_of = {n: one.id for one in light.groups for n in one.links}
+    own = next(
+        (timing for timing in timings if timing.stages and timing.junction in view.names), None
+    )
+    group_of = {n: group.id for group in light.groups for n in group.links}
     names: dict[str, MovementInfo] = {}
     for n, one in enumerate(view.movements):
         if not one.turn:
             continue
         # Turns of an approach are told apart; where one leads to several roads, these are.
-        for name in shortest_names(_alike(n, view), view.movements):
+        for name in shortest_names(_movements_alike(n, view), view.movements):
             known = MovementInfo(name=name, walk=one.walk, group=group_of.get(n, ""))
             names.setdefault(name, known)
     return {
-        "turns": _turns(light, view),
+        "turns": _turn_infos(light, view),
         "movements": list(names.values()),
         "pairs": [
-            GroupPairInfo(**one._asdict()) for one in (group_pairs(own, view) if own else ())
+            GroupPairInfo(**group_pair._asdict())
+            for group_pair in (group_pairs(own, view) if own else ())
         ],
         "lanes": [
-            DetectorLaneInfo(at=one.at, approach=one.approach, line=list(one.line))
-            for one in detector_lanes(loaded, view.names[0])
+            DetectorLaneInfo(
+                at=detector_lane.at, approach=detector_lane.approach, line=list(detector_lane.line)
+            )
+            for detector_lane in detector_lanes(loaded, view.names[0])
         ],
     }
 
 
-def _alike(movement: int, view: Light) -> set[int]:
+def _movements_alike(movement: int, view: Light) -> set[int]:
     """Movements that turn as one does, from the same approach into the same road."""
     one = view.movements[movement]
     return {
@@ -299,31 +309,33 @@ def _alike(movement: int, view: Light) -> set[int]:
     }
 
 
-def _turns(light: LightProgram, view: Light) -> list[TurnInfo]:
+def _turn_infos(light: LightProgram, view: Light) -> list[TurnInfo]:
     """Turns across oncoming traffic, and how the stages of the first plan treat them."""
     states = [stage.state for stage in stage_spans(light.plans[0])]
     return [
         TurnInfo(
-            approach=one.approach,
-            turn="left" if one.turn == "left" else "right",
-            treatment=_treatment({state[n] for state in states for n in one.movements}),
-            alone=one.alone,
+            approach=crossing_turn.approach,
+            turn="left" if crossing_turn.turn == "left" else "right",
+            treatment=_treatment_of_letters(
+                {state[n] for state in states for n in crossing_turn.movements}
+            ),
+            alone=crossing_turn.alone,
         )
-        for one in crossing_turns(view)
+        for crossing_turn in crossing_turns(view)
     ]
 
 
-def _treatment(letters: set[str]) -> TurnTreatment:
+def _treatment_of_letters(letters: set[str]) -> TurnTreatment:
     """How movements are treated that show these letters in the stages of a cycle."""
     if {"g", "G"} <= letters:
         return "both"
     return "protected" if "G" in letters else "permissive"
 
 
-def _plan(
+def _plan_info(
     light: LightProgram, plan: ShownPlan, pictures: JunctionPictures, times: list[float]
 ) -> DayPlanInfo:
-    drawn = {one.stage.begin: one for one in pictures.stages(plan)}
+    drawn = {stage.stage.begin: stage for stage in pictures.stages(plan)}
     stages = []
     for stage in stage_spans(plan):
         one = drawn.get(stage.begin)
@@ -350,8 +362,8 @@ def _plan(
         begins=list(plan.begins),
         stages=stages,
         phases=[
-            PhaseInfo(seconds=one.seconds, state=one.state, name=one.name, stage=one.stage)
-            for one in plan.phases
+            PhaseInfo(seconds=phase.seconds, state=phase.state, name=phase.name, stage=phase.stage)
+            for phase in plan.phases
         ],
         bars=str(plan_chart(light, plan, width=_WIDTH)),
         plot=plan_scale(light, plan, width=_WIDTH).shares,
@@ -368,7 +380,7 @@ def _times_of_day(light: LightProgram, scenario: Scenario) -> dict[str, list[flo
     }
 
 
-def _shown(states: pl.DataFrame) -> Iterator[Mapping[str, Any]]:
+def _shown_states(states: pl.DataFrame) -> Iterator[Mapping[str, Any]]:
     """Rows of :class:`~odscen.web.wire.signal_messages.ShownStates`, which is not made of them.
 
     A day of a town has hundreds of thousands of changes.
@@ -385,7 +397,7 @@ def _shown(states: pl.DataFrame) -> Iterator[Mapping[str, Any]]:
         }
 
 
-def _calls(light: LightProgram, folder: Path) -> _Calls:
+def _detector_calls(light: LightProgram, folder: Path) -> _Calls:
     """Times in which the detectors of a light saw somebody."""
     import polars as pl
 
@@ -393,7 +405,7 @@ def _calls(light: LightProgram, folder: Path) -> _Calls:
     if table is None:
         return {}
     found: _Calls = {}
-    own = table.filter(pl.col("detector").is_in([one.id for one in light.detectors]))
+    own = table.filter(pl.col("detector").is_in([detector.id for detector in light.detectors]))
     for detector, begin, end in own.select("detector", "begin", "end").iter_rows():
         found.setdefault(detector, []).append((begin, end))
     return found

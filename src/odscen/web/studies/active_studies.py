@@ -60,7 +60,7 @@ class Studies:
             If there is one of that name, or another one is under way.
         """
         self._refuse_unknown(wish.scenarios)
-        plan = _plan(wish)
+        plan = _plan_of_wish(wish)
         with self._work.lock:
             self._work.refuse_more()
             folder = self._free_folder(wish)
@@ -84,7 +84,7 @@ class Studies:
         ConflictError
             If there is nothing to do, or a study is under way.
         """
-        folder = self._of(name)
+        folder = self._folder_of(name)
         with self._work.lock:
             self._work.refuse_more()
             state = study_state(folder)
@@ -104,7 +104,7 @@ class Studies:
         NotFoundError, ConflictError
             If there is none of that name, or this server does not carry it out.
         """
-        self._of(name)
+        self._folder_of(name)
         self._work.stop(name)
 
     def remove(self, name: str) -> None:
@@ -115,7 +115,7 @@ class Studies:
         NotFoundError, ConflictError
             If there is none of that name, or it is under way.
         """
-        folder = self._of(name)
+        folder = self._folder_of(name)
         with self._work.lock:
             self._work.forget(name)
             if study_state(folder).active:
@@ -124,12 +124,12 @@ class Studies:
 
     def info(self, name: str) -> StudyInfo:
         """How far a study is; :class:`NotFoundError` if there is none of that name."""
-        folder = self._of(name)
+        folder = self._folder_of(name)
         known, live = self._work.known(name), self._work.live(name)
         grid, state = read_study(folder), study_state(folder)
         return StudyInfo(
             study=name,
-            state=_status(state, known, live),
+            state=_status_of_study(state, known, live),
             elsewhere=state.active and live is None,
             scenarios=list(grid.sources),
             variants=list(grid.plan.variant_names),
@@ -158,7 +158,7 @@ class Studies:
 
     def folder(self, name: str) -> Path:
         """Folder of a study; :class:`NotFoundError` if there is none of that name."""
-        return self._of(name)
+        return self._folder_of(name)
 
     def file(self, name: str, path: str) -> Path:
         """A file of a study: its table, or its page, which is written when it is asked for.
@@ -168,7 +168,7 @@ class Studies:
         NotFoundError
             If there is no such study, or file, or the study has not ended.
         """
-        folder = self._of(name)
+        folder = self._folder_of(name)
         if path == PAGE_FILE:
             return write_study_page(folder, SHOWN_FIGURES, folder / PAGE_FILE)
         if path not in _DOWNLOADS or not (folder / path).is_file():
@@ -195,18 +195,20 @@ class Studies:
         self._work.start(folder.name, before, work)
 
     def _refuse_unknown(self, scenarios: Iterable[str]) -> None:
-        known = [one.name.removesuffix(SUFFIX) for one in self._files()]
+        known = [
+            scenario_file.name.removesuffix(SUFFIX) for scenario_file in self._scenario_files()
+        ]
         for name in scenarios:
             if name not in known:
                 raise NotFoundError("scenario", name, known)
 
-    def _files(self) -> list[Path]:
+    def _scenario_files(self) -> list[Path]:
         return sorted(self._workspace.scenarios.glob(f"*{SUFFIX}"))
 
-    def _of(self, name: str) -> Path:
+    def _folder_of(self, name: str) -> Path:
         folder = self._folder / check_name(name, what="study")
         if not (folder / STUDY_FILE).is_file():
-            raise NotFoundError("study", name, [one.study for one in self.rows()])
+            raise NotFoundError("study", name, [row.study for row in self.rows()])
         return folder
 
     def _free_folder(self, wish: StudyWish) -> Path:
@@ -220,11 +222,13 @@ class Studies:
         return next(self._folder / name for name in names if not (self._folder / name).exists())
 
 
-def _plan(wish: StudyWish) -> StudyPlan:
+def _plan_of_wish(wish: StudyWish) -> StudyPlan:
     runs = {} if wish.until is None else {"until": wish.until}
     said = {
         "name": wish.name or wish.scenarios[0],
-        "scenarios": [f"{check_name(one, what='scenario')}{SUFFIX}" for one in wish.scenarios],
+        "scenarios": [
+            f"{check_name(scenario, what='scenario')}{SUFFIX}" for scenario in wish.scenarios
+        ],
         "seeds": wish.seeds,
         "variant": [
             {"name": preset, "edits": [{"kind": "set_environment", "preset": preset}]}
@@ -235,7 +239,9 @@ def _plan(wish: StudyWish) -> StudyPlan:
     return validated(StudyPlan, said)
 
 
-def _status(state: StudyState, known: UnderWay | None, live: UnderWay | None) -> StudyStatus:
+def _status_of_study(
+    state: StudyState, known: UnderWay | None, live: UnderWay | None
+) -> StudyStatus:
     if live is not None or state.active:
         return "running"
     if state.done and (state.folder / TABLE_FILE).is_file():

@@ -78,10 +78,10 @@ def results(study: str, shared: Shared, figure: str | None = None) -> StudyResul
     shown = figure or next((one for one in SHOWN_FIGURES if one in names), names[0])
     groups, differences = study_groups(folder, [shown])
     return StudyResults(
-        figures=[_figure(name) for name in names],
+        figures=[_figure_info(name) for name in names],
         figure=shown,
-        groups=_groups(groups, shown),
-        differences=_groups(differences, shown),
+        groups=_figure_groups(groups, shown),
+        differences=_figure_groups(differences, shown),
     )
 
 
@@ -95,26 +95,26 @@ def file(study: str, name: str, shared: Shared) -> Response:
     return FileResponse(path, filename=f"{study}-{path.name}")
 
 
-def _figure(name: str) -> StudyFigure:
+def _figure_info(name: str) -> StudyFigure:
     found = run_figure(name)
     if found is None:
         return StudyFigure(name=name, label=name, unit="")
     return StudyFigure(name=name, label=found.label, unit=found.unit)
 
 
-def _groups(groups: Sequence[StudyGroup], figure: str) -> list[FigureGroup]:
+def _figure_groups(groups: Sequence[StudyGroup], figure: str) -> list[FigureGroup]:
     return [
         FigureGroup(
-            scenario=one.scenario,
-            variant=one.variant,
-            runs=one.runs,
-            mean=_number(one.figures[figure].mean),
-            half_width=_number(one.figures[figure].half_width),
-            values=[value for value in one.values[figure] if math.isfinite(value)],
+            scenario=group.scenario,
+            variant=group.variant,
+            runs=group.runs,
+            mean=_finite_number(group.figures[figure].mean),
+            half_width=_finite_number(group.figures[figure].half_width),
+            values=[value for value in group.values[figure] if math.isfinite(value)],
         )
-        for one in groups
+        for group in groups
     ]
 
 
-def _number(value: float | None) -> float | None:
+def _finite_number(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else value

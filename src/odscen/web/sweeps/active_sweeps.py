@@ -68,7 +68,7 @@ class Sweeps:
         InputError
             If it is not possible.
         """
-        plan, settings = plan_from_data(wish.plan), _settings(wish)
+        plan, settings = plan_from_data(wish.plan), _settings_of_wish(wish)
         count, tried = len(plan.cases()), estimate(
             self._workspace, scenario, plan, settings=settings
         )  # fmt: skip
@@ -94,7 +94,7 @@ class Sweeps:
         ConflictError
             If another sweep is under way.
         """
-        plan, settings = plan_from_data(wish.plan), _settings(wish)
+        plan, settings = plan_from_data(wish.plan), _settings_of_wish(wish)
         refuse_unknown(plan.names, scenario)
         CaseRuns(scenario, self._folder, settings)  # an unknown figure or limit is refused
         plan.cases()
@@ -102,7 +102,7 @@ class Sweeps:
             self._work.refuse_more()
             folder = self._free_folder(name)
             begin_sweep(folder, scenario, plan, settings)
-            self._submit(folder.name, scenario, plan, settings, wish.processes)
+            self._submit_sweep(folder.name, scenario, plan, settings, wish.processes)
         return folder.name
 
     def resume(self, name: str, processes: int) -> None:
@@ -117,7 +117,7 @@ class Sweeps:
         InputError
             If it is driven by code that only its folder names.
         """
-        folder = self._of(name)
+        folder = self._folder_of(name)
         scenario, plan, said = read_sweep(folder)
         with self._work.lock:
             self._work.refuse_more()
@@ -132,7 +132,7 @@ class Sweeps:
                     f"{settings.behaviour.shown!r}; what a folder says is not executed: resume it "
                     "with odscen sweep, which names it again"
                 )
-            self._submit(name, scenario, plan, settings, processes)
+            self._submit_sweep(name, scenario, plan, settings, processes)
 
     def stop(self, name: str) -> None:
         """Stop a sweep; cases that are under way are given up, those that have ended are kept.
@@ -142,7 +142,7 @@ class Sweeps:
         NotFoundError, ConflictError
             If there is none of that name, or it is not under way.
         """
-        self._of(name)
+        self._folder_of(name)
         self._work.stop(name)
 
     def remove(self, name: str) -> None:
@@ -153,19 +153,19 @@ class Sweeps:
         NotFoundError, ConflictError
             If there is none of that name, or it is under way.
         """
-        folder = self._of(name)
+        folder = self._folder_of(name)
         with self._work.lock:
             self._work.forget(name)
             discard(folder)
 
     def info(self, name: str) -> SweepInfo:
         """How far a sweep is; :class:`NotFoundError` if there is none of that name."""
-        folder = self._of(name)
+        folder = self._folder_of(name)
         plan, _ = read_plan(folder)
-        cases, state = len(plan.cases()), self._state(name, folder)
+        cases, state = len(plan.cases()), self._state_of_sweep(name, folder)
         known, live = self._work.known(name), self._work.live(name)
-        ended = _ended(folder) if live is None else max(live.ended, live.before)
-        safe, unsafe = _verdicts(folder) if state == "done" else (None, None)
+        ended = _count_ended(folder) if live is None else max(live.ended, live.before)
+        safe, unsafe = _count_verdicts(folder) if state == "done" else (None, None)
         return SweepInfo(
             sweep=name,
             scenario=_scenario_of(name),
@@ -189,12 +189,12 @@ class Sweeps:
             if (folder / SWEEP_FILE).is_file() and not folder.name.startswith("."):
                 with suppress(InputError, OSError):  # not a name of ours, or just removed
                     found.append(self.info(folder.name))
-        wanted = [one for one in found if scenario is None or one.scenario == _stem(scenario)]
+        wanted = [one for one in found if scenario is None or one.scenario == _name_stem(scenario)]
         return sorted(wanted, key=lambda one: (one.changed, one.sweep))
 
     def table(self, name: str) -> tuple[Sweep, Scenario, dict[str, Any]]:
         """Table of a sweep as far as it is, its scenario, and how it is judged."""
-        folder = self._of(name)
+        folder = self._folder_of(name)
         scenario, _, settings = read_sweep(folder)
         return read_table(folder), scenario, settings
 
@@ -206,7 +206,7 @@ class Sweeps:
         NotFoundError
             If there is no such sweep, or file, or it is not one for download.
         """
-        found = self._of(name) / path
+        found = self._folder_of(name) / path
         if not _FILES.fullmatch(path) or not found.is_file():
             raise NotFoundError(f"file of sweep {name!r}", path, [])
         if not path.startswith("runs/"):  # a run has checksums of its own
@@ -221,13 +221,13 @@ class Sweeps:
         NotFoundError
             If there is no such case, or it is not possible.
         """
-        return opened_case(self._of(name), case)
+        return opened_case(self._folder_of(name), case)
 
     def close(self) -> None:
         """Stop what is under way; it can be resumed."""
         self._work.close()
 
-    def _submit(
+    def _submit_sweep(
         self,
         name: str,
         scenario: Scenario,
@@ -252,9 +252,9 @@ class Sweeps:
                 done=done,
             )
 
-        self._work.start(name, _ended(folder), work)
+        self._work.start(name, _count_ended(folder), work)
 
-    def _state(self, name: str, folder: Path) -> SweepState:
+    def _state_of_sweep(self, name: str, folder: Path) -> SweepState:
         if self._work.live(name) is not None:
             return "running"
         if _is_whole(folder):
@@ -262,19 +262,19 @@ class Sweeps:
         known = self._work.known(name)
         return "stopped" if known is None or known.error is None else "failed"
 
-    def _of(self, name: str) -> Path:
+    def _folder_of(self, name: str) -> Path:
         folder = self._folder / check_name(name, what="sweep")
         if not (folder / SWEEP_FILE).is_file():
-            raise NotFoundError("sweep", name, [one.sweep for one in self.rows()])
+            raise NotFoundError("sweep", name, [row.sweep for row in self.rows()])
         return folder
 
     def _free_folder(self, scenario: str) -> Path:
         numbers = itertools.count(1)
-        names = (f"{_stem(scenario)}-{number}" for number in numbers)
+        names = (f"{_name_stem(scenario)}-{number}" for number in numbers)
         return next(self._folder / name for name in names if not (self._folder / name).exists())
 
 
-def _settings(wish: SweepWish) -> SweepSettings:
+def _settings_of_wish(wish: SweepWish) -> SweepSettings:
     return SweepSettings(wish.safe, wish.figures, seed=wish.seed)
 
 
@@ -283,7 +283,7 @@ def _at_most(processes: int) -> int:
     return min(processes, os.cpu_count() or 1)
 
 
-def _stem(scenario: str) -> str:
+def _name_stem(scenario: str) -> str:
     """Beginning of the names of a scenario's sweeps; a number follows."""
     return scenario[:56]
 
@@ -297,11 +297,11 @@ def _is_whole(folder: Path) -> bool:
     return all((folder / name).is_file() for name in (TABLE_FILE, PAGE_FILE))
 
 
-def _ended(folder: Path) -> int:
+def _count_ended(folder: Path) -> int:
     return sum(1 for _ in folder.glob(f"runs/case-*/{layout.SUMMARY_FILE}"))
 
 
-def _verdicts(folder: Path) -> tuple[int, int]:
+def _count_verdicts(folder: Path) -> tuple[int, int]:
     """How many cases are safe, and how many are not."""
     safe = read_table(folder).table["safe"].to_list()
     return safe.count(True), safe.count(False)

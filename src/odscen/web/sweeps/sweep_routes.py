@@ -47,13 +47,13 @@ def list_sweeps(shared: Shared, scenario: str | None = None) -> list[SweepInfo]:
 @router.post("/plan")
 def plan(wish: SweepWish, shared: Shared) -> PlannedSweep:
     """What a sweep would take; runs one of its cases, and takes as long as that does."""
-    return shared.sweeps.plan(_document(shared, wish.scenario), wish)
+    return shared.sweeps.plan(_document_of(shared, wish.scenario), wish)
 
 
 @router.post("", status_code=202)
 def start(wish: SweepWish, shared: Shared) -> SweepInfo:
     """Sweep a scenario as it is now."""
-    name = shared.sweeps.start(wish.scenario, _document(shared, wish.scenario), wish)
+    name = shared.sweeps.start(wish.scenario, _document_of(shared, wish.scenario), wish)
     return shared.sweeps.info(name)
 
 
@@ -97,7 +97,7 @@ def cases(sweep: str, shared: Shared) -> SweepCases:
             SweepParameter(name=name, unit=scenario.parameters[name].unit) for name in names
         ],
         columns=[SweepColumn(name=name, unit=units.get(name, "")) for name in columns],
-        cases=[_case(row, names, columns) for row in found.table.iter_rows(named=True)],
+        cases=[_case_info(row, names, columns) for row in found.table.iter_rows(named=True)],
         boundary=list(found.boundary),
     )
 
@@ -107,7 +107,7 @@ def open_case(sweep: str, case: str, wish: CaseName, shared: Shared) -> Scenario
     """Save a case as a scenario; the one that it was saved as before, if that is unchanged."""
     scenario = shared.sweeps.case(sweep, case)
     name = f"{sweep[:48]}-{case}" if wish.name is None else wish.name
-    return state_of(shared, _saved(shared, scenario, name, given=wish.name is not None))
+    return state_of(shared, _save_scenario(shared, scenario, name, given=wish.name is not None))
 
 
 @router.get("/{sweep}/files/{name:path}", response_class=Response, responses=ANY_FILE)
@@ -120,7 +120,7 @@ def file(sweep: str, name: str, shared: Shared) -> Response:
     return FileResponse(path, filename=f"{sweep}-{path.name}")
 
 
-def _document(shared: Services, name: str) -> Scenario:
+def _document_of(shared: Services, name: str) -> Scenario:
     if shared.large is not None and shared.large.is_large(name):
         raise InputError(
             f"scenario {name!r} is too large to be swept here; use the command odscen sweep"
@@ -128,7 +128,7 @@ def _document(shared: Services, name: str) -> Scenario:
     return shared.drafts.get(name).scenario
 
 
-def _saved(shared: Services, scenario: Scenario, name: str, *, given: bool) -> Draft:
+def _save_scenario(shared: Services, scenario: Scenario, name: str, *, given: bool) -> Draft:
     label = "Case of a sweep"
     try:
         return shared.drafts.create(scenario, name, stem=name, label=label)
@@ -141,17 +141,17 @@ def _saved(shared: Services, scenario: Scenario, name: str, *, given: bool) -> D
     return shared.drafts.create(scenario, None, stem=name, label=label)
 
 
-def _case(row: dict[str, Any], names: list[str], columns: list[str]) -> SweepCase:
+def _case_info(row: dict[str, Any], names: list[str], columns: list[str]) -> SweepCase:
     return SweepCase(
         case=row["case"],
         status=row["status"],
         safe=row["safe"],
         detail=row["detail"],
         values=[row[name] for name in names],
-        measures=[_number(row[name]) for name in columns],
+        measures=[_finite_number(row[name]) for name in columns],
     )
 
 
-def _number(value: Any) -> float | None:
+def _finite_number(value: Any) -> float | None:
     """A number as JSON has it; what is not finite is not known."""
     return None if value is None or not math.isfinite(value) else float(value)

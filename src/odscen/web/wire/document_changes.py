@@ -71,35 +71,35 @@ def changes_between(before: Scenario, after: Scenario) -> list[DocumentChange]:
             # As the document writes it: a part alone may be written otherwise.
             pair = (before, after)
             old, new = (one.model_dump(mode="json", include={name})[name] for one in pair)
-        found += _changes(old, new, f"/{name}")
+        found += _list_changes(old, new, f"/{name}")
     return found
 
 
-def _changes(before: Any, after: Any, path: str) -> Iterator[DocumentChange]:
+def _list_changes(before: Any, after: Any, path: str) -> Iterator[DocumentChange]:
     if isinstance(before, BaseModel) and isinstance(after, BaseModel):
         if before is not after and before != after:
-            yield from _changes(_json(before), _json(after), path)
+            yield from _list_changes(_json_value(before), _json_value(after), path)
     elif isinstance(before, dict) and isinstance(after, dict):
         yield from _changes_of_table(before, after, path)
     elif isinstance(before, list | tuple) and isinstance(after, list | tuple):
         yield from _changes_of_list(before, after, path)
     elif type(before) is not type(after) or before != after:
-        yield _replaced(after, path)
+        yield _replace_change(after, path)
 
 
 def _changes_of_table(
     before: dict[str, Any], after: dict[str, Any], path: str
 ) -> Iterator[DocumentChange]:
     if [key for key in before if key in after] != list(after)[: len(before.keys() & after.keys())]:
-        yield _replaced(after, path)  # JSON Patch cannot put keys in order, which people see
+        yield _replace_change(after, path)  # JSON Patch cannot put keys in order, which people see
         return
     for key in before:
         if key not in after:
-            yield DocumentChange(op="remove", path=f"{path}/{_escaped(key)}")
+            yield DocumentChange(op="remove", path=f"{path}/{_escape_key(key)}")
     for key, value in after.items():
-        place = f"{path}/{_escaped(key)}"
+        place = f"{path}/{_escape_key(key)}"
         if key in before:
-            yield from _changes(before[key], value, place)
+            yield from _list_changes(before[key], value, place)
         else:
             yield DocumentChange(op="add", path=place, value=value)
 
@@ -108,46 +108,46 @@ def _changes_of_list(
     before: Sequence[Any], after: Sequence[Any], path: str
 ) -> Iterator[DocumentChange]:
     """Entries are followed by their ids; without ids, or in another order, the list is sent."""
-    old, new = _keys(before), _keys(after)
+    old, new = _rows_by_id(before), _rows_by_id(after)
     if old is None or new is None or [k for k in old if k in new] != [k for k in new if k in old]:
-        if _json(before) != _json(after):
-            yield _replaced(after, path)
+        if _json_value(before) != _json_value(after):
+            yield _replace_change(after, path)
         return
     gone = [row for key, row in old.items() if key not in new]
     fresh = sum(key not in old for key in new)
     if len(gone) + fresh > 1 and len(gone) + fresh > MOST_OF_A_LIST * len(before):
-        yield _replaced(after, path)
+        yield _replace_change(after, path)
         return
     for row in reversed(gone):
         yield DocumentChange(op="remove", path=f"{path}/{row}")
     for key, row in new.items():
         if key in old:
-            yield from _changes(before[old[key]], after[row], f"{path}/{row}")
+            yield from _list_changes(before[old[key]], after[row], f"{path}/{row}")
         else:
-            yield DocumentChange(op="add", path=f"{path}/{row}", value=_json(after[row]))
+            yield DocumentChange(op="add", path=f"{path}/{row}", value=_json_value(after[row]))
 
 
-def _keys(entries: Sequence[Any]) -> dict[str, int] | None:
+def _rows_by_id(entries: Sequence[Any]) -> dict[str, int] | None:
     """Rows of entries by their ids; ``None`` if they have none, or share one."""
-    rows = {key: row for row, key in enumerate(map(_key, entries)) if isinstance(key, str)}
+    rows = {key: row for row, key in enumerate(map(_entry_id, entries)) if isinstance(key, str)}
     return rows if len(rows) == len(entries) else None
 
 
-def _key(entry: Any) -> Any:
+def _entry_id(entry: Any) -> Any:
     if isinstance(entry, str):
         return entry
     return entry.get("id") if isinstance(entry, dict) else getattr(entry, "id", None)
 
 
-def _replaced(value: Any, path: str) -> DocumentChange:
-    return DocumentChange(op="replace", path=path, value=_json(value))
+def _replace_change(value: Any, path: str) -> DocumentChange:
+    return DocumentChange(op="replace", path=path, value=_json_value(value))
 
 
-def _json(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     if isinstance(value, BaseModel):
         return value.model_dump(mode="json")
-    return [_json(one) for one in value] if isinstance(value, list | tuple) else value
+    return [_json_value(one) for one in value] if isinstance(value, list | tuple) else value
 
 
-def _escaped(key: str) -> str:
+def _escape_key(key: str) -> str:
     return key.replace("~", "~0").replace("/", "~1")

@@ -96,7 +96,7 @@ class MovingFrame:
         if not self._names:
             return None
         if self.fixed or len(self._names) > 1:
-            names = " and ".join(repr(one) for one in sorted(self._names))
+            names = " and ".join(repr(name) for name in sorted(self._names))
             where = " and to the map" if self.fixed else ""
             raise RefusedError(kind, f"places relative to {names}{where}, which move apart")
         (name,) = self._names

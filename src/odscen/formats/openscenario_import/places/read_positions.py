@@ -106,15 +106,15 @@ class PositionReader:
         """
         kind = self.report.only(position)
         read = {
-            "WorldPosition": self._world,
-            "LanePosition": self._lane,
-            "RoadPosition": self._road,
+            "WorldPosition": self._read_world_position,
+            "LanePosition": self._read_lane_position,
+            "RoadPosition": self._read_road_position,
             "RelativeLanePosition": self._relative_lane,
             "RelativeRoadPosition": self._relative_road,
             "RelativeWorldPosition": self._relative_world,
             "RelativeObjectPosition": self._relative_object,
-            "RoutePosition": self._route,
-            "TrajectoryPosition": self._trajectory,
+            "RoutePosition": self._read_route_position,
+            "TrajectoryPosition": self._read_trajectory_position,
         }.get(str(kind.tag))
         if read is None:
             raise RefusedError(kind, f"a place given as {kind.tag}")
@@ -122,13 +122,13 @@ class PositionReader:
         if frame is not None:
             if kind.get("entityRef") in self.moving:
                 found = frame.point(kind)
-                return self._turned(found, kind)
+                return self._turn_to_orientation(found, kind)
             frame.fixed = True
         found = read(kind)
         self.report.positions[position] = (round(float(found.x), 2), round(float(found.y), 2))
-        return self._turned(found, kind)
+        return self._turn_to_orientation(found, kind)
 
-    def _turned(self, found: MapPoint, kind: _Element) -> MapPoint:
+    def _turn_to_orientation(self, found: MapPoint, kind: _Element) -> MapPoint:
         turn = self.report.child(kind, "Orientation")
         if turn is None:
             return found
@@ -200,7 +200,7 @@ class PositionReader:
         wanted = key.lane + by
         if (key.lane < 0) != (wanted < 0) or wanted == 0:
             wanted += 1 if by > 0 else -1
-        return self._node(key.road, wanted, float(lanes.s[node]), section=key.section)
+        return self._find_node(key.road, wanted, float(lanes.s[node]), section=key.section)
 
     def of_entity(self, element: _Element) -> MapPoint:
         """Where the entity is that an element names.
@@ -223,7 +223,9 @@ class PositionReader:
             self.report.mark(element, "approximated", words)
         return self.starts[name]
 
-    def _node(self, road: str, lane: int, s: float, *, section: int | None = None) -> int | None:
+    def _find_node(
+        self, road: str, lane: int, s: float, *, section: int | None = None
+    ) -> int | None:
         lanes = self.graph.lanes
         first = lanes.lanes.first_node
         found: list[int] = []
@@ -234,15 +236,15 @@ class PositionReader:
             return None
         return int(found[int(np.argmin(np.abs(lanes.s[found] - s)))])
 
-    def _at(self, node: int, s: float | None = None, offset: float = 0.0) -> MapPoint:
+    def _point_at_node(self, node: int, s: float | None = None, offset: float = 0.0) -> MapPoint:
         lanes = self.graph.lanes
         forward = bool(lanes.lanes.forward[int(lanes.lane[node])])
-        ahead = 0.0 if s is None else self._kept(node, s) - float(lanes.s[node])
-        offset = self._kept(node, offset)
+        ahead = 0.0 if s is None else self._traced_metres(node, s) - float(lanes.s[node])
+        offset = self._traced_metres(node, offset)
         point = MapPoint(float(lanes.x[node]), float(lanes.y[node]), float(lanes.hdg[node]), node)
         return point.moved(ahead, offset) if forward else point.moved(-ahead, -offset)
 
-    def _kept(self, node: int, metres: float) -> float:
+    def _traced_metres(self, node: int, metres: float) -> float:
         """Metres along or across the lane of a node: a formula only if the lane is straight."""
         lanes = self.graph.lanes
         row = int(lanes.lane[node])
@@ -250,7 +252,7 @@ class PositionReader:
         straight = bool(np.ptp(np.unwrap(lanes.hdg[nodes])) < _STRAIGHT)
         return metres if self.varied and straight else float(metres)
 
-    def _world(self, kind: _Element) -> MapPoint:
+    def _read_world_position(self, kind: _Element) -> MapPoint:
         x, y = self.report.number(kind, "x"), self.side * self.report.number(kind, "y")
         if kind.get("h") is not None:
             return MapPoint(x, y, self.side * self.report.number(kind, "h"))
@@ -258,17 +260,17 @@ class PositionReader:
         near = int(np.argmin(np.hypot(lanes.x - x, lanes.y - y)))
         return MapPoint(x, y, float(lanes.hdg[near]))
 
-    def _lane(self, kind: _Element) -> MapPoint:
+    def _read_lane_position(self, kind: _Element) -> MapPoint:
         road, s = self.report.word(kind, "roadId"), self.report.number(kind, "s")
         lane = self.report.number(kind, "laneId")
         offset = self.side * self.report.number(kind, "offset", 0.0)
-        node = self._node(road, int(lane), s)
+        node = self._find_node(road, int(lane), s)
         walk = self._on_foot(road, int(lane), s) if node is None else None
         if walk is not None:
             return walk.moved(0.0, offset if lane < 0 else -offset)
         if node is None:
             return self._on_any_lane(kind, road, int(lane), s, offset)
-        return self._at(node, s, offset)
+        return self._point_at_node(node, s, offset)
 
     def _on_any_lane(
         self, kind: _Element, road: str, lane: int, s: float, offset: float
@@ -305,7 +307,7 @@ class PositionReader:
         point = MapPoint(*found)
         return point if t < 0 else point._replace(hdg=point.hdg + math.pi)
 
-    def _road(self, kind: _Element) -> MapPoint:
+    def _read_road_position(self, kind: _Element) -> MapPoint:
         s, t = self.report.number(kind, "s"), self.report.number(kind, "t", 0.0)
         return self._on_road(kind, self.report.word(kind, "roadId"), s, t)
 
@@ -323,9 +325,9 @@ class PositionReader:
         forward = bool(lanes.lanes.forward[int(lanes.lane[beside])])
         offset = self.report.number(kind, "offset", 0.0)
         there = self.along(beside, metres if forward else -metres)
-        if not isinstance(self._kept(beside, metres), TracedNumber):
-            return self._at(there, None, offset)
-        base, here = self.of_entity(kind), self._at(beside, None, offset)
+        if not isinstance(self._traced_metres(beside, metres), TracedNumber):
+            return self._point_at_node(there, None, offset)
+        base, here = self.of_entity(kind), self._point_at_node(beside, None, offset)
         ahead = (base.x - here.x) * math.cos(here.hdg) + (base.y - here.y) * math.sin(here.hdg)
         return here.moved(ahead + (metres if forward else -metres))._replace(node=there)
 
@@ -334,8 +336,8 @@ class PositionReader:
         lanes = self.graph.lanes
         metres, left = (self.report.number(kind, name, 0.0) for name in ("ds", "dt"))
         side = 1.0 if bool(lanes.lanes.forward[int(lanes.lane[node])]) else -1.0
-        there = self._at(self.along(node, side * metres))
-        here = self._at(node)
+        there = self._point_at_node(self.along(node, side * metres))
+        here = self._point_at_node(node)
         off = (base.y - here.y) * math.cos(here.hdg) - (base.x - here.x) * math.sin(here.hdg)
         return there.moved(0.0, off + side * left)._replace(node=None)
 
@@ -348,12 +350,12 @@ class PositionReader:
         dx, dy = (self.report.number(kind, name, 0.0) for name in ("dx", "dy"))
         return self.of_entity(kind)._replace(node=None).moved(dx, self.side * dy)
 
-    def _trajectory(self, kind: _Element) -> MapPoint:
+    def _read_trajectory_position(self, kind: _Element) -> MapPoint:
         if self.on_trajectory is None:
             raise RefusedError(kind, "a place on a trajectory")
         return self.on_trajectory(self, kind)
 
-    def _route(self, kind: _Element) -> MapPoint:
+    def _read_route_position(self, kind: _Element) -> MapPoint:
         inside = next(kind.iter(*_IN_ROUTE), None)
         places = kind.findall(".//Waypoint/Position")
         if inside is not None and inside.tag == "FromCurrentEntity":
@@ -361,14 +363,14 @@ class PositionReader:
             return self.of_entity(inside)
         if inside is None or not places:
             raise RefusedError(kind, "a place on a route without the route, or without a place")
-        for one in kind.iter("*"):
-            self.report.mark(one, "approximated", "taken along the lane of the first waypoint")
+        for element in kind.iter("*"):
+            self.report.mark(element, "approximated", "taken along the lane of the first waypoint")
         base = self.point(places[0])
         node = self.node_near(base) if base.node is None else base.node
         metres = self.report.number(inside, "pathS")
         there = self.along(node, metres)
         if inside.tag == "FromLaneCoordinates":
-            return self._at(there)
+            return self._point_at_node(there)
         lanes = self.graph.lanes
         key = lanes.lanes.keys[int(lanes.lane[there])]
         t = self.side * self.report.number(inside, "t", 0.0)

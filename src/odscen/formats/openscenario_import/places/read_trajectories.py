@@ -50,8 +50,8 @@ def read_trajectory(
     line = next(kind.iter("Trajectory"), None)
     if line is None:
         raise RefusedError(kind, "a trajectory that is not found")
-    for one in kind.iter("Trajectory", "Shape", "TrajectoryRef"):
-        report.mark(one, "taken")
+    for element in kind.iter("Trajectory", "Shape", "TrajectoryRef"):
+        report.mark(element, "taken")
     shape = line.find("Shape")
     body = None if shape is None else report.child(shape)
     reader = None if body is None else SHAPES.get(str(body.tag))
@@ -60,7 +60,7 @@ def read_trajectory(
     points = reader(report, positions, body)
     if len(points) < 2:
         raise RefusedError(body, f"a {body.tag} of less than two points")
-    return _from(points, report.number(kind, "initialDistanceOffset", 0.0))
+    return _points_from(points, report.number(kind, "initialDistanceOffset", 0.0))
 
 
 def trajectory_place(positions: PositionReader, kind: _Element) -> MapPoint:
@@ -78,7 +78,7 @@ def trajectory_place(positions: PositionReader, kind: _Element) -> MapPoint:
     if not -_BEYOND <= along <= length + _BEYOND:
         words = f"at the end of the trajectory, which is {length:.1f} m long"
         report.mark(kind, "approximated", words)
-    first, second = _from(points, min(max(float(along), 0.0), length))[:2]
+    first, second = _points_from(points, min(max(float(along), 0.0), length))[:2]
     hdg = math.atan2(second.at.y - first.at.y, second.at.x - first.at.x)
     return MapPoint(float(first.at.x), float(first.at.y), hdg).moved(0.0, float(left))
 
@@ -87,7 +87,7 @@ def _length_of(points: list[TrajectoryPoint]) -> float:
     return sum(one.at.away(other.at) for one, other in itertools.pairwise(points))
 
 
-def _from(points: list[TrajectoryPoint], metres: float) -> list[TrajectoryPoint]:
+def _points_from(points: list[TrajectoryPoint], metres: float) -> list[TrajectoryPoint]:
     """Points so many metres along a trajectory and after; of its last segment at least the end."""
     left = float(metres)
     if left <= 0.0:
@@ -105,23 +105,23 @@ def _from(points: list[TrajectoryPoint], metres: float) -> list[TrajectoryPoint]
     return points
 
 
-def _polyline(
+def _read_polyline(
     report: ImportReport, positions: PositionReader, shape: _Element
 ) -> list[TrajectoryPoint]:
     found: list[TrajectoryPoint] = []
     turned: list[bool] = []
     for vertex in report.children(shape, "Vertex"):
-        place = _position(report, vertex, "Position")
+        place = _required_position(report, vertex, "Position")
         at = positions.point(place)
         turned.append(place.find("*/Orientation") is not None or place.find("*[@h]") is not None)
         found.append(TrajectoryPoint(report.number(vertex, "time", 0.0), at))
     return [
-        one if own else one._replace(at=one.at._replace(hdg=_direction(found, row)))
+        one if own else one._replace(at=one.at._replace(hdg=_direction_at(found, row)))
         for row, (one, own) in enumerate(zip(found, turned, strict=True))
     ]
 
 
-def _direction(points: list[TrajectoryPoint], row: int) -> float:
+def _direction_at(points: list[TrajectoryPoint], row: int) -> float:
     """Direction in which a line leads through one of its points."""
     before, after = points[max(row - 1, 0)].at, points[min(row + 1, len(points) - 1)].at
     if before.away(after) < _SAME:
@@ -129,26 +129,28 @@ def _direction(points: list[TrajectoryPoint], row: int) -> float:
     return math.atan2(after.y - before.y, after.x - before.x)
 
 
-def _clothoid(
+def _read_clothoid(
     report: ImportReport, positions: PositionReader, shape: _Element
 ) -> list[TrajectoryPoint]:
-    start = positions.point(_position(report, shape, "Position"))
-    length = _length(report, shape)
+    start = positions.point(_required_position(report, shape, "Position"))
+    length = _read_length(report, shape)
     bend = positions.side * report.number(shape, "curvature")
     change = positions.side * report.number(
         shape, "curvaturePrime", report.number(shape, "curvatureDot", 0.0)
     )
     begin, end = (report.number(shape, name, 0.0) for name in ("startTime", "stopTime"))
-    points = _spiral(start, length, bend, bend + change * length)
-    _said(report, shape, _off(length, max(abs(bend), abs(bend + change * length))))
-    return _timed(points, begin, end)
+    points = _sample_spiral(start, length, bend, bend + change * length)
+    _note_approximation(
+        report, shape, _sagitta_of_arc(length, max(abs(bend), abs(bend + change * length)))
+    )
+    return _time_points(points, begin, end)
 
 
 def _clothoid_spline(
     report: ImportReport, positions: PositionReader, shape: _Element
 ) -> list[TrajectoryPoint]:
     segments = list(report.children(shape, "ClothoidSplineSegment"))
-    ends = [report.number(one, "timeStart", 0.0) for one in segments[1:]]
+    ends = [report.number(segment, "timeStart", 0.0) for segment in segments[1:]]
     ends.append(report.number(shape, "timeEnd", 0.0))
     found: list[TrajectoryPoint] = []
     worst = 0.0
@@ -166,22 +168,22 @@ def _clothoid_spline(
             positions.side * report.number(segment, name)
             for name in ("curvatureStart", "curvatureEnd")
         ]
-        length = _length(report, segment)
-        points = _spiral(start, length, bends[0], bends[1])
-        worst = max(worst, _off(length, max(abs(one) for one in bends)))
-        more = _timed(points, report.number(segment, "timeStart", 0.0), end)
+        length = _read_length(report, segment)
+        points = _sample_spiral(start, length, bends[0], bends[1])
+        worst = max(worst, _sagitta_of_arc(length, max(abs(bend) for bend in bends)))
+        more = _time_points(points, report.number(segment, "timeStart", 0.0), end)
         found += more[1:] if found and place is None else more
-    _said(report, shape, worst)
+    _note_approximation(report, shape, worst)
     return found
 
 
-def _nurbs(
+def _read_nurbs(
     report: ImportReport, positions: PositionReader, shape: _Element
 ) -> list[TrajectoryPoint]:
     """Rational B-spline; ``order`` is the degree plus one (section 6.9 of the user guide)."""
     degree = int(report.number(shape, "order")) - 1
     controls = list(report.children(shape, "ControlPoint"))
-    knots = np.array([report.number(one, "value") for one in report.children(shape, "Knot")])
+    knots = np.array([report.number(child, "value") for child in report.children(shape, "Knot")])
     if degree < 1 or len(controls) <= degree or len(knots) != len(controls) + degree + 1:
         raise RefusedError(
             shape,
@@ -190,10 +192,10 @@ def _nurbs(
     if np.any(np.diff(knots) < 0) or knots[degree] >= knots[len(controls)]:
         raise RefusedError(shape, "knots that do not grow")
     rows, weights = [], []
-    for one in controls:
-        at = positions.point(_position(report, one, "Position"))
-        rows.append((at.x, at.y, report.number(one, "time", 0.0)))
-        weights.append(report.number(one, "weight", 1.0))
+    for control in controls:
+        at = positions.point(_required_position(report, control, "Position"))
+        rows.append((at.x, at.y, report.number(control, "time", 0.0)))
+        weights.append(report.number(control, "weight", 1.0))
     if min(weights) <= 0:
         raise RefusedError(shape, f"a weight of {min(weights):g}")
     around = np.array(rows)
@@ -204,7 +206,7 @@ def _nurbs(
     whole = BSpline(knots, np.column_stack([around * own[:, None], own]), degree)(fine)
     x, y, time = (whole[:, :3] / whole[:, 3:]).T
     between = np.hypot(x[1::2] - (x[:-1:2] + x[2::2]) / 2, y[1::2] - (y[:-1:2] + y[2::2]) / 2)
-    _said(report, shape, float(between.max()))
+    _note_approximation(report, shape, float(between.max()))
     hdg = np.arctan2(np.gradient(y[::2]), np.gradient(x[::2]))
     return [
         TrajectoryPoint(float(t), MapPoint(float(a), float(b), float(h)))
@@ -212,21 +214,21 @@ def _nurbs(
     ]
 
 
-def _position(report: ImportReport, element: _Element, tag: str) -> _Element:
+def _required_position(report: ImportReport, element: _Element, tag: str) -> _Element:
     found = report.child(element, tag)
     if found is None:
         raise RefusedError(element, f"{element.tag} without {tag}")
     return found
 
 
-def _length(report: ImportReport, element: _Element) -> float:
+def _read_length(report: ImportReport, element: _Element) -> float:
     length = report.number(element, "length")
     if not 0 < length <= _MOST * _STEP:
         raise RefusedError(element, f"a length of {length:g} m")
     return length
 
 
-def _spiral(start: MapPoint, length: float, bend: float, end: float) -> list[MapPoint]:
+def _sample_spiral(start: MapPoint, length: float, bend: float, end: float) -> list[MapPoint]:
     """Points of a clothoid, at most a step apart; ``bend`` and ``end`` are curvatures, 1/m."""
     kind = GeometryKind.SPIRAL if bend != end else GeometryKind.ARC
     params: tuple[float, ...] = (bend, end) if kind is GeometryKind.SPIRAL else (bend,)
@@ -241,19 +243,19 @@ def _spiral(start: MapPoint, length: float, bend: float, end: float) -> list[Map
     ]
 
 
-def _timed(points: list[MapPoint], begin: float, end: float) -> list[TrajectoryPoint]:
+def _time_points(points: list[MapPoint], begin: float, end: float) -> list[TrajectoryPoint]:
     """Points with times that grow evenly along the curve."""
     times = np.linspace(begin, end, len(points))
     return [TrajectoryPoint(float(time), at) for time, at in zip(times, points, strict=True)]
 
 
-def _off(length: float, bend: float) -> float:
+def _sagitta_of_arc(length: float, bend: float) -> float:
     """Metres between an arc and its chord, at most: the sagitta."""
     chord = length / max(math.ceil(length / _STEP), 1)
     return chord * chord * bend / 8.0
 
 
-def _said(report: ImportReport, shape: _Element, metres: float) -> None:
+def _note_approximation(report: ImportReport, shape: _Element, metres: float) -> None:
     words = f"a polyline of points up to {_STEP:g} m apart, up to {metres:.3f} m off the curve"
     report.mark(shape, "approximated", words)
 
@@ -261,8 +263,8 @@ def _said(report: ImportReport, shape: _Element, metres: float) -> None:
 SHAPES: Final[
     Mapping[str, Callable[[ImportReport, PositionReader, _Element], list[TrajectoryPoint]]]
 ] = {
-    "Polyline": _polyline,
-    "Clothoid": _clothoid,
+    "Polyline": _read_polyline,
+    "Clothoid": _read_clothoid,
     "ClothoidSpline": _clothoid_spline,
-    "Nurbs": _nurbs,
+    "Nurbs": _read_nurbs,
 }

@@ -22,11 +22,11 @@ def name_entities(report: ImportReport, root: _Element) -> None:
     """Put entities in the place of selections, in a tree in which each attribute has its value."""
     selections: dict[str, tuple[str, ...]] = {}
     for element in root.iterfind("Entities/EntitySelection"):
-        selections[element.get("name", "")] = _members(root, element, selections)
+        selections[element.get("name", "")] = _members_of(root, element, selections)
         report.take(element)
     for actors in root.iterfind("Storyboard/Story//Actors"):
         if actors.get("selectTriggeringEntities") == "true":
-            _triggering(report, actors)
+            _add_triggering_entities(report, actors)
     for element in [*root.iterfind("Storyboard//EntityRef")]:
         above = element.getparent()
         if above is None or above.tag not in ("Actors", "TriggeringEntities"):
@@ -38,26 +38,28 @@ def name_entities(report: ImportReport, root: _Element) -> None:
             above.remove(element)
 
 
-def _members(
+def _members_of(
     root: _Element, selection: _Element, known: Mapping[str, tuple[str, ...]]
 ) -> tuple[str, ...]:
     found: dict[str, None] = {}
-    for one in selection.iterfind("Members/EntityRef"):
-        name = one.get("entityRef", "")
+    for element in selection.iterfind("Members/EntityRef"):
+        name = element.get("entityRef", "")
         found |= dict.fromkeys(known.get(name, (name,)))
-    for one in selection.iterfind("Members/ByType"):
-        tag = _KINDS.get(one.get("objectType", ""), "")
+    for element in selection.iterfind("Members/ByType"):
+        tag = _KINDS.get(element.get("objectType", ""), "")
         these = root.iterfind("Entities/ScenarioObject")
         found |= {it.get("name", ""): None for it in these if tag and it.find(tag) is not None}
     return tuple(found)
 
 
-def _triggering(report: ImportReport, actors: _Element) -> None:
+def _add_triggering_entities(report: ImportReport, actors: _Element) -> None:
     """Add the entities of the trigger of the act, which is when its actors are chosen."""
     act = next(actors.iterancestors("Act"), None)
-    there = {one.get("entityRef") for one in actors.iterfind("EntityRef")}
-    for one in () if act is None else act.iterfind("StartTrigger//TriggeringEntities/EntityRef"):
-        if one.get("entityRef") not in there:
-            there.add(one.get("entityRef"))
-            actors.append(actors.makeelement("EntityRef", entityRef=one.get("entityRef", "")))
+    there = {element.get("entityRef") for element in actors.iterfind("EntityRef")}
+    for element in (
+        () if act is None else act.iterfind("StartTrigger//TriggeringEntities/EntityRef")
+    ):
+        if element.get("entityRef") not in there:
+            there.add(element.get("entityRef"))
+            actors.append(actors.makeelement("EntityRef", entityRef=element.get("entityRef", "")))
     report.mark(actors, "approximated", _WHOEVER)

@@ -46,12 +46,12 @@ def with_parameters(
     document = with_formulas(data, reached)
     made: dict[str, Made] = {}
     for name, one in declared.items():
-        made[name] = _parameter(report, one, frozenset(made))
+        made[name] = _read_parameter(report, one, frozenset(made))
     used = frozenset().union(*(names_in(report.formulas[one]) for one in reached))
     kept = _with_needed(made, used)
     document["parameters"] = {name: one for name, one in made.items() if name in kept}
     for name, element in declared.items():
-        _tell(report, name, element, reached, kept=name in kept)
+        _report_kept_value(report, name, element, reached, kept=name in kept)
     return computed(document) if kept else document
 
 
@@ -66,7 +66,7 @@ def _with_needed(made: Mapping[str, Made], used: frozenset[str]) -> frozenset[st
     return found
 
 
-def _parameter(report: ImportReport, element: _Element, earlier: frozenset[str]) -> Made:
+def _read_parameter(report: ImportReport, element: _Element, earlier: frozenset[str]) -> Made:
     value = report.number(element, "value")
     found: Made = {"value": report.formulas.get((element, "value"), float(value))}
     groups = list(report.children(element, "ConstraintGroup"))
@@ -75,11 +75,13 @@ def _parameter(report: ImportReport, element: _Element, earlier: frozenset[str])
         why = "one of several groups, of which any may hold" if len(groups) > 1 else ""
         if not report.uses.get((bound, "value"), frozenset()) <= earlier:
             why = "it depends on a parameter that is declared later"
-        _bound(report, bound, found, value=value, why=why)
+        _read_bound(report, bound, found, value=value, why=why)
     return found
 
 
-def _bound(report: ImportReport, bound: _Element, found: Made, *, value: float, why: str) -> None:
+def _read_bound(
+    report: ImportReport, bound: _Element, found: Made, *, value: float, why: str
+) -> None:
     rule, limit = bound.get("rule", ""), report.number(bound, "value")
     side = _BOUNDS.get(rule)
     holds = value >= limit if side == "min" else value <= limit
@@ -95,7 +97,7 @@ def _bound(report: ImportReport, bound: _Element, found: Made, *, value: float, 
         report.mark(bound, "approximated", "the bound itself is possible too")
 
 
-def _tell(
+def _report_kept_value(
     report: ImportReport, name: str, element: _Element, reached: set[Source], *, kept: bool
 ) -> None:
     """Say where a parameter keeps its declared value."""

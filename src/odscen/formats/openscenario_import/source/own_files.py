@@ -32,8 +32,8 @@ def own_fields(report: ImportReport, thing: _Element) -> Made | None:
     """
     found: Made = {}
     for group in report.children(thing, "Properties"):
-        for one in report.children(group, "Property"):
-            name, text = one.get("name", ""), one.get("value", "")
+        for child in report.children(group, "Property"):
+            name, text = child.get("name", ""), child.get("value", "")
             if name.startswith(PREFIX):
                 found[name.removeprefix(PREFIX)] = value_of(text)
     return found if "spawn" in found else None

@@ -63,36 +63,36 @@ class _DistributionReader:
     def deterministic(self, group: _Element) -> list[Range | Table]:
         """An axis for each distribution of parameters that are known."""
         found: list[Range | Table] = []
-        for one in self.report.children(group):
+        for child in self.report.children(group):
             try:
-                if one.tag == "DeterministicMultiParameterDistribution":
-                    axis: Range | Table | None = self._together(self.report.only(one))
+                if child.tag == "DeterministicMultiParameterDistribution":
+                    axis: Range | Table | None = self._read_value_sets(self.report.only(child))
                 else:
-                    axis = self._single(one)
+                    axis = self._read_single(child)
             except RefusedError as error:
-                self.report.mark(one, "refused", error.reason)
+                self.report.mark(child, "refused", error.reason)
                 continue
             if axis is not None:
                 found.append(axis)
         return found
 
-    def _single(self, element: _Element) -> Range | Table | None:
+    def _read_single(self, element: _Element) -> Range | Table | None:
         name = self.report.word(element, "parameterName").lstrip("$")
         if not self._is_known(element, name):
             return None
         kind = self.report.only(element)
         if kind.tag == "DistributionSet":
-            values = [self.report.number(one, "value") for one in self.report.children(kind)]
-            return Table((name,), _rows(kind, [(_plain(value),) for value in values]))
+            values = [self.report.number(child, "value") for child in self.report.children(kind)]
+            return Table((name,), _unique_rows(kind, [(_round_value(value),) for value in values]))
         if kind.tag == "DistributionRange":
-            return self._range(kind, name)
+            return self._read_range(kind, name)
         raise RefusedError(kind, f"a {kind.tag} of values")
 
-    def _range(self, kind: _Element, name: str) -> Range | Table:
+    def _read_range(self, kind: _Element, name: str) -> Range | Table:
         """Values from the lower limit on, a step apart, up to the upper limit."""
         limits = self.report.only(kind)
-        low = _plain(self.report.number(limits, "lowerLimit"))
-        high = _plain(self.report.number(limits, "upperLimit"))
+        low = _round_value(self.report.number(limits, "lowerLimit"))
+        high = _round_value(self.report.number(limits, "upperLimit"))
         step = self.report.number(kind, "stepWidth")
         if step <= 0 or high < low:
             raise self.report.wrong(kind, f"no step of {step:g} leads from {low:g} to {high:g}")
@@ -104,24 +104,26 @@ class _DistributionReader:
             return Range(name, low, high, count)
         return Table((name,), tuple((value,) for value in values))
 
-    def _together(self, kind: _Element) -> Table | None:
+    def _read_value_sets(self, kind: _Element) -> Table | None:
         """Values that belong together; columns of parameters that are not known are left out."""
         if kind.tag != "ValueSetDistribution":
             raise RefusedError(kind, f"a {kind.tag} of values")
         rows: list[dict[str, float]] = []
         for group in self.report.children(kind, "ParameterValueSet"):
             row = {}
-            for one in self.report.children(group, "ParameterAssignment"):
-                name = self.report.word(one, "parameterRef").lstrip("$")
-                if self._is_known(one, name):
-                    row[name] = _plain(self.report.number(one, "value"))
+            for child in self.report.children(group, "ParameterAssignment"):
+                name = self.report.word(child, "parameterRef").lstrip("$")
+                if self._is_known(child, name):
+                    row[name] = _round_value(self.report.number(child, "value"))
             rows.append(row)
         names = tuple(rows[0]) if rows else ()
         if any(set(row) != set(names) for row in rows):
             raise RefusedError(kind, "sets of values that do not have the same parameters")
         if not names:
             return None
-        return Table(names, _rows(kind, [tuple(row[name] for name in names) for row in rows]))
+        return Table(
+            names, _unique_rows(kind, [tuple(row[name] for name in names) for row in rows])
+        )
 
     def _is_known(self, element: _Element, name: str) -> bool:
         if name in self.known:
@@ -144,7 +146,7 @@ class _DistributionReader:
                 continue
             generator = np.random.default_rng([seed, index])
             try:
-                columns[name] = self._column(self.report.only(one), count, generator)
+                columns[name] = self._draw_column(self.report.only(one), count, generator)
             except RefusedError as error:
                 self.report.mark(one, "refused", error.reason)
                 continue
@@ -153,11 +155,11 @@ class _DistributionReader:
         rows = tuple(zip(*columns.values(), strict=True))
         return [Table(tuple(columns), rows)] if columns else []
 
-    def _column(self, kind: _Element, count: int, generator: Generator) -> list[float]:
+    def _draw_column(self, kind: _Element, count: int, generator: Generator) -> list[float]:
         draw = DRAWS.get(str(kind.tag))
         if draw is None:
             raise RefusedError(kind, f"a {kind.tag} of values")
-        return [_plain(value) for value in draw(self, kind, count, generator).tolist()]
+        return [_round_value(value) for value in draw(self, kind, count, generator).tolist()]
 
     def limits(self, kind: _Element) -> tuple[float, float]:
         """Limits of a distribution; infinite without a range."""
@@ -170,7 +172,7 @@ class _DistributionReader:
         return low, high
 
 
-def _uniform(
+def _draw_uniform(
     read: _DistributionReader, kind: _Element, count: int, generator: Generator
 ) -> FloatArray:
     low, high = read.limits(kind)
@@ -179,7 +181,7 @@ def _uniform(
     return generator.uniform(low, high, count)
 
 
-def _normal(
+def _draw_normal(
     read: _DistributionReader, kind: _Element, count: int, generator: Generator
 ) -> FloatArray:
     from scipy.stats import truncnorm
@@ -197,7 +199,7 @@ def _normal(
     return clipped
 
 
-def _poisson(
+def _draw_poisson(
     read: _DistributionReader, kind: _Element, count: int, generator: Generator
 ) -> FloatArray:
     """Whole numbers in the range, as often as a Poisson distribution has them."""
@@ -215,11 +217,11 @@ def _poisson(
     return found
 
 
-def _histogram(
+def _draw_histogram(
     read: _DistributionReader, kind: _Element, count: int, generator: Generator
 ) -> FloatArray:
     bins = list(read.report.children(kind, "Bin", "HistogramBin"))
-    chosen = generator.choice(len(bins), count, p=_shares(read, kind, bins))
+    chosen = generator.choice(len(bins), count, p=_read_shares(read, kind, bins))
     limits = np.array([read.limits(one) for one in bins])
     if not np.isfinite(limits).all():
         raise read.report.wrong(kind, "a bin has no Range")
@@ -232,12 +234,12 @@ def _by_weight(
     read: _DistributionReader, kind: _Element, count: int, generator: Generator
 ) -> FloatArray:
     values = list(read.report.children(kind, "Element"))
-    chosen = generator.choice(len(values), count, p=_shares(read, kind, values))
-    return np.array([read.report.number(one, "value") for one in values])[chosen]
+    chosen = generator.choice(len(values), count, p=_read_shares(read, kind, values))
+    return np.array([read.report.number(value, "value") for value in values])[chosen]
 
 
-def _shares(read: _DistributionReader, kind: _Element, parts: list[_Element]) -> FloatArray:
-    weights = np.array([read.report.number(one, "weight") for one in parts])
+def _read_shares(read: _DistributionReader, kind: _Element, parts: list[_Element]) -> FloatArray:
+    weights = np.array([read.report.number(part, "weight") for part in parts])
     if not parts or weights.min() < 0 or not weights.sum() > 0:
         raise read.report.wrong(kind, "there are no parts with weights")
     shares: FloatArray = weights / weights.sum()
@@ -247,20 +249,20 @@ def _shares(read: _DistributionReader, kind: _Element, parts: list[_Element]) ->
 DRAWS: Final[
     Mapping[str, Callable[[_DistributionReader, _Element, int, Generator], FloatArray]]
 ] = {
-    "UniformDistribution": _uniform,
-    "NormalDistribution": _normal,
-    "PoissonDistribution": _poisson,
-    "Histogram": _histogram,
+    "UniformDistribution": _draw_uniform,
+    "NormalDistribution": _draw_normal,
+    "PoissonDistribution": _draw_poisson,
+    "Histogram": _draw_histogram,
     "ProbabilityDistributionSet": _by_weight,
 }
 """How values of stochastic distributions are drawn."""
 
 
-def _plain(value: float) -> float:
+def _round_value(value: float) -> float:
     return round(float(value), _DIGITS)
 
 
-def _rows(kind: _Element, rows: list[tuple[float, ...]]) -> tuple[tuple[float, ...], ...]:
+def _unique_rows(kind: _Element, rows: list[tuple[float, ...]]) -> tuple[tuple[float, ...], ...]:
     """Rows in their order, each once."""
     if not rows:
         raise RefusedError(kind, "it has no values")

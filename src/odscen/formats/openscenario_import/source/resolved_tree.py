@@ -62,39 +62,39 @@ class TreeResolver:
         InputError
             If a name is unknown, an expression has no value, or a catalog is missing.
         """
-        values = self._declared(root, {}, named=True)
+        values = self._declared_values(root, {}, named=True)
         for element in root.iterfind("CatalogLocations/*/Directory"):
-            self._put(element, values)
+            self._put_values(element, values)
             self._report.mark(element, "taken")
         places = root.iterfind("CatalogLocations//Directory")
         self._folders = tuple(element.get("path", "") for element in places)
         for element in (*root.iterfind("CatalogLocations"), *root.iterfind("CatalogLocations/*")):
             self._report.mark(element, "taken")
-        for one in self.parameters.values():
-            for bound in one.iterfind("ConstraintGroup/ValueConstraint"):
-                self._put(bound, values)
-        self._inside(root, values, depth=0)
+        for parameter in self.parameters.values():
+            for bound in parameter.iterfind("ConstraintGroup/ValueConstraint"):
+                self._put_values(bound, values)
+        self._resolve_inside(root, values, depth=0)
         return values
 
-    def _inside(self, element: _Element, values: Mapping[str, str], *, depth: int) -> None:
+    def _resolve_inside(self, element: _Element, values: Mapping[str, str], *, depth: int) -> None:
         if depth > 8:
             raise self._report.wrong(element, "catalogs refer to each other without end")
         try:
-            self._put(element, values)
+            self._put_values(element, values)
         except InputError as error:
             if next(element.iterancestors("Event"), None) is None:
                 raise
             # Its event alone is refused, where the value is read.
             self._report.mark(element, "refused", error.problem)
         if element.tag == "CatalogReference":
-            self._expand(element, values, depth=depth)
+            self._expand_catalog_reference(element, values, depth=depth)
             return
-        own = values if element.tag == "OpenSCENARIO" else self._declared(element, values)
+        own = values if element.tag == "OpenSCENARIO" else self._declared_values(element, values)
         for child in list(element.iterchildren("*")):
             if child.tag != "ParameterDeclarations":
-                self._inside(child, own, depth=depth)
+                self._resolve_inside(child, own, depth=depth)
 
-    def _declared(
+    def _declared_values(
         self, element: _Element, values: Mapping[str, str], *, named: bool = False
     ) -> dict[str, str]:
         """Names in force inside an element; those of the file itself are parameters of scenarios.
@@ -108,7 +108,7 @@ class TreeResolver:
         for group in element.iterchildren("ParameterDeclarations", "VariableDeclarations"):
             self._report.mark(group, "taken")
             for one in group.iterchildren("ParameterDeclaration", "VariableDeclaration"):
-                self._put(one, found)
+                self._put_values(one, found)
                 name, text = one.get("name", "").lstrip("$"), str(one.get("value", ""))
                 formula = self._report.formulas.get((one, "value"))
                 if named and one.tag == "ParameterDeclaration" and is_parameter(name, text):
@@ -120,26 +120,28 @@ class TreeResolver:
                 found[name] = text if formula is None else TracedText.of(text, formula)
         return found
 
-    def _put(self, element: _Element, values: Mapping[str, str]) -> None:
+    def _put_values(self, element: _Element, values: Mapping[str, str]) -> None:
         for key, text in element.attrib.items():
             if "$" in text and key not in _LITERAL:
-                self._trace(element, str(key), str(text), values)
-                element.set(key, self._value(element, str(text), values))
+                self._trace_parameters(element, str(key), str(text), values)
+                element.set(key, self._value_of_text(element, str(text), values))
             elif key == "parameterRef" and element.tag == "ParameterCondition":
-                self._trace(element, str(key), "$" + str(text).lstrip("$"), values)
+                self._trace_parameters(element, str(key), "$" + str(text).lstrip("$"), values)
 
-    def _trace(self, element: _Element, key: str, text: str, values: Mapping[str, str]) -> None:
+    def _trace_parameters(
+        self, element: _Element, key: str, text: str, values: Mapping[str, str]
+    ) -> None:
         """Note which parameters an attribute comes from, and by which formula if it has one."""
         named = [values.get(name) for name in _NAME.findall(text)]
         used = [names_in(one.formula) for one in named if isinstance(one, TracedText)]
         if not used:
             return
         self._report.uses[element, key] = frozenset().union(*used)
-        formula = _formula(text, values)
+        formula = _formula_of(text, values)
         if formula is not None:
             self._report.formulas[element, key] = formula
 
-    def _value(self, element: _Element, text: str, values: Mapping[str, str]) -> str:
+    def _value_of_text(self, element: _Element, text: str, values: Mapping[str, str]) -> str:
         numbers = {}
         for name, value in values.items():
             try:
@@ -157,18 +159,20 @@ class TreeResolver:
             raise self._report.wrong(element, f"{text!r} is no parameter of the file")
         return values[whole[1]]
 
-    def _expand(self, element: _Element, values: Mapping[str, str], *, depth: int) -> None:
+    def _expand_catalog_reference(
+        self, element: _Element, values: Mapping[str, str], *, depth: int
+    ) -> None:
         """Put the entry of a catalog in the place of its reference."""
         name, entry = element.get("catalogName", ""), element.get("entryName", "")
         found = self._catalog(self._folders, name)
-        where = None if found is None else _entry(found[0], entry)
+        where = None if found is None else _find_entry(found[0], entry)
         if found is None or where is None:
-            self._missing(element, f"no catalog has {name!r} with {entry!r}")
+            self._replace_missing_entry(element, f"no catalog has {name!r} with {entry!r}")
             return
         self._report.mark(element, "taken")
-        given = self._assigned(element, values)
+        given = self._assigned_values(element, values)
         whole = deepcopy(found[0])
-        copy = _entry(whole, entry)
+        copy = _find_entry(whole, entry)
         if copy is None:
             return
         self._report.add(copy, found[1])
@@ -180,12 +184,12 @@ class TreeResolver:
                     if isinstance(text, TracedText):
                         self._report.formulas[one, "value"] = text.formula
         # An entry should declare all that it names; esmini's use parameters of the file too.
-        self._inside(copy, values, depth=depth + 1)
+        self._resolve_inside(copy, values, depth=depth + 1)
         parent = element.getparent()
         if parent is not None:
             parent.replace(element, copy)
 
-    def _missing(self, element: _Element, words: str) -> None:
+    def _replace_missing_entry(self, element: _Element, words: str) -> None:
         """Put a usual body in the place of one that no catalog has."""
         parent = element.getparent()
         tag = "" if parent is None else str(parent.tag)
@@ -201,12 +205,12 @@ class TreeResolver:
             what = _USUAL_BODY[str(body.tag)]
             self._report.mark(element, "approximated", f"{words}: {what} of the usual size")
 
-    def _assigned(self, element: _Element, values: Mapping[str, str]) -> dict[str, str]:
+    def _assigned_values(self, element: _Element, values: Mapping[str, str]) -> dict[str, str]:
         found = {}
         for group in element.iterchildren("ParameterAssignments"):
             self._report.mark(group, "taken")
             for one in group.iterchildren("ParameterAssignment"):
-                self._put(one, values)
+                self._put_values(one, values)
                 self._report.mark(one, "taken")
                 text, formula = str(one.get("value", "")), self._report.formulas.get((one, "value"))
                 name = one.get("parameterRef", "").lstrip("$")
@@ -214,9 +218,11 @@ class TreeResolver:
         return found
 
 
-def _entry(root: _Element, name: str) -> _Element | None:
+def _find_entry(root: _Element, name: str) -> _Element | None:
     """Entry of a catalog of that name."""
-    return next((one for one in root.iterfind("Catalog/*") if one.get("name") == name), None)
+    return next(
+        (element for element in root.iterfind("Catalog/*") if element.get("name") == name), None
+    )
 
 
 def is_parameter(name: str, text: str) -> bool:
@@ -228,7 +234,7 @@ def is_parameter(name: str, text: str) -> bool:
     return math.isfinite(value) and len(name) <= 64 and _NAME.fullmatch(f"${name}") is not None
 
 
-def _formula(text: str, values: Mapping[str, str]) -> str | None:
+def _formula_of(text: str, values: Mapping[str, str]) -> str | None:
     """Formula of parameters that an attribute is, if it is a single one of numbers."""
     whole = _EXPRESSION.fullmatch(text) or _NAME.fullmatch(text)
     if whole is None:

@@ -45,14 +45,14 @@ class ActorPlaces:
             return
         left, node = float(made.get("lateral_offset", 0.0)), there.node
         while node is not None and (
-            str(node_id(graph, node)) in taken or self._meets(entity, node, left)
+            str(node_id(graph, node)) in taken or self._overlaps_earlier(entity, node, left)
         ):
             steps += 1
             back = self._positions.along(node, -math.ceil(entity.length + 1.0))
             node = None if back == node else back
         if node is None:
             return
-        self._bodies.append((self._centre(node, left), entity.category))
+        self._bodies.append((self._centre_at(node, left), entity.category))
         if steps == 0:
             return
         made["spawn"] = str(node_id(graph, node))
@@ -60,14 +60,14 @@ class ActorPlaces:
         words = f"about {metres} m behind, as another one starts there"
         self._report.mark(entity.element, "approximated", words)
 
-    def _centre(self, node: int, left: float) -> MapPoint:
+    def _centre_at(self, node: int, left: float) -> MapPoint:
         lanes = self._positions.graph.lanes
         at = MapPoint(float(lanes.x[node]), float(lanes.y[node]), float(lanes.hdg[node]))
         return at.moved(0.0, left)
 
-    def _meets(self, entity: ReadEntity, node: int, left: float) -> bool:
+    def _overlaps_earlier(self, entity: ReadEntity, node: int, left: float) -> bool:
         """Whether the body of an actor at a node would have ground of one that starts before."""
-        own, size = self._centre(node, left), DEFAULT_BODY[entity.category]
+        own, size = self._centre_at(node, left), DEFAULT_BODY[entity.category]
         for other, category in self._bodies:
             body = DEFAULT_BODY[category]
             dx, dy = own.x - other.x, own.y - other.y

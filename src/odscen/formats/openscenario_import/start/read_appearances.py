@@ -46,8 +46,8 @@ class AppearanceReader:
         for name in names:
             if name in self.positions.starts:
                 continue
-            for place in self._places(board, name):
-                self._put(name, place)
+            for place in self._possible_places(board, name):
+                self._put_entity(name, place)
                 break
 
     def _at_first(self, about: _Element) -> None:
@@ -61,29 +61,29 @@ class AppearanceReader:
         position = about.find("AddEntityAction/Position")
         if position is not None:
             self.report.mark(position, "taken")
-            self._put(name, lambda: self.positions.point(position))
+            self._put_entity(name, lambda: self.positions.point(position))
 
-    def _places(self, board: _Element, name: str) -> Iterator[Callable[[], MapPoint]]:
+    def _possible_places(self, board: _Element, name: str) -> Iterator[Callable[[], MapPoint]]:
         """Where an entity begins: on a trajectory at first, or where the story puts it first."""
         for private in board.iterfind("Init/Actions/Private"):
             for kind in private.iter("FollowTrajectoryAction"):
                 if private.get("entityRef") == name:
-                    yield lambda kind=kind: self._begin(kind)  # type: ignore[misc]
+                    yield lambda kind=kind: self._begin_of_trajectory(kind)  # type: ignore[misc]
         for kind in board.iterfind("Story//Position"):
-            if self._puts(kind) == name:
+            if self._entity_put_at(kind) == name:
                 self.late.add(name)
                 group = next(kind.iterancestors("ManeuverGroup"), None)
                 if group is not None and group.get("name") == f"{name} departs":
                     self.departing.add(name)
                 yield lambda kind=kind: self.positions.point(kind)  # type: ignore[misc]
 
-    def _begin(self, kind: _Element) -> MapPoint:
+    def _begin_of_trajectory(self, kind: _Element) -> MapPoint:
         self.report.mark(kind, "approximated", "the actor starts on it")
         first, second, *_ = (one.at for one in read_trajectory(self.report, self.positions, kind))
         return first._replace(hdg=math.atan2(second.y - first.y, second.x - first.x))
 
     @staticmethod
-    def _puts(position: _Element) -> str | None:
+    def _entity_put_at(position: _Element) -> str | None:
         """Name of the entity that an action of the story puts at a position."""
         action = position.getparent()
         if action is None:
@@ -94,10 +94,10 @@ class AppearanceReader:
         group = next(position.iterancestors("ManeuverGroup"), None)
         if action.tag != "TeleportAction" or group is None:
             return None
-        actors = [one.get("entityRef") for one in group.iterfind("Actors/EntityRef")]
+        actors = [element.get("entityRef") for element in group.iterfind("Actors/EntityRef")]
         return actors[0] if len(actors) == 1 else None
 
-    def _put(self, name: str, place: Callable[[], MapPoint]) -> None:
+    def _put_entity(self, name: str, place: Callable[[], MapPoint]) -> None:
         try:
             self.positions.starts[name] = place()
         except RefusedError as error:

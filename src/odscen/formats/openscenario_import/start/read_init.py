@@ -55,13 +55,13 @@ class InitReader:
         for element in group.iterchildren("GlobalAction"):
             tell_unread(report, element, story=False)
         privates = list(report.children(group, "Private"))
-        self._teleports(privates)
+        self._read_teleports(privates)
         without = [name for name in self._entities if name not in self._positions.starts]
         self._appear.read(board, without)
         for private in privates:
-            self._actions(private)
+            self._read_actions(private)
 
-    def _teleports(self, privates: list[_Element]) -> None:
+    def _read_teleports(self, privates: list[_Element]) -> None:
         """Places first; one relative to an entity that has none yet waits for it."""
         report, starts = self._report, self._positions.starts
         waiting = [
@@ -85,7 +85,7 @@ class InitReader:
             report.mark(why.element, "refused", why.reason)
             report.mark(action, "refused", f"{name!r} has no place: {why.reason}")
 
-    def _actions(self, private: _Element) -> None:
+    def _read_actions(self, private: _Element) -> None:
         report, story = self._report, self._story
         entity = self._entities.get(private.get("entityRef", ""))
         if entity is None or story.actions is None:
@@ -148,9 +148,9 @@ class InitReader:
                 continue
             try:
                 if entity.own is not None:
-                    made = self._own(entity, entity.own, start)
+                    made = self._read_own_actor(entity, entity.own, start)
                 elif start is not None:
-                    made = self._actor(
+                    made = self._make_actor(
                         entity, start, free=entity.id in driven, late=name in self._appear.late
                     )
             except RefusedError as error:
@@ -167,7 +167,7 @@ class InitReader:
             del self._entities[name]  # events and conditions that name it are refused
         return found
 
-    def _own(
+    def _read_own_actor(
         self, entity: ReadEntity, fields: dict[str, Any], start: MapPoint | None
     ) -> dict[str, Any]:
         """Actor that odscen wrote; place, speed and goal of the file hold where they differ."""
@@ -194,7 +194,7 @@ class InitReader:
             made["goal"] = goals[-1]
         return made
 
-    def _actor(
+    def _make_actor(
         self, entity: ReadEntity, start: MapPoint, *, free: bool, late: bool
     ) -> dict[str, Any]:
         centre = start.moved(entity.ahead)
@@ -202,7 +202,7 @@ class InitReader:
         changes = [one["speed"] for one in then if "speed" in one]
         speed = changes[-1]["to"] if changes else 0.0
         # What takes time begins from a standstill, which entities are at before the first action.
-        first = speed if all(one.get("shape") == "step" for one in changes) else 0.0
+        first = speed if all(change.get("shape") == "step" for change in changes) else 0.0
         made: dict[str, Any] = {"id": entity.id, "category": str(entity.category)}
         if entity.category is Category.PEDESTRIAN:
             made |= self._places.walker(centre)

@@ -37,11 +37,11 @@ def tell_unread(report: ImportReport, content: _Element, *, story: bool) -> None
     kind = content if content.tag == "UserDefinedAction" else content.find("*")
     if kind is None or (story and kind.tag in READ):
         return
-    makes = [one for one in kind.iterchildren(*_MAKES) if kind.tag == "TrafficAction"]
+    makes = [element for element in kind.iterchildren(*_MAKES) if kind.tag == "TrafficAction"]
     if makes:
-        for one in (content, kind, *makes):
+        for make in (content, kind, *makes):
             words = "it puts traffic of its own on the road; give the scenario flows or demand"
-            report.mark(one, "refused", words)
+            report.mark(make, "refused", words)
     elif kind.tag == "InfrastructureAction":
         report.ignore(content, _LIGHTS)
     elif story or kind.tag not in READ | {"EnvironmentAction"}:

@@ -111,7 +111,7 @@ def _given_back(element: _Element) -> Made | None:
     return {"release": {}} if kind.get("lateral") == "true" else {"go": {}}
 
 
-def _speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+def _read_speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report = read.conditions.report
     dynamics = report.child(kind, "SpeedActionDynamics")
     target = report.child(kind, "SpeedActionTarget")
@@ -131,7 +131,7 @@ def _speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     return {"speed": {"to": to, "shape": _SHAPES.get(shape, "linear"), measure: value}}
 
 
-def _duration(read: ActionReader, dynamics: _Element | None, entity: ReadEntity) -> float:
+def _read_duration(read: ActionReader, dynamics: _Element | None, entity: ReadEntity) -> float:
     """Seconds of a change of lane."""
     report = read.conditions.report
     if dynamics is None:
@@ -154,9 +154,9 @@ def _duration(read: ActionReader, dynamics: _Element | None, entity: ReadEntity)
     return seconds
 
 
-def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+def _read_lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report = read.conditions.report
-    over = _duration(read, report.child(kind, "LaneChangeActionDynamics"), entity)
+    over = _read_duration(read, report.child(kind, "LaneChangeActionDynamics"), entity)
     target = report.child(kind, "LaneChangeTarget")
     lane = None if target is None else report.only(target)
     if lane is None:
@@ -209,7 +209,7 @@ def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: f
     return {"offset": {"to": metres, "over": max(over, 0.1)}}
 
 
-def _offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+def _read_offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report = read.conditions.report
     dynamics = report.child(kind, "LaneOffsetActionDynamics")
     target = report.child(kind, "LaneOffsetTarget")
@@ -232,7 +232,7 @@ def _offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     return {"offset": {"to": metres, "over": max(over, 0.1)}}
 
 
-def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+def _read_abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     """Keep beside another: an offset from the own lane, where both start."""
     report, positions = read.conditions.report, read.conditions.positions
     other = positions.of_entity(kind)
@@ -276,7 +276,7 @@ def _start_offset(read: ActionReader, element: _Element) -> float:
     return positions.beside_lane(positions.starts[name])
 
 
-def _gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+def _read_gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
     report = read.conditions.report
     part: Made = {"to": read.conditions.actor(kind)}
     if kind.get("displacement") == "leadingReferencedEntity":
@@ -300,15 +300,15 @@ def _gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
     return {"keep_gap": part}
 
 
-def _trajectory(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+def _read_trajectory_action(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     return followed(read.conditions, kind, entity)
 
 
-def _teleport(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+def _read_teleport(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     return teleported(read.conditions, kind, entity, read.speeds.get(entity.id, 0.0))
 
 
-def _profile(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+def _read_profile(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     """Speeds one after the other, each reached evenly; the first one at once if it takes none."""
     report = read.conditions.report
     steps: list[Made] = []
@@ -327,33 +327,33 @@ def _profile(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     return steps[0] if len(steps) == 1 else {FOLLOWING: steps}
 
 
-def _goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+def _read_goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
     positions, report = read.conditions.positions, read.conditions.report
     places = list(kind.iterfind(".//Waypoint/Position")) or list(kind.iterchildren("Position"))
     if not places:
         raise RefusedError(kind, "a route without places")
-    for one in kind.iter("Route", "Waypoint"):
-        report.mark(one, "approximated", "only the last place of a route is a goal")
+    for element in kind.iter("Route", "Waypoint"):
+        report.mark(element, "approximated", "only the last place of a route is a goal")
     report.mark(places[-1], "taken")
     point = positions.point(places[-1])
     node = positions.node_near(point) if point.node is None else point.node
     return {"goal": {"to": str(node_id(positions.graph, node))}}
 
 
-def _arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+def _read_arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     return arriving(read.conditions, kind, entity, read.speeds)
 
 
 _MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]]] = {
-    "SpeedAction": _speed,
-    "LaneChangeAction": _lane,
-    "LaneOffsetAction": _offset,
-    "LongitudinalDistanceAction": _gap,
-    "FollowTrajectoryAction": _trajectory,
-    "AssignRouteAction": _goal,
-    "AcquirePositionAction": _goal,
-    "SpeedProfileAction": _profile,
-    "TeleportAction": _teleport,
-    "SynchronizeAction": _arrive,
-    "LateralDistanceAction": _abreast,
+    "SpeedAction": _read_speed,
+    "LaneChangeAction": _read_lane,
+    "LaneOffsetAction": _read_offset,
+    "LongitudinalDistanceAction": _read_gap,
+    "FollowTrajectoryAction": _read_trajectory_action,
+    "AssignRouteAction": _read_goal,
+    "AcquirePositionAction": _read_goal,
+    "SpeedProfileAction": _read_profile,
+    "TeleportAction": _read_teleport,
+    "SynchronizeAction": _read_arrive,
+    "LateralDistanceAction": _read_abreast,
 }

@@ -84,9 +84,9 @@ class ConditionReader:
 
     def group(self, group: _Element) -> Made:
         """Condition that holds while all of a ``ConditionGroup`` do."""
-        return joined("all", [self._condition(one) for one in self.report.children(group)])
+        return joined("all", [self._read_condition(child) for child in self.report.children(group)])
 
-    def _condition(self, element: _Element) -> Made:
+    def _read_condition(self, element: _Element) -> Made:
         content = self.report.child(element, "ByValueCondition", "ByEntityCondition")
         if content is None:
             raise RefusedError(element, "a condition without content")
@@ -94,9 +94,9 @@ class ConditionReader:
             made = self._by_value(self.report.only(content))
         else:
             made = self._by_entity(content)
-        return self._when(element, made)
+        return self._add_edge_and_delay(element, made)
 
-    def _when(self, element: _Element, made: Made) -> Made:
+    def _add_edge_and_delay(self, element: _Element, made: Made) -> Made:
         edge, delay = element.get("conditionEdge", "none"), self.report.number(element, "delay", 0)
         made = _at_edge(made, edge)
         return {**made, "delay": delay} if delay > 0 else made
@@ -110,7 +110,7 @@ class ConditionReader:
         if kind.tag in ("TrafficSignalCondition", "TrafficSignalControllerCondition"):
             return self.signals.condition(kind)
         if kind.tag in ("ParameterCondition", "VariableCondition"):
-            return self._value(kind)
+            return self._read_value(kind)
         if kind.tag == "TimeOfDayCondition":
             return self._time_of_day(kind)
         raise RefusedError(kind, f"odscen has no {kind.tag}")
@@ -129,22 +129,22 @@ class ConditionReader:
         after: Made = {"time": {"after": seconds}}
         return {"not": after} if before else after
 
-    def _value(self, kind: _Element) -> Made:
+    def _read_value(self, kind: _Element) -> Made:
         """Whether a value is as it should be: at first, and after what sets it in the story."""
         name = (kind.get("parameterRef") or kind.get("variableRef") or "").lstrip("$")
         have = self.values.get(name)
         if have is None:
             raise RefusedError(kind, f"{name!r} is not declared")
-        first, changes = _holds(kind, have), self.changes(kind, name)
+        first, changes = _value_holds(kind, have), self.changes(kind, name)
         if not changes:
             self.report.mark(kind, "approximated", "held against the declared value, once")
             return ALWAYS if first else NEVER
         words = f"from when an event sets {name!r}, as far as its trigger still holds"
         self.report.mark(kind, "approximated", words)
-        sets = [when for value, when in changes if _holds(kind, value)]
+        sets = [when for value, when in changes if _value_holds(kind, value)]
         if not first:
             return joined("any", sets) if sets else NEVER
-        unsets = [when for value, when in changes if not _holds(kind, value)]
+        unsets = [when for value, when in changes if not _value_holds(kind, value)]
         if not unsets:
             return ALWAYS
         return joined("any", [{"not": joined("any", unsets)}, *sets])
@@ -154,13 +154,13 @@ class ConditionReader:
         body = self.report.child(element, "EntityCondition")
         if who is None or body is None:
             raise RefusedError(element, "a condition without entities")
-        names = [self.actor(one) for one in self.report.children(who, "EntityRef")]
+        names = [self.actor(child) for child in self.report.children(who, "EntityRef")]
         kind = self.report.only(body)
         read = _KINDS.get(str(kind.tag))
         if read is None or not names:
             raise RefusedError(kind, f"odscen has no {kind.tag}")
         rule = who.get("triggeringEntitiesRule", "any")
-        return joined("any" if rule == "any" else "all", [read(self, kind, one) for one in names])
+        return joined("any" if rule == "any" else "all", [read(self, kind, name) for name in names])
 
     def actor(self, element: _Element) -> str:
         """Id of the actor that an element refers to.
@@ -202,7 +202,7 @@ class ConditionReader:
         position = self.report.child(kind, "Position")
         if position is None:
             raise RefusedError(kind, f"{kind.tag} without a position")
-        ahead = next((one.ahead for one in self.entities.values() if one.id == of), 0.0)
+        ahead = next((entity.ahead for entity in self.entities.values() if entity.id == of), 0.0)
         return self.point_or_node(position, ahead=ahead)
 
     def point_or_node(self, position: _Element, *, ahead: float = 0.0) -> list[float] | str:
@@ -219,7 +219,7 @@ class ConditionReader:
         point = self.positions.point(position)
         if not self.own:
             point = point.moved(ahead)
-        node = self.positions.name_at(point) if self.own and _headed(position) else None
+        node = self.positions.name_at(point) if self.own and _says_heading(position) else None
         return node or [round(point.x, 4), round(point.y, 4)]
 
 
@@ -231,9 +231,9 @@ def _at_edge(made: Made, edge: str) -> Made:
     """
     if edge == "none":
         return made
-    if _stays(made):
+    if _stays_true(made):
         return NEVER if edge == "falling" else made
-    if "not" in made and _stays(made["not"]) and edge != "rising":
+    if "not" in made and _stays_true(made["not"]) and edge != "rising":
         return dict(made["not"])
     if edge == "rising":
         return {**made, "edge": "rising"}
@@ -241,15 +241,15 @@ def _at_edge(made: Made, edge: str) -> Made:
     return falls if edge == "falling" else {"any": [{**made, "edge": "rising"}, falls]}
 
 
-def _stays(made: Made) -> bool:
+def _stays_true(made: Made) -> bool:
     """Whether a condition holds for good once it does."""
     (kind,) = (key for key in made if key not in ("edge", "delay"))
     if kind in ("all", "any"):
-        return "edge" not in made and all(_stays(one) for one in made[kind])
+        return "edge" not in made and all(_stays_true(one) for one in made[kind])
     return kind in ("time", "rule")
 
 
-def _holds(kind: _Element, have: str) -> bool:
+def _value_holds(kind: _Element, have: str) -> bool:
     """Whether a value is to the one of a condition as its rule says."""
     want, rule = kind.get("value", ""), kind.get("rule")
     try:
@@ -265,7 +265,7 @@ def _holds(kind: _Element, have: str) -> bool:
     }.get(str(rule), one == other)
 
 
-def _headed(position: _Element) -> bool:
+def _says_heading(position: _Element) -> bool:
     """Whether a position says a heading: points of odscen's have none, nodes have."""
     return position.find("WorldPosition[@h]") is not None
 
@@ -282,11 +282,11 @@ def joined(kind: str, parts: list[Made]) -> Made:
     return rest[0] if len(rest) == 1 else {kind: rest}
 
 
-def _speed(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_speed(read: ConditionReader, kind: _Element, of: str) -> Made:
     return read.bounded(kind, "speed", {"of": of})
 
 
-def _acceleration(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_acceleration(read: ConditionReader, kind: _Element, of: str) -> Made:
     return read.bounded(kind, "acceleration", {"of": of})
 
 
@@ -294,26 +294,26 @@ def _relative_speed(read: ConditionReader, kind: _Element, of: str) -> Made:
     return read.bounded(kind, "relative_speed", {"of": of, "to": read.actor(kind)})
 
 
-def _travelled(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_travelled(read: ConditionReader, kind: _Element, of: str) -> Made:
     return {"travelled": {"of": of, "above": read.report.number(kind, "value")}}
 
 
-def _stopped(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_stopped(read: ConditionReader, kind: _Element, of: str) -> Made:
     return {"stopped": {"of": of, "seconds": read.report.number(kind, "duration", 0.0)}}
 
 
-def _reaches(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_reaches(read: ConditionReader, kind: _Element, of: str) -> Made:
     within = min(max(read.report.number(kind, "tolerance"), 0.01), 1000.0)
     return {"reaches": {"of": of, "place": read.place(kind, of), "within": within}}
 
 
-def _headway(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_headway(read: ConditionReader, kind: _Element, of: str) -> Made:
     if kind.get("freespace") == "false":
         read.report.mark(kind, "approximated", "between bodies, not reference points")
     return read.bounded(kind, "headway", {"of": of, "to": read.actor(kind)})
 
 
-def _ttc(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_ttc(read: ConditionReader, kind: _Element, of: str) -> Made:
     target = read.report.only(kind)
     other = read.report.child(target, "EntityRef")
     if other is None:
@@ -323,7 +323,7 @@ def _ttc(read: ConditionReader, kind: _Element, of: str) -> Made:
     return read.bounded(kind, "ttc", {"of": of, "to": read.actor(other)})
 
 
-def _measure(read: ConditionReader, kind: _Element, usual: str) -> Made:
+def _read_measure(read: ConditionReader, kind: _Element, usual: str) -> Made:
     along = _ALONG.get(kind.get("relativeDistanceType", usual), "straight")
     if along == "longitudinal" and kind.get("coordinateSystem") in ("lane", "road"):
         along = "lane"
@@ -334,20 +334,20 @@ def _measure(read: ConditionReader, kind: _Element, usual: str) -> Made:
 
 
 def _relative_distance(read: ConditionReader, kind: _Element, of: str) -> Made:
-    part = {"of": of, "to": read.actor(kind), **_measure(read, kind, "longitudinal")}
+    part = {"of": of, "to": read.actor(kind), **_read_measure(read, kind, "longitudinal")}
     return read.bounded(kind, "distance", part)
 
 
-def _distance(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_distance(read: ConditionReader, kind: _Element, of: str) -> Made:
     centre = "" if kind.get("freespace") == "true" else of
     place = read.place(kind, centre)
-    part = {"of": of, "place": place, **_measure(read, kind, "euclidianDistance")}
+    part = {"of": of, "place": place, **_read_measure(read, kind, "euclidianDistance")}
     if kind.get("alongRoute") == "true":
         part["along"] = "lane"
     return read.bounded(kind, "distance", part)
 
 
-def _touched(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_touched(read: ConditionReader, kind: _Element, of: str) -> Made:
     other = read.report.only(kind)
     if other.tag == "EntityRef":
         return {"touched": {"of": of, "to": read.actor(other)}}
@@ -377,17 +377,17 @@ def _road_end(read: ConditionReader, kind: _Element, of: str) -> Made:
 
 
 _KINDS: Final[Mapping[str, Callable[[ConditionReader, _Element, str], Made]]] = {
-    "SpeedCondition": _speed,
-    "AccelerationCondition": _acceleration,
+    "SpeedCondition": _read_speed,
+    "AccelerationCondition": _read_acceleration,
     "RelativeSpeedCondition": _relative_speed,
-    "TraveledDistanceCondition": _travelled,
-    "StandStillCondition": _stopped,
-    "ReachPositionCondition": _reaches,
-    "TimeHeadwayCondition": _headway,
-    "TimeToCollisionCondition": _ttc,
+    "TraveledDistanceCondition": _read_travelled,
+    "StandStillCondition": _read_stopped,
+    "ReachPositionCondition": _read_reaches,
+    "TimeHeadwayCondition": _read_headway,
+    "TimeToCollisionCondition": _read_ttc,
     "RelativeDistanceCondition": _relative_distance,
-    "DistanceCondition": _distance,
-    "CollisionCondition": _touched,
+    "DistanceCondition": _read_distance,
+    "CollisionCondition": _read_touched,
     "OffroadCondition": _off_road,
     "EndOfRoadCondition": _road_end,
 }

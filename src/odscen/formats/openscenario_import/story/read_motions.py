@@ -45,8 +45,8 @@ def stays(report: ImportReport, kind: _Element, names: Container[str]) -> bool:
         return False
     if any(report.number(place, name, 0.0) for name in ("dx", "dy")):
         return False
-    for one in kind.iter("*"):
-        report.mark(one, "approximated", "it stays where it is: odscen has no height or tilt")
+    for element in kind.iter("*"):
+        report.mark(element, "approximated", "it stays where it is: odscen has no height or tilt")
     return True
 
 
@@ -57,8 +57,8 @@ def lines_up(report: ImportReport, kind: _Element, names: Container[str]) -> boo
         return False
     if any(report.number(place, name, 0.0) for name in ("dLane", "ds", "dsLane", "offset")):
         return False
-    for one in kind.iter("*"):
-        report.mark(one, "approximated", f"to the middle of its lane within {JUMP:g} s")
+    for element in kind.iter("*"):
+        report.mark(element, "approximated", f"to the middle of its lane within {JUMP:g} s")
     return True
 
 
@@ -88,10 +88,10 @@ def followed(conditions: ConditionReader, kind: _Element, entity: ReadEntity) ->
     ]
     report.mark(kind, "approximated", "followed by the front, from where the actor is")
     relative = {} if base is None else {"relative_to": entities[base].id}
-    return {"path": _timed(conditions, kind, vertices[1:]) | relative}
+    return {"path": _timed_points(conditions, kind, vertices[1:]) | relative}
 
 
-def _timed(
+def _timed_points(
     conditions: ConditionReader, kind: _Element, vertices: list[tuple[float, float, float]]
 ) -> Made:
     """Points of a path, with their times where the file has timing."""

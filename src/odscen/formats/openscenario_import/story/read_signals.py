@@ -46,8 +46,8 @@ class SignalReader:
             light, movement = self._green_in_phase(kind, "trafficSignalControllerRef")
             self.report.mark(kind, "approximated", f"while {movement!r} of {light!r} has green")
             return {"signal": {"light": light, "movement": movement, "shows": "green"}}
-        state = _colour(kind.get("state", ""))
-        light, movement = self._over(kind)
+        state = _colour_of_state(kind.get("state", ""))
+        light, movement = self._light_and_movement_of(kind)
         if state not in ("red", "yellow", "green"):
             raise RefusedError(kind, f"the state {state!r} of a signal")
         return {"signal": {"light": light, "movement": movement, "shows": state}}
@@ -63,15 +63,15 @@ class SignalReader:
         kind = next(about.iter("TrafficSignalStateAction", "TrafficSignalControllerAction"), None)
         if kind is None:
             raise RefusedError(about, "an infrastructure action without a signal")
-        for one in (about, *kind.iterancestors("TrafficSignalAction"), kind):
-            self.report.mark(one, "taken")
+        for iterancestor in (about, *kind.iterancestors("TrafficSignalAction"), kind):
+            self.report.mark(iterancestor, "taken")
         if kind.tag == "TrafficSignalControllerAction":
             light, movement = self._green_in_phase(kind, "trafficSignalControllerRef")
             words = f"the program of {light!r} jumps to where {movement!r} has green"
             self.report.mark(kind, "approximated", words)
             return {"signal": {"light": light, "shows": "green", "movement": movement}}
-        state = _colour(kind.get("state", ""))
-        light, movement = self._over(kind)
+        state = _colour_of_state(kind.get("state", ""))
+        light, movement = self._light_and_movement_of(kind)
         if state in ("off", ""):
             return {"signal": {"light": light, "shows": "off"}}
         if state != "green":
@@ -85,7 +85,7 @@ class SignalReader:
         for element in self.root.iterfind("RoadNetwork/TrafficSignals"):
             self.report.ignore(element, "lights have the program of the map, or that of a scenario")
 
-    def _over(self, kind: _Element) -> tuple[str, str]:
+    def _light_and_movement_of(self, kind: _Element) -> tuple[str, str]:
         name = self.report.word(kind, "name")
         found = self.movement(name)
         if found is None:
@@ -94,26 +94,26 @@ class SignalReader:
 
     def _green_in_phase(self, kind: _Element, key: str) -> tuple[str, str]:
         name, phase = self.report.word(kind, key), self.report.word(kind, "phase")
-        for one in self.root.iterfind("RoadNetwork/TrafficSignals/TrafficSignalController"):
-            if one.get("name") != name:
+        for element in self.root.iterfind("RoadNetwork/TrafficSignals/TrafficSignalController"):
+            if element.get("name") != name:
                 continue
-            for state in one.iterfind("Phase/TrafficSignalState"):
+            for state in element.iterfind("Phase/TrafficSignalState"):
                 above = state.getparent()
                 if above is None or above.get("name") != phase:
                     continue
                 found = self.movement(state.get("trafficSignalId", ""))
-                if _colour(state.get("state", "")) == "green" and found is not None:
+                if _colour_of_state(state.get("state", "")) == "green" and found is not None:
                     return found
         raise RefusedError(kind, f"phase {phase!r} of {name!r} gives no signal of the map green")
 
 
-def _colour(state: str) -> str:
+def _colour_of_state(state: str) -> str:
     """Colour of a state, given by its name or as the lamps that are on, from the top: ``off;on``.
 
     Red and yellow together are red: who waits has to wait on.
     """
-    lamps = [one.strip().lower() for one in state.split(";")]
-    if not lamps or any(one not in ("on", "off") for one in lamps) or len(lamps) == 1:
+    lamps = [part.strip().lower() for part in state.split(";")]
+    if not lamps or any(lamp not in ("on", "off") for lamp in lamps) or len(lamps) == 1:
         return state.strip().lower()
     lit = [colour for colour, one in zip(_LAMPS, lamps, strict=False) if one == "on"]
     return lit[0] if lit else "off"

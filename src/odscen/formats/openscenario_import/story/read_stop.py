@@ -27,15 +27,17 @@ def read_stop(report: ImportReport, board: _Element, story: StoryReader) -> floa
     found, latest, ends = [], 0.0, False
     for group in () if stop is None else report.children(stop, "ConditionGroup"):
         times = group.findall(".//SimulationTimeCondition")
-        seconds = [report.number(one, "value") for one in times]
+        seconds = [report.number(time, "value") for time in times]
         if times and len(times) == len(group.findall("Condition")):
-            _take(report, times, board)
+            _take_stop_time(report, times, board)
             found.append(min(seconds))
-        elif story.actions is not None and (when := _when(report, group, story.actions.conditions)):
+        elif story.actions is not None and (
+            when := _stop_condition(report, group, story.actions.conditions)
+        ):
             story.end(when)
             latest, ends = max([latest, *seconds]), True
         elif times:
-            _take(report, times, board)
+            _take_stop_time(report, times, board)
             found.append(min(seconds))
             report.mark(group, "approximated", "the run ends by time alone")
     if found := [one for one in found if one > 0]:
@@ -47,7 +49,9 @@ def read_stop(report: ImportReport, board: _Element, story: StoryReader) -> floa
     return duration
 
 
-def _when(report: ImportReport, group: _Element, conditions: ConditionReader) -> Made | None:
+def _stop_condition(
+    report: ImportReport, group: _Element, conditions: ConditionReader
+) -> Made | None:
     """Condition on which the run ends, if that can happen and is known."""
     if any(one.get("name", "").startswith(_CRITERION) for one in group):
         return None
@@ -63,7 +67,7 @@ def _when(report: ImportReport, group: _Element, conditions: ConditionReader) ->
     return None if when in ({}, ALWAYS, NEVER) else when
 
 
-def _take(report: ImportReport, times: list[_Element], board: _Element) -> None:
+def _take_stop_time(report: ImportReport, times: list[_Element], board: _Element) -> None:
     for condition in times:
         above: _Element | None = condition
         while above is not None and above is not board:

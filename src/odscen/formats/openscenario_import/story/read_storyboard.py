@@ -69,11 +69,11 @@ class StoryReader:
         """Read all events; an event that cannot be taken over is left out."""
         for story in self.report.children(board, "Story"):
             for act in self.report.children(story, "Act"):
-                self._act(act)
+                self._read_act(act)
         while self._waiting:  # for elements that come later in the file
             again, self._waiting = self._waiting, []
             for one in again:
-                self._event(*one)
+                self._read_event(*one)
             if len(self._waiting) == len(again):
                 self._last.append(True)
 
@@ -90,19 +90,19 @@ class StoryReader:
             event = next(action.iterancestors("Event"), None)
             if event is None or self.actions is None:
                 continue
-            if event in self._asked or any(one is kind for one in event.iter("*")):
+            if event in self._asked or any(element is kind for element in event.iter("*")):
                 raise RefusedError(kind, f"{name!r}, which is set by what waits for it")
             rules = self._made.get(event, [])
             self._asked.add(event)
             act = next(event.iterancestors("Act"), None)
             trigger = self.actions.conditions.trigger
             starts = () if act is None else (act.find("StartTrigger"), event.find("StartTrigger"))
-            when = joined("all", [trigger(one) for one in starts])
+            when = joined("all", [trigger(start) for start in starts])
             self._asked.discard(event)
             if rules:
                 when = {"rule": {"id": rules[0]["id"], "has": "started"}}
-            for one in action.iter("*"):
-                self.report.mark(one, "taken")
+            for element in action.iter("*"):
+                self.report.mark(element, "taken")
             value = new_value(action, self.actions.conditions.values.get(name, "0"))
             found.append((value, when))
         return found
@@ -127,8 +127,8 @@ class StoryReader:
         if has is None:
             raise RefusedError(kind, f"the state {state!r}")
         bare = name.replace("::", "/").rpartition("/")[2]
-        parts = [*self._begun(kind, bare)] if has == "started" else []
-        for event in () if parts else self._events(kind, bare):
+        parts = [*self._begin_triggers(kind, bare)] if has == "started" else []
+        for event in () if parts else self._events_in(kind, bare):
             rules = self._made.get(event, [])
             if not rules and event in self._whens:
                 self.report.mark(kind, "approximated", "what it waits for does nothing")
@@ -138,7 +138,7 @@ class StoryReader:
             raise LaterError(kind, f"{name!r}, which is left out or is not there")
         return joined("all" if has == "ended" else "any", parts)
 
-    def _begun(self, kind: _Element, name: str) -> Iterator[Made]:
+    def _begin_triggers(self, kind: _Element, name: str) -> Iterator[Made]:
         """Triggers of what holds events, which starts with the act that it is in."""
         for element in kind.getroottree().getroot().iterfind("Storyboard//*[@name]"):
             if element.get("name") != name or element.tag not in _HOLDERS or self.actions is None:
@@ -147,14 +147,14 @@ class StoryReader:
             trigger = act.find("StartTrigger")
             if element.tag == "Story" or trigger is None:
                 yield ALWAYS
-            elif trigger in self._asked or any(one is kind for one in trigger.iter()):
+            elif trigger in self._asked or any(element is kind for element in trigger.iter()):
                 raise RefusedError(kind, f"{name!r}, which waits for this")
             else:
                 self._asked.add(trigger)
                 yield self.actions.conditions.trigger(trigger)
                 self._asked.discard(trigger)
 
-    def _events(self, kind: _Element, name: str) -> Iterator[_Element]:
+    def _events_in(self, kind: _Element, name: str) -> Iterator[_Element]:
         root = kind.getroottree().getroot()
         for element in root.iterfind("Storyboard/Story//*[@name]"):
             if element.get("name") == name:
@@ -162,7 +162,7 @@ class StoryReader:
                 if inside is not None:
                     yield from inside.iter("Event")
 
-    def _act(self, act: _Element) -> None:
+    def _read_act(self, act: _Element) -> None:
         trigger = self.report.child(act, "StartTrigger")
         for stop in act.iterchildren("StopTrigger"):
             if self.own:  # the end of the run, as that of the storyboard
@@ -174,18 +174,18 @@ class StoryReader:
                 self.report.mark(group, "approximated", "its maneuvers take place once")
             who = self.report.child(group, "Actors")
             refs = () if who is None else self.report.children(who, "EntityRef")
-            names = [one.get("entityRef", "") for one in refs]
+            names = [ref.get("entityRef", "") for ref in refs]
             if self.own and (not names or group.get("name") in said_in_properties(names)):
                 self.report.take(group)
                 continue
             if self.own:
-                self._rule(group, names[0])
+                self._read_own_rule(group, names[0])
                 continue
             for maneuver in self.report.children(group, "Maneuver"):
                 for event in self.report.children(maneuver, "Event"):
-                    self._event(event, trigger, names)
+                    self._read_event(event, trigger, names)
 
-    def _rule(self, group: _Element, name: str) -> None:
+    def _read_own_rule(self, group: _Element, name: str) -> None:
         """Rule of a group that odscen wrote: its events follow one another."""
         events = [
             event
@@ -193,7 +193,7 @@ class StoryReader:
             for event in self.report.children(maneuver, "Event")
         ]
         before = len(self.rules)
-        self._event(events[0], None, [name])
+        self._read_event(events[0], None, [name])
         if len(self.rules) == before:
             return
         rule = self.rules[-1]
@@ -202,7 +202,7 @@ class StoryReader:
             for trigger in self.report.children(event, "StartTrigger"):
                 self.report.take(trigger)
             try:
-                then = self._then(event, self.entities[name])
+                then = self._read_then(event, self.entities[name])
             except RefusedError as error:
                 self.report.mark(error.element, "refused", error.reason)
                 continue
@@ -210,10 +210,10 @@ class StoryReader:
                 rule["then"] += then if len(then) == 1 else [{"together": then}]
             self._made[event] = [rule]
 
-    def _event(self, event: _Element, trigger: _Element | None, names: list[str]) -> None:
+    def _read_event(self, event: _Element, trigger: _Element | None, names: list[str]) -> None:
         before = len(self.rules)
         try:
-            self._take(event, trigger, names)
+            self._take_event(event, trigger, names)
         except RefusedError as error:
             if isinstance(error, LaterError) and not self._last and len(self.rules) == before:
                 self._waiting.append((event, trigger, names))
@@ -223,7 +223,7 @@ class StoryReader:
         except InputError as error:
             self.report.mark(event, "refused", f"left out: {error.element}: {error.problem}")
 
-    def _take(self, event: _Element, trigger: _Element | None, names: Iterable[str]) -> None:
+    def _take_event(self, event: _Element, trigger: _Element | None, names: Iterable[str]) -> None:
         if self.actions is None:
             return
         conditions = self.actions.conditions
@@ -234,7 +234,7 @@ class StoryReader:
         self._whens[event] = when
         times = int(self.report.number(event, "maximumExecutionCount", 1.0))
         if not self.own:
-            self._globals(event, when, times)
+            self._read_global_actions(event, when, times)
         if event.find("Action/PrivateAction") is None and not self.own:
             for content in event.iterfind("Action/*"):
                 tell_unread(self.report, content, story=True)
@@ -243,22 +243,22 @@ class StoryReader:
             if name not in self.entities:
                 raise RefusedError(event, f"entity {name!r} is not among the actors")
             entity = self.entities[name]
-            then = self._then(event, entity)
+            then = self._read_then(event, entity)
             if not then:
                 self.report.mark(event, "ignored", "nothing that it does has a counterpart")
             elif entity.id in self.driven:
                 self.report.ignore(event, "something else drives this actor; see --ego")
             else:
-                self._add(event, entity.id, when, then, times)
+                self._add_rule(event, entity.id, when, then, times)
 
-    def _globals(self, event: _Element, when: Made, times: int) -> None:
+    def _read_global_actions(self, event: _Element, when: Made, times: int) -> None:
         """Read what global actions of an event make rules of."""
         for about in event.iterfind("Action/GlobalAction/EntityAction"):
-            self._entity(event, about, when, times)
+            self._read_entity_action(event, about, when, times)
         for about in event.iterfind("Action/GlobalAction/InfrastructureAction"):
-            self._signal(event, about, when, times)
+            self._read_signal_action(event, about, when, times)
 
-    def _signal(self, event: _Element, about: _Element, when: Made, times: int) -> None:
+    def _read_signal_action(self, event: _Element, about: _Element, when: Made, times: int) -> None:
         """Let a rule switch a light; which actor it is of does not matter."""
         if self.actions is None or not self.entities:
             return
@@ -267,9 +267,9 @@ class StoryReader:
         for one in () if above is None else (above, above.getparent()):
             if one is not None:
                 self.report.mark(one, "taken")
-        self._add(event, next(iter(self.entities.values())).id, when, [made], times)
+        self._add_rule(event, next(iter(self.entities.values())).id, when, [made], times)
 
-    def _then(self, event: _Element, entity: ReadEntity) -> list[Made]:
+    def _read_then(self, event: _Element, entity: ReadEntity) -> list[Made]:
         found: list[Made] = []
         for action in self.report.children(event, "Action"):
             content = self.report.only(action)
@@ -277,16 +277,16 @@ class StoryReader:
             if kind is not None and kind.tag in READ and not self.own:
                 continue
             if content.tag != "PrivateAction":
-                found += self._global(content, entity)
+                found += self._read_global_action(content, entity)
             elif self.actions is not None:
                 found += self.actions.actions(content, entity)
         if len(found) > 1 and any(FOLLOWING in one for one in found):
             raise RefusedError(event, "a speed profile beside other actions of its event")
         if len(found) == 1 and "replay" in found[0] and entity.id in self.later:
-            return [{FOLLOWING: self._appearing(entity, found[0]["replay"]["rows"][0][1:])}]
+            return [{FOLLOWING: self._appear_actions(entity, found[0]["replay"]["rows"][0][1:])}]
         return with_speed(found, entity) if self.own else found
 
-    def _global(self, content: _Element, entity: ReadEntity) -> list[Made]:
+    def _read_global_action(self, content: _Element, entity: ReadEntity) -> list[Made]:
         if self.own and self.actions is not None:
             made = own_entity_action(content, entity, self.actions.conditions.positions)
             about = content.find("InfrastructureAction")
@@ -298,13 +298,13 @@ class StoryReader:
         tell_unread(self.report, content, story=True)
         return []
 
-    def _appearing(self, entity: ReadEntity, at: list[float]) -> list[Made]:
+    def _appear_actions(self, entity: ReadEntity, at: list[float]) -> list[Made]:
         """What an actor does that the story puts on the road: it appears, and does as at first."""
         first = self.later[entity.id]
         rest = first if len(first) < 2 else [{"together": first}]
         return [{"appear": {"at": at}}, *rest]
 
-    def _entity(self, event: _Element, about: _Element, when: Made, times: int) -> None:
+    def _read_entity_action(self, event: _Element, about: _Element, when: Made, times: int) -> None:
         """Let an actor appear or vanish."""
         if self.actions is None:
             return
@@ -316,16 +316,20 @@ class StoryReader:
                 self.report.mark(one, "taken")
         position = about.find("AddEntityAction/Position")
         if position is None:
-            self._add(event, entity.id, when, [{"vanish": {}}], times)
+            self._add_rule(event, entity.id, when, [{"vanish": {}}], times)
             return
         if entity.id not in self.later:
             raise RefusedError(about, f"{entity.id!r}, which is there already")
         self.report.mark(position, "taken")
         centre = self.actions.conditions.positions.point(position).moved(entity.ahead)
         at = [round(centre.x, 4), round(centre.y, 4), round(centre.hdg, 6)]
-        self._add(event, entity.id, when, [{FOLLOWING: self._appearing(entity, at)}], times)
+        self._add_rule(
+            event, entity.id, when, [{FOLLOWING: self._appear_actions(entity, at)}], times
+        )
 
-    def _add(self, event: _Element, actor: str, when: Made, then: list[Made], times: int) -> None:
+    def _add_rule(
+        self, event: _Element, actor: str, when: Made, then: list[Made], times: int
+    ) -> None:
         rule: Made = {"id": plain_id(event.get("name", "event"), self._ids), "actor": actor}
         # What happens from the start on does so where the actor starts.
         begin: Made = {"time": {"after": JUMP}} if actor in self._placed else ALWAYS

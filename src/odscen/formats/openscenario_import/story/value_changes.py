@@ -16,17 +16,17 @@ _ACTIONS = ("VariableAction", "ParameterAction")
 
 def first_values(report: ImportReport, root: _Element, values: dict[str, str]) -> None:
     """Give parameters and variables the values that actions of ``Init`` set."""
-    for kind, name in _of(root, "Storyboard/Init/Actions/GlobalAction"):
-        for one in (kind.getparent(), kind, *kind.iter("*")):
-            if one is not None:
-                report.mark(one, "taken")
+    for kind, name in _actions_in(root, "Storyboard/Init/Actions/GlobalAction"):
+        for element in (kind.getparent(), kind, *kind.iter("*")):
+            if element is not None:
+                report.mark(element, "taken")
         values[name] = new_value(kind, values.get(name, "0"))
 
 
 def sets_in_story(root: _Element, name: str) -> list[_Element]:
     """Actions of the story that set a parameter or variable."""
     paths = "Storyboard/Story//Action/GlobalAction"
-    return [kind for kind, found in _of(root, paths) if found == name]
+    return [kind for kind, found in _actions_in(root, paths) if found == name]
 
 
 def new_value(kind: _Element, have: str) -> str:
@@ -44,7 +44,7 @@ def new_value(kind: _Element, have: str) -> str:
     return f"{one + other if by.tag == 'AddValue' else one * other:.12g}"
 
 
-def _of(root: _Element, path: str) -> Iterator[tuple[_Element, str]]:
+def _actions_in(root: _Element, path: str) -> Iterator[tuple[_Element, str]]:
     for action in root.iterfind(path):
         for kind in action.iterchildren(*_ACTIONS):
             name = kind.get("variableRef") or kind.get("parameterRef") or ""

@@ -67,7 +67,7 @@ def read_entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]
             continue
         for controller in element.iterchildren("ObjectController"):
             report.ignore(controller, "a controller is a program beside the file; see --ego")
-        one = _entity(report, thing, plain_id(name, taken))
+        one = _read_entity(report, thing, plain_id(name, taken))
         if one is None:
             report.mark(element, "refused", "its category has no counterpart")
         else:
@@ -83,7 +83,7 @@ def read_entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]
     return found
 
 
-def _entity(report: ImportReport, thing: _Element, own: str) -> ReadEntity | None:
+def _read_entity(report: ImportReport, thing: _Element, own: str) -> ReadEntity | None:
     kind = thing.get("vehicleCategory", "car")
     if thing.tag == "Pedestrian":
         category: Category | None = Category.PEDESTRIAN

@@ -99,13 +99,13 @@ def read_environment(
             if one is not None:
                 report.mark(one, "taken")
         try:
-            found = _read(report, element, weather, driven=driven, own=own)
+            found = _read_weather(report, element, weather, driven=driven, own=own)
         except InputError as error:
             report.mark(element, "refused", f"left out: {error.element}: {error.problem}")
     return found
 
 
-def _read(
+def _read_weather(
     report: ImportReport,
     element: _Element,
     weather: Callable[[str], Mapping[str, float] | None],
@@ -117,7 +117,7 @@ def _read(
     clock, day = (None, 0) if time is None else clock_of(report, time)
     runs = time is None or time.get("animation") != "false"
     if own:
-        said = _said(element)
+        said = _read_properties(element)
         if _is_written(report, element, said, weather):
             report.take(element)
             return ReadEnvironment(said["environment"], said["clock"], day, runs)
@@ -148,7 +148,7 @@ def clock_of(report: ImportReport, element: _Element) -> tuple[float, int]:
     found = _TIME.fullmatch(text.strip())
     if found is None:
         raise report.wrong(element, f"dateTime={text!r} is no date with a time")
-    year, month, date = (int(one) for one in found.groups()[:3])
+    year, month, date = (int(group) for group in found.groups()[:3])
     hours, minutes, seconds = int(found[4]), int(found[5]), float(found[6])
     clock = (hours * 60 + minutes) * 60 + seconds
     if not 0 <= clock < _DAY:
@@ -157,12 +157,12 @@ def clock_of(report: ImportReport, element: _Element) -> tuple[float, int]:
     return round(clock, 3), (year * 12 + month) * 31 + date
 
 
-def _said(element: _Element) -> Made:
+def _read_properties(element: _Element) -> Made:
     """What the properties say of the document that a file of odscen's was written from."""
     rows = {
-        one.get("name", "").removeprefix(SAID): value_of(one.get("value", ""))
-        for one in element.iterfind("RoadCondition/Properties/Property")
-        if one.get("name", "").startswith(SAID)
+        element.get("name", "").removeprefix(SAID): value_of(element.get("value", ""))
+        for element in element.iterfind("RoadCondition/Properties/Property")
+        if element.get("name", "").startswith(SAID)
     }
     clock = rows.pop("clock", None)
     return {"environment": rows, "clock": clock}
@@ -183,8 +183,8 @@ def _is_written(
     minor = 2 if header is None else int(report.number(header, "revMinor", 2.0))
     whole = {**preset, **given.get("parameters", {})}
     written = environment(whole, said["clock"] or 0.0, Dialect(minor), {})
-    here, there = ([(one.tag, dict(one.attrib)) for one in tree.iter("*")
-                    if one.tag not in ("Properties", "Property")]
+    here, there = ([(element.tag, dict(element.attrib)) for element in tree.iter("*")
+                    if element.tag not in ("Properties", "Property")]
                    for tree in (element, written))  # fmt: skip
     return here == there
 
@@ -196,7 +196,7 @@ class _Weather:
         self.values: dict[str, float] = {}
         self._report = report
 
-    def _set(self, name: str, value: float) -> None:
+    def _set_value(self, name: str, value: float) -> None:
         self.values[name] = round(float(value), 3) + 0.0
 
     def sky(self, weather: _Element) -> None:
@@ -204,22 +204,22 @@ class _Weather:
         report = self._report
         oktas, state = weather.get("fractionalCloudCover"), weather.get("cloudState")
         if oktas in OKTAS:
-            self._set("cloudiness", min(OKTAS.index(oktas) * 12.5, 100.0))
+            self._set_value("cloudiness", min(OKTAS.index(oktas) * 12.5, 100.0))
         elif state is not None:
-            self._set("cloudiness", _CLOUDS.get(state, 0.0))
+            self._set_value("cloudiness", _CLOUDS.get(state, 0.0))
             words = f"clouds over {self.values['cloudiness']:g} % of the sky"
             report.mark(weather, "approximated", words)
         if weather.get("temperature") or weather.get("atmosphericPressure"):
             report.mark(weather, "approximated", "without temperature and pressure of the air")
         readers = {
-            "Sun": self._sun, "Fog": self._fog, "Precipitation": self._rain, "Wind": self._wind,
+            "Sun": self._read_sun, "Fog": self._read_fog, "Precipitation": self._read_rain, "Wind": self._read_wind,
         }  # fmt: skip
-        for one in weather.iterchildren("*"):
-            if str(one.tag) in readers:
-                report.mark(one, "taken")
-                readers[str(one.tag)](one)
+        for element in weather.iterchildren("*"):
+            if str(element.tag) in readers:
+                report.mark(element, "taken")
+                readers[str(element.tag)](element)
 
-    def _sun(self, sun: _Element) -> None:
+    def _read_sun(self, sun: _Element) -> None:
         report = self._report
         height = math.degrees(report.number(sun, "elevation", 0.0))
         turn = math.degrees(report.number(sun, "azimuth", 0.0)) % 360.0
@@ -230,21 +230,21 @@ class _Weather:
             light = report.number(sun, "illuminance", 1e5 * report.number(sun, "intensity", -1.0))
             if light >= 0 and abs(light / 1e5 - math.sin(math.radians(height))) > _BRIGHTER:
                 report.mark(sun, "approximated", "as bright as it is high")
-        self._set("sun_altitude_angle", min(max(height, -90.0), 90.0))
-        self._set("sun_azimuth_angle", turn)
+        self._set_value("sun_altitude_angle", min(max(height, -90.0), 90.0))
+        self._set_value("sun_azimuth_angle", turn)
 
-    def _fog(self, fog: _Element) -> None:
+    def _read_fog(self, fog: _Element) -> None:
         report = self._report
         sight = report.number(fog, "visualRange")
         share = math.log(max(sight, 1e-3) / CLEAR) / math.log(DENSE / CLEAR)
         if share > 1.0:
             report.mark(fog, "approximated", f"one sees {DENSE:g} m: the densest fog that there is")
-        self._set("fog_density", 100.0 * min(max(share, 0.0), 1.0))
-        self._set("fog_distance", 0.0)
+        self._set_value("fog_density", 100.0 * min(max(share, 0.0), 1.0))
+        self._set_value("fog_distance", 0.0)
         for box in fog.iterchildren("BoundingBox"):
             report.ignore(box, "fog is everywhere")
 
-    def _rain(self, rain: _Element) -> None:
+    def _read_rain(self, rain: _Element) -> None:
         report, kind = self._report, rain.get("precipitationType", "dry")
         if rain.get("precipitationIntensity") is not None:
             share = report.number(rain, "precipitationIntensity") / HEAVIEST
@@ -256,11 +256,11 @@ class _Weather:
             report.mark(rain, "approximated", "rain of as much water")
         elif share > 1.0:
             report.mark(rain, "approximated", f"the heaviest rain is {HEAVIEST:g} mm/h")
-        self._set("precipitation", 100.0 * min(max(share, 0.0), 1.0))
+        self._set_value("precipitation", 100.0 * min(max(share, 0.0), 1.0))
 
-    def _wind(self, wind: _Element) -> None:
+    def _read_wind(self, wind: _Element) -> None:
         share = self._report.number(wind, "speed") / FULL_WIND
-        self._set("wind_intensity", 100.0 * min(max(share, 0.0), 1.0))
+        self._set_value("wind_intensity", 100.0 * min(max(share, 0.0), 1.0))
         words = f"from any direction; {FULL_WIND:g} m/s is the strongest"
         self._report.mark(wind, "approximated", words)
 
@@ -272,9 +272,9 @@ class _Weather:
         if not WET_GRIP <= friction <= 1.0:
             words = f"grip is {WET_GRIP:g} to 1 times that of a dry road"
             report.mark(road, "approximated", words)
-        self._set("wetness", min(max(wet, 0.0), 100.0))
+        self._set_value("wetness", min(max(wet, 0.0), 100.0))
         puddles = _WET.get(said or "dry", 0.0) if said != "moist" else 0.0
         if said is not None and puddles > self.values["wetness"]:
             report.mark(road, "approximated", f"{said!r} by its friction alone")
             puddles = self.values["wetness"]
-        self._set("precipitation_deposits", puddles)
+        self._set_value("precipitation_deposits", puddles)

@@ -182,7 +182,7 @@ def vehicle_loops(
         own = detector_movements(detector.at, view.movements)
         for lane, movements in _by_lane(light, own).items():
             loops.append(
-                _placed(
+                _place_loop(
                     net, f"{light.id}.{detector.id}.{len(loops)}", lane, movements,
                     name=detector.id, ahead=detector.before, length=detector.length,
                     stages=detector.stages, gap=detector.gap,
@@ -200,7 +200,7 @@ def vehicle_loops(
             AHEAD * max(light.links[n].speed for n in movements), (shortest / PASSING + 0.5) * ROOM
         )
         loops.append(
-            _placed(
+            _place_loop(
                 net, f"{light.id}.loop.{len(loops)}", lane, movements, ahead=ahead, stages=stages
             )
         )
@@ -210,13 +210,15 @@ def vehicle_loops(
 def idle_loop(light: SumoLight, net: RoadNet, movement: int) -> PlacedLoop:
     """Make a loop that prolongs nothing: without any SUMO could not load the state of a light."""
     lane = light.links[movement].source
-    return _placed(net, f"{light.id}.idle", lane, (movement,), ahead=LOOP, stages=())
+    return _place_loop(net, f"{light.id}.idle", lane, (movement,), ahead=LOOP, stages=())
 
 
 def idle_loops(light: SumoLight, net: RoadNet, areas: Iterable[BusArea]) -> tuple[PlacedLoop, ...]:
     """Make one in each lane: SUMO warns of actuated greens without a loop."""
     return tuple(
-        _placed(net, f"{light.id}.idle.{number}", area.lane, area.movements, ahead=LOOP, stages=())
+        _place_loop(
+            net, f"{light.id}.idle.{number}", area.lane, area.movements, ahead=LOOP, stages=()
+        )
         for number, area in enumerate(areas)
     )
 
@@ -262,7 +264,7 @@ def _by_lane(light: SumoLight, movements: Iterable[int]) -> dict[str, tuple[int,
     return {lane: tuple(own) for lane, own in found.items()}
 
 
-def _placed(
+def _place_loop(
     net: RoadNet,
     name_of_loop: str,
     stop_lane: str,
@@ -275,7 +277,7 @@ def _placed(
     gap: float = GAP,
 ) -> PlacedLoop:
     """Lay a loop whose front end is ``ahead`` metres before the stop line, on the lane there."""
-    lane, front = _upstream(net, stop_lane, ahead)
+    lane, front = _position_upstream(net, stop_lane, ahead)
     rear = max(front - length, 0.0)
     return PlacedLoop(
         name_of_loop, name, lane, rear, max(front - rear, _LEAST), stop_lane, stages, movements,
@@ -283,7 +285,7 @@ def _placed(
     )  # fmt: skip
 
 
-def _upstream(net: RoadNet, lane: str, ahead: float) -> tuple[str, float]:
+def _position_upstream(net: RoadNet, lane: str, ahead: float) -> tuple[str, float]:
     """Lane and position so many metres before the end of a lane; the start of the last one else."""
     while (rest := net.lanes[lane].length - max(ahead, 0.0)) < _LEAST:
         before = lane_before(net, lane)
@@ -298,4 +300,6 @@ def lane_before(net: RoadNet, lane: str) -> str | None:
     """Lane that leads onto a lane, of several the one beside the fewest others; else ``None``."""
     same = net.lanes[lane].index
     sources = (link.source for link in net.links_to.get(lane, ()))
-    return min(sources, key=lambda one: (abs(net.lanes[one].index - same), one), default=None)
+    return min(
+        sources, key=lambda source: (abs(net.lanes[source].index - same), source), default=None
+    )

@@ -124,8 +124,10 @@ def realized_lights(
         timing = own[0] if own else JunctionTiming(junction=view.names[0])
         asked = signals.bus_priority if timing.bus_priority is None else timing.bus_priority
         control = timing.control or signals.control
-        one = _Realizing(light, view, timing, control, sumo_map, buses=asked)
-        found.append(one.designed(scenario.demand.clock, until) if timing.stages else one.kept())
+        realizing = _Realizing(light, view, timing, control, sumo_map, buses=asked)
+        found.append(
+            realizing.designed(scenario.demand.clock, until) if timing.stages else realizing.kept()
+        )
     return tuple(found)
 
 
@@ -173,15 +175,15 @@ class _Realizing:
         loops: tuple[PlacedLoop, ...] = ()
         areas: tuple[CallArea, ...] = ()
         conditions: dict[str, str] = {}
-        called = self._called(phases) if self._control == "actuated" else None
+        called = self._realize_called(phases) if self._control == "actuated" else None
         if called is not None:
             loops, areas, conditions = called.loops, called.areas, dict(called.conditions)
         elif self._control == "actuated":
-            loops = self._loops({p.stage: p for p in phases if p.prolonged})
-            phases = self._ending(phases, loops, conditions)
+            loops = self._place_loops({p.stage: p for p in phases if p.prolonged})
+            phases = self._add_endings(phases, loops, conditions)
         plan = PhasePlan(tuple(phases), len(phases)) if called is None else called.plan
         if self._buses and self._control == "fixed":
-            plan = bus_phases(plan, {p.stage: _green(p.state) for p in phases}, self._buses,
+            plan = bus_phases(plan, {p.stage: _green_links(p.state) for p in phases}, self._buses,
                               conditions)  # fmt: skip
             loops = idle_loops(light, self._net, self._buses)
         plans = (self._picture.plan(ONLY_PLAN, offset, plan),)
@@ -191,19 +193,19 @@ class _Realizing:
         if not self._buses and self._control == "fixed" and not changed and offset == light.offset:
             return RealizedLight(shown)
         kind = "actuated" if self._buses else TYPES[self._control]
-        params = self._params(loops) | ({} if called is None else {STAGES_PARAM: MAP_STAGES})
+        params = self._loop_params(loops) | ({} if called is None else {STAGES_PARAM: MAP_STAGES})
         start = started_offset(plan, offset)
         program = SumoProgram(ONLY_PLAN, kind, start, plan, conditions, params)
         return RealizedLight(shown, (program,), loops, buses=self._buses, areas=areas)
 
-    def _called(self, phases: Sequence[SumoPhase]) -> CalledLight | None:
+    def _realize_called(self, phases: Sequence[SumoPhase]) -> CalledLight | None:
         """The map's stages, which vehicles and people call, where there is a choice."""
         return called_light(
             self._light, self._view, self._net, phases, detectors=self._timing.detectors,
             buses=self._buses,
         )  # fmt: skip
 
-    def _ending(
+    def _add_endings(
         self, phases: Sequence[SumoPhase], loops: Sequence[PlacedLoop], conditions: dict[str, str]
     ) -> list[SumoPhase]:
         """Say of the phase behind each prolonged one when it is to come."""
@@ -211,12 +213,12 @@ class _Realizing:
         for index, phase in enumerate(phases):
             if not phase.prolonged:
                 continue
-            expression = may_end(loops, phase.stage, _green(phase.state))
+            expression = may_end(loops, phase.stage, _green_links(phase.state))
             if not expression:
                 result[index] = replace(result[index], least=0.0, most=0.0)
                 continue
             name = f"end{phase.stage}"
-            conditions[name] = ended_with_buses(expression, self._buses, _green(phase.state))
+            conditions[name] = ended_with_buses(expression, self._buses, _green_links(phase.state))
             after = (index + 1) % len(phases)
             result[after] = replace(result[after], early=name, final="1")
         return result
@@ -239,7 +241,7 @@ class _Realizing:
         if self._control == "actuated":
             stages = {s.id: s for plan in plans for s in plan.stages}
             loops = (
-                *self._loops(
+                *self._place_loops(
                     {
                         name: SumoPhase(0.0, "", "", name, stage.least, stage.most)
                         for name, stage in stages.items()
@@ -258,17 +260,19 @@ class _Realizing:
         shown_plans: list[ShownPlan] = []
         for plan in plans:
             if plan.id in {name for _, name in active}:
-                one = self._program(program, plan, loops, areas)
-                made.append(one)
+                sumo_program = self._make_program(program, plan, loops, areas)
+                made.append(sumo_program)
                 begins = tuple(time for time, name in active if name == plan.id)
-                shown_plans.append(self._picture.plan(plan.id, plan.offset, one.plan, begins))
+                shown_plans.append(
+                    self._picture.plan(plan.id, plan.offset, sumo_program.plan, begins)
+                )
         groups = tuple(
             self._picture.group(group.id, group.movements) for group in program.groups.values()
         )
         told = self._picture.program(groups, tuple(shown_plans), loops, self._buses, own=True)
         return RealizedLight(told, tuple(made), loops, active, self._buses, areas)
 
-    def _program(
+    def _make_program(
         self,
         program: DesignedProgram,
         plan: TimedPlan,
@@ -289,7 +293,7 @@ class _Realizing:
         switched = bool(program.timing.plans) and (bool(loops) or self._control == "actuated")
         phases = plan_phases(program, plan, ends=ends, calls=calls, switched=switched)
         free = self._control == "fixed" and not phases.chooses
-        params = self._params(() if free else loops)
+        params = self._loop_params(() if free else loops)
         params |= {
             f"{GROUP_PARAM}{group.id}": " ".join(map(str, group.movements))
             for group in program.groups.values()
@@ -310,7 +314,7 @@ class _Realizing:
             plan.id, "static" if free else "actuated", offset, phases, conditions, params
         )
 
-    def _loops(
+    def _place_loops(
         self, stages: Mapping[str, SumoPhase], green: Mapping[str, set[int]] | None = None
     ) -> tuple[PlacedLoop, ...]:
         return vehicle_loops(
@@ -318,11 +322,11 @@ class _Realizing:
             self._view,
             self._net,
             designed=self._timing.detectors,
-            green=green or {name: _green(phase.state) for name, phase in stages.items()},
+            green=green or {name: _green_links(phase.state) for name, phase in stages.items()},
             least={name: phase.least for name, phase in stages.items()},
         )
 
-    def _params(self, loops: Sequence[PlacedLoop]) -> dict[str, str]:
+    def _loop_params(self, loops: Sequence[PlacedLoop]) -> dict[str, str]:
         """SUMO's parameters: one loop a lane as its own, the others only to be shown."""
         params = {
             f"linkSignalID:{n}": " ".join(names)
@@ -350,5 +354,5 @@ class _Realizing:
         return params
 
 
-def _green(state: str) -> set[int]:
+def _green_links(state: str) -> set[int]:
     return {n for n, letter in enumerate(state) if letter in "Gg"}

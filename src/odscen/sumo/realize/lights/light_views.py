@@ -26,19 +26,21 @@ def scenario_lights(sumo_map: SumoMap) -> tuple[Light, ...]:
     if not sumo_map.lights:
         return ()
     segments = lane_segments(sumo_map)
-    return tuple(_light(light, sumo_map, segments) for light in sumo_map.lights)
+    return tuple(_make_light(light, sumo_map, segments) for light in sumo_map.lights)
 
 
-def _light(light: SumoLight, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]]) -> Light:
+def _make_light(
+    light: SumoLight, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]]
+) -> Light:
     return Light(
         tuple(light.junctions) or (light.id,),
         tuple(phase.duration for phase in light.phases if phase.is_stage),
-        tuple(_movement(link, sumo_map, segments) for link in light.links),
+        tuple(_make_movement(link, sumo_map, segments) for link in light.links),
         tuple(Meeting(*conflict) for conflict in light.conflicts),
     )
 
 
-def _movement(
+def _make_movement(
     link: LightLink, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]]
 ) -> SignalMovement:
     if link.turn == UNUSED:
@@ -51,7 +53,7 @@ def _movement(
         legs = legs or (link.source,)
         return SignalMovement(legs[0], legs[0], turn, legs=legs)
     source, target = (
-        _segment(lane, sumo_map, segments, back=back)
+        _segment_at_stop_line(lane, sumo_map, segments, back=back)
         for lane, back in ((link.source, True), (link.target, False))
     )
     names = sumo_map.lane_names
@@ -60,7 +62,7 @@ def _movement(
     return SignalMovement(source, target, turn, lanes_named, yellow)
 
 
-def _segment(
+def _segment_at_stop_line(
     lane: str, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]], *, back: bool
 ) -> str:
     """Segment at the stop line (or behind the junction) of a lane, or of the next one with any.
@@ -71,20 +73,20 @@ def _segment(
     seen = {lane}
     todo = [lane]
     while todo:
-        one = todo.pop(0)
-        for beside in _beside(one, sumo_map):
+        name = todo.pop(0)
+        for beside in _lanes_of_edge(name, sumo_map):
             if segments.get(beside):
                 return segments[beside][-1 if back else 0]
         for link in links:
             near, far = (link.target, link.source) if back else (link.source, link.target)
-            if near == one and far not in seen:
+            if near == name and far not in seen:
                 seen.add(far)
                 todo.append(far)
     return lane
 
 
-def _beside(lane: str, sumo_map: SumoMap) -> list[str]:
+def _lanes_of_edge(lane: str, sumo_map: SumoMap) -> list[str]:
     """A lane and the others of its edge, the nearest first."""
     own = sumo_map.net.lanes[lane]
     others = sumo_map.net.edge_lanes.get(own.edge, ())
-    return [lane, *(one.id for one in sorted(others, key=lambda x: abs(x.index - own.index)))]
+    return [lane, *(lane.id for lane in sorted(others, key=lambda x: abs(x.index - own.index)))]

@@ -81,7 +81,7 @@ def _program_xml(light: str, program: SumoProgram) -> Iterator[str]:
         f' offset="{program.offset:g}">'
     )
     for phase in program.plan.phases:
-        yield f"        <phase {' '.join(_attributes(phase, program.kind))}/>"
+        yield f"        <phase {' '.join(_phase_attributes(phase, program.kind))}/>"
     for name, expression in program.conditions.items():
         yield f"        <condition id={quoteattr(name)} value={quoteattr(expression)}/>"
     for key, value in program.params.items():
@@ -89,7 +89,7 @@ def _program_xml(light: str, program: SumoProgram) -> Iterator[str]:
     yield "    </tlLogic>"
 
 
-def _attributes(phase: SumoPhase, kind: str) -> Iterator[str]:
+def _phase_attributes(phase: SumoPhase, kind: str) -> Iterator[str]:
     yield f'duration="{phase.seconds:g}" state="{phase.state}"'
     if kind == "actuated" and phase.prolonged:
         yield f'minDur="{phase.least:g}" maxDur="{phase.most:g}"'

@@ -69,7 +69,7 @@ class ShownLight:
         """A signal group with the lanes of its movements; ``links`` are places in the states."""
         movements = self._view.movements
         walk = bool(movements) and all(movements[n].walk for n in links)
-        lanes = tuple(self._inside(n) for n in links)
+        lanes = tuple(self._lanes_of_link(n) for n in links)
         names = shortest_names(links, movements) if movements else ()
         paths = tuple(self._light.links[n].path for n in links)
         return ShownGroup(name, links, names, walk, () if walk else lanes, paths)
@@ -92,7 +92,7 @@ class ShownLight:
             groups.append(self.group(name, tuple(links)))
         return tuple(groups)
 
-    def _inside(self, n: int) -> tuple[str, ...]:
+    def _lanes_of_link(self, n: int) -> tuple[str, ...]:
         """Lane before the light, and the lanes of a link inside the junction."""
         link = self._light.links[n]
         onto = next(

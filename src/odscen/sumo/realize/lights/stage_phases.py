@@ -95,13 +95,13 @@ def kept_phases(light: SumoLight, green: Sequence[float]) -> list[SumoPhase]:
         seconds = next(greens, phase.duration) if phase.is_stage else phase.duration
         least = min(phase.least, seconds)
         most = phase.most * seconds / phase.duration if phase.is_stage else phase.most
-        if phase.is_stage and not bounded and _drive(phase.state, light):
+        if phase.is_stage and not bounded and _vehicles_have_green(phase.state, light):
             least, most = min(LEAST_GREEN, seconds), PROLONGED * seconds
         phases.append(SumoPhase(seconds, phase.state, phase.name, stage, least, most))
     return phases
 
 
-def _drive(state: str, light: SumoLight) -> bool:
+def _vehicles_have_green(state: str, light: SumoLight) -> bool:
     """Whether a vehicle has green."""
     return any(
         letter in "Gg" and link.turn != CROSSED
@@ -195,25 +195,25 @@ class _Phases:
     def build(self) -> PhasePlan:
         for number, stage in enumerate(self._stages):
             self._first.append(len(self._phases))
-            self._phases += self._greens(number, stage)
+            self._phases += self._green_phases(number, stage)
             self._last.append(len(self._phases) - 1)
-            self._change(number, self._after(number))
+            self._append_change(number, self._stage_after(number))
         main = len(self._phases)
         for number in range(len(self._stages)):
-            self._decide(number)
+            self._decide_ways(number)
         if len(self._phases) > main and not self._phases[main - 1].following:
             self._phases[main - 1] = replace(self._phases[main - 1], following=(0,))
         if self._cycle is not None:
-            self._coordinate(self._cycle)
+            self._coordinate_stages(self._cycle)
             return _from_its_end(self._phases, main, self._last[0])
         return PhasePlan(tuple(self._phases), main)
 
-    def _after(self, number: int) -> int:
+    def _stage_after(self, number: int) -> int:
         return (number + 1) % len(self._stages)
 
-    def _greens(self, number: int, stage: PlannedStage) -> list[SumoPhase]:
+    def _green_phases(self, number: int, stage: PlannedStage) -> list[SumoPhase]:
         """Phase of a stage; of the first one perhaps two, of which the other may be ended."""
-        green = self._green(stage)
+        green = self._green_phase(stage)
         if not (self._switched and number == 0 and stage.id in self._ends and green.least > 1.0):
             return [green]
         fixed = green.least - 1.0
@@ -228,36 +228,36 @@ class _Phases:
             ),
         ]
 
-    def _green(self, stage: PlannedStage) -> SumoPhase:
+    def _green_phase(self, stage: PlannedStage) -> SumoPhase:
         bounds = (stage.least, stage.most) if stage.id in self._ends else (0.0, 0.0)
         state = stage_state(self._program, stage)
         name = f"{STAGE}{stage.id}"
         return SumoPhase(stage.green, state, name, stage.id, *bounds, on_call=stage.on_call)
 
-    def _change(self, number: int, following: int) -> None:
+    def _append_change(self, number: int, following: int) -> None:
         """Append the steps from one stage to another."""
         steps = change_steps(self._program, self._stages[number], self._stages[following])
         self._phases += [SumoPhase(*step) for step in steps]
 
-    def _decide(self, number: int) -> None:
+    def _decide_ways(self, number: int) -> None:
         """Say where a stage leads, and lay the ways past stages that were not called."""
         stage, at = self._stages[number], self._last[number]
         end = self._ends.get(stage.id, "")
-        way = self._after(number)
-        ways: list[int] = [self._entry(number, way)]
+        way = self._stage_after(number)
+        ways: list[int] = [self._entry_phase(number, way)]
         passed = [way]
         while self._stages[way].on_call and len(passed) < len(self._stages):
-            self._condition(ways[-1], end, self._calls[self._stages[way].id])
-            way = self._after(way)
-            ways.append(self._past(number, way, passed))
+            self._add_conditions(ways[-1], end, self._calls[self._stages[way].id])
+            way = self._stage_after(way)
+            ways.append(self._append_way_past(number, way, passed))
             passed.append(way)
-        self._condition(ways[-1], end, "")
+        self._add_conditions(ways[-1], end, "")
         if self._switched and number == 0:
             self._phases[ways[-1]] = replace(self._phases[ways[-1]], final="1")
         if len(ways) > 1:
             self._phases[at] = replace(self._phases[at], following=tuple(ways))
 
-    def _entry(self, number: int, following: int) -> int:
+    def _entry_phase(self, number: int, following: int) -> int:
         """First phase on the direct way from a stage to the next."""
         after = self._last[number] + 1
         return (
@@ -266,7 +266,7 @@ class _Phases:
             else (self._first[following])
         )
 
-    def _past(self, number: int, following: int, passed: list[int]) -> int:
+    def _append_way_past(self, number: int, following: int, passed: list[int]) -> int:
         """Append the way past stages, and return its first phase."""
         stage, target = self._stages[number], self._stages[following]
         first = len(self._phases)
@@ -280,7 +280,7 @@ class _Phases:
             rest = between + greens - change_length(self._program, stage, target)
             green = self._phases[self._last[number]]
             self._phases.append(SumoPhase(rest, green.state, f"{HOLD}{stage.id}", stage.id))
-        self._change(number, following)
+        self._append_change(number, following)
         last = len(self._phases) - 1
         if last < first:
             return self._first[following]
@@ -289,14 +289,14 @@ class _Phases:
         self._phases[last] = replace(self._phases[last], following=(self._first[following],))
         return first
 
-    def _condition(self, phase: int, end: str, call: str) -> None:
+    def _add_conditions(self, phase: int, end: str, call: str) -> None:
         """Say when a phase is the one to go to: if the green may end, and somebody has called."""
-        early = " and ".join(one for one in (end, call) if one)
+        early = " and ".join(name for name in (end, call) if name)
         self._phases[phase] = replace(
             self._phases[phase], early=early if end else "", final=call or ("1" if end else "")
         )
 
-    def _coordinate(self, cycle: float) -> None:
+    def _coordinate_stages(self, cycle: float) -> None:
         """End stages at their places in the cycle at the latest, and the first exactly there.
 
         What the others leave over, the first stage has. SUMO counts the cycle from its end: only

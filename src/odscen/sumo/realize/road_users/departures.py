@@ -52,9 +52,9 @@ def road_users(
         RoadUser(
             id=actor.id,
             category=actor.category,
-            spawn=_node(graph, actor.spawn),
+            spawn=_required_node(graph, actor.spawn),
             goal=goals[actor.id],
-            via=tuple(_node(graph, name) for name in actor.via),
+            via=tuple(_required_node(graph, name) for name in actor.via),
             depart=actor.depart,
             speed=actor.speed,
             initial_speed=actor.initial_speed,
@@ -65,7 +65,7 @@ def road_users(
     if scenario.flows:
         candidates = flow_goals(scenario, graph, region=region)
         for flow in scenario.flows:
-            spawn = _node(graph, flow.spawn)
+            spawn = _required_node(graph, flow.spawn)
             users += flow_users(
                 flow,
                 seed=scenario.seed,
@@ -95,7 +95,7 @@ def flow_users(
         passed, last = day.amount(passed), day.amount(last)
     while True:
         passed += float(random.exponential(3600.0 / flow.per_hour))
-        category = _pick(random, categories, shares)
+        category = _pick_category(random, categories, shares)
         goal = int(goals[int(random.integers(len(goals)))])
         if passed >= last:
             return users
@@ -148,7 +148,7 @@ def demand_users(
     if parking is not None:
         users, said = parking.applied(users)
         unmet += said
-    generated = [one for one in scenario.demand.counts if one.use == "generate"]
+    generated = [count for count in scenario.demand.counts if count.use == "generate"]
     if generated:
         others = [*placed, *users]
         seen = observations(scenario.demand)
@@ -184,7 +184,9 @@ def trip_users(trips: Trips, *, until: float) -> list[RoadUser]:
     ]
 
 
-def _pick(random: np.random.Generator, categories: list[Category], shares: list[float]) -> Category:
+def _pick_category(
+    random: np.random.Generator, categories: list[Category], shares: list[float]
+) -> Category:
     drawn = float(random.random()) * sum(shares)
     for category, share in zip(categories, shares, strict=True):
         drawn -= share
@@ -193,7 +195,7 @@ def _pick(random: np.random.Generator, categories: list[Category], shares: list[
     return categories[-1]
 
 
-def _node(graph: MapGraph, name: str) -> int:
+def _required_node(graph: MapGraph, name: str) -> int:
     place = place_of(graph, name)
     if place is None:  # goals have been resolved, so the spawn is known
         raise AssertionError(name)

@@ -104,7 +104,7 @@ def planned_positions(
     try:
         users = road_users(scenario, graph, region, until=until)
     except ScenarioError:  # to check all of them costs more than to plan them
-        sound, left_out = _sound(scenario, sumo_map, region)
+        sound, left_out = _keep_plannable(scenario, sumo_map, region)
         users = road_users(sound, graph, region, until=until)
     users = tuple(user for user in users if user.id not in later)
     planned = users[:MOST_PLANNED]
@@ -112,9 +112,9 @@ def planned_positions(
     step = scenario.simulation.step_length
     free = FreeFlow(graph, scenario, assets, effect, step)
     bodies = [free.body(user) for user in planned]
-    paths = _paths(planned, bodies, sumo_map, region)
+    paths = _plan_paths(planned, bodies, sumo_map, region)
     rows = [
-        _points(free, user, free.motion(user, free.driver(user, body), path), path)
+        _path_points(free, user, free.motion(user, free.driver(user, body), path), path)
         for user, body, path in zip(planned, bodies, paths, strict=True)
         if len(path)
     ]
@@ -137,7 +137,7 @@ def planned_positions(
     )
 
 
-def _sound(
+def _keep_plannable(
     scenario: Scenario, sumo_map: SumoMap, region: Region
 ) -> tuple[Scenario, tuple[str, ...]]:
     """Scenario without the actors and flows that cannot be planned, and their ids."""
@@ -156,7 +156,7 @@ def _sound(
     return scenario.model_copy(update=kept), tuple(gone)
 
 
-def _paths(
+def _plan_paths(
     users: Sequence[RoadUser], bodies: Sequence[Body], sumo_map: SumoMap, region: Region
 ) -> list[Int32Array]:
     """Nodes of the route of each; empty where there is none."""
@@ -172,7 +172,7 @@ def _paths(
             for n, user in enumerate(users)
             if not user.via
             and goals[user.person, user.goal] > starts[user.person, user.spawn]
-            and _searched(user, drivable)
+            and _is_searched(user, drivable)
         ]
         trips = [replace(users[n], trip=True) for n in together]
         for n, path in each_path(trips, region, drivable, [bodies[k] for k in together]):
@@ -184,18 +184,18 @@ def _paths(
     return found
 
 
-def _searched(user: RoadUser, drivable: Router) -> bool:
+def _is_searched(user: RoadUser, drivable: Router) -> bool:
     """Whether the search for routes to a goal, which begins on SUMO's lanes, takes a user."""
     return user.person or bool(drivable.mask[user.spawn] and drivable.mask[user.goal])
 
 
-def _points(free: FreeFlow, user: RoadUser, motion: Motion, path: Int32Array) -> FloatArray:
+def _path_points(free: FreeFlow, user: RoadUser, motion: Motion, path: Int32Array) -> FloatArray:
     """Rows of time, x, y and hdg at the points of a path that are kept."""
     graph = free.graph.walks if user.person else free.graph.lanes
     x, y = graph.x[path], graph.y[path]
     # People walk either way along their paths.
-    hdg = _directions(x, y) if user.person else graph.hdg[path]
-    kept = _kept(motion, hdg)
+    hdg = _point_directions(x, y) if user.person else graph.hdg[path]
+    kept = _rows_to_keep(motion, hdg)
     offset = user.design.lateral_offset
     return np.column_stack(
         [
@@ -207,14 +207,14 @@ def _points(free: FreeFlow, user: RoadUser, motion: Motion, path: Int32Array) ->
     )
 
 
-def _directions(x: FloatArray, y: FloatArray) -> FloatArray:
+def _point_directions(x: FloatArray, y: FloatArray) -> FloatArray:
     if len(x) < 2:
         return np.zeros(len(x))
     ahead = np.arctan2(np.diff(y), np.diff(x))
     return np.append(ahead, ahead[-1])
 
 
-def _kept(motion: Motion, hdg: FloatArray) -> Int32Array:
+def _rows_to_keep(motion: Motion, hdg: FloatArray) -> Int32Array:
     """Rows of a path where it has turned, gone on or changed its speed enough; the ends always."""
     gone = np.concatenate([[0.0], np.cumsum(motion.steps)])
     turns = np.abs(np.angle(np.exp(1j * np.diff(hdg))))

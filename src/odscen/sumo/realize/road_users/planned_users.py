@@ -107,7 +107,7 @@ class RoadUserWriter:
         for index, path in self._ways.each_path(users, bodies, self.assigned):
             routes[index] = self._plan_route(users[index], bodies[index], drivers[index], path)
         return tuple(
-            self._write(user, body, behaviour, routes[index])
+            self._write_user(user, body, behaviour, routes[index])
             for index, (user, body, behaviour) in enumerate(
                 zip(users, bodies, drivers, strict=True)
             )
@@ -118,7 +118,7 @@ class RoadUserWriter:
     ) -> _PlannedRoute:
         problem, route = None, None
         try:
-            route = self._route(user, body, path)
+            route = self._plan_user_route(user, body, path)
         except NoRouteError as error:
             problem = str(error)
         if route is not None and user.design.crosses_anywhere and self.roads is not None:
@@ -128,7 +128,7 @@ class RoadUserWriter:
         motion = self._free.motion(user, behaviour, path)
         return _PlannedRoute(route, problem, float(np.sum(motion.steps)), motion.duration)
 
-    def _route(self, user: RoadUser, body: Body, path: Int32Array) -> Route | Walk:
+    def _plan_user_route(self, user: RoadUser, body: Body, path: Int32Array) -> Route | Walk:
         offset = user.design.lateral_offset
         if user.person:
             if (node := turns_round(path)) is not None:
@@ -173,7 +173,7 @@ class RoadUserWriter:
                 )
             here = lane.edge
 
-    def _write(
+    def _write_user(
         self, user: RoadUser, body: Body, behaviour: Driver, planned: _PlannedRoute
     ) -> PlannedActor:
         if planned.route is None:
@@ -196,7 +196,7 @@ class RoadUserWriter:
                     looks_every=self._period if self._ways.informed(user) else None,
                 )
             self.notes += [f"{user.id}: {repair.words}" for repair in planned.route.repairs]
-        return self._planned(user, body, behaviour, planned)
+        return self._planned_actor_of(user, body, behaviour, planned)
 
     def _initial_speeds(
         self, user: RoadUser, behaviour: Driver, route: Route
@@ -225,7 +225,7 @@ class RoadUserWriter:
         stops = math.sqrt(reacting**2 + 2.0 * decel * room) - reacting
         return wanted, min(allowed, stops)
 
-    def _planned(
+    def _planned_actor_of(
         self, user: RoadUser, body: Body, behaviour: Driver, planned: _PlannedRoute
     ) -> PlannedActor:
         return planned_actor(

@@ -140,9 +140,9 @@ class RoutesOfDemand:
         if not self._choice.shares or not self.chooses(user):
             return None
         here, there = (str(graph.segments.ids[segment[node]]) for node in (user.spawn, user.goal))
-        for one in self._choice.shares:
-            if here in segments_of(demand, one.origin) and there in segments_of(
-                demand, one.destination
+        for share in self._choice.shares:
+            if here in segments_of(demand, share.origin) and there in segments_of(
+                demand, share.destination
             ):
-                return one
+                return share
         return None

@@ -33,7 +33,7 @@ class KnownRoutes:
 
     def learn(self, path: Int32Array, edges: EdgeSteps) -> None:
         """Add a path, if it is a new one."""
-        if not any(np.array_equal(path, one) for one in self.paths):
+        if not any(np.array_equal(path, array) for array in self.paths):
             self.paths.append(path)
             self.steps.append(edges.of(path))
 

@@ -94,10 +94,10 @@ class TimedNetwork:
         half of an interval, nothing is quick in it.
         """
         count = max(1, int(np.ceil(until / interval)))
-        seconds = np.zeros((count, len(self._edges)))
+        seconds = np.zeros((count, len(self._edge_names)))
         metres = np.zeros_like(seconds)
         for begin, edge, spent, driven in uses:
-            column = self._column.get(edge)
+            column = self._column_of_edge.get(edge)
             if column is not None:
                 row = min(int(begin // interval), count - 1)
                 seconds[row, column] += spent
@@ -105,51 +105,57 @@ class TimedNetwork:
         pace = (seconds + self._edge_length / self._edge_speed) / (metres + self._edge_length)
         pace = np.minimum(pace, 1.0 / SLOWEST)
         for row in range(count):
-            pace[row, self._closed(closings, row * interval, (row + 1) * interval)] = 1.0 / SLOWEST
+            pace[row, self._closed_columns(closings, row * interval, (row + 1) * interval)] = (
+                1.0 / SLOWEST
+            )
         lanes = self._map.graph.lanes
         own = np.where(self._edge_of_node >= 0, pace[:, self._edge_of_node], 0.0)
         of_node = np.maximum(own, _free_pace(lanes))
         return TravelTimes(interval, lanes.length * of_node[:, lanes.source])
 
-    def _closed(self, closings: Sequence[ClosedLanes], begin: float, end: float) -> list[int]:
+    def _closed_columns(
+        self, closings: Sequence[ClosedLanes], begin: float, end: float
+    ) -> list[int]:
         lanes = {
             lane
-            for one in closings
-            if CAR in one.banned
-            and min(one.end, end) - max(one.begin, begin) >= 0.5 * (end - begin)
-            for lane in one.lanes
+            for closing in closings
+            if CAR in closing.banned
+            and min(closing.end, end) - max(closing.begin, begin) >= 0.5 * (end - begin)
+            for lane in closing.lanes
         }
         edges = sorted({self._map.net.lanes[lane].edge for lane in lanes})
         every = self._map.net.edge_lanes
         return [
-            self._column[edge]
+            self._column_of_edge[edge]
             for edge in edges
-            if all(one.id in lanes for one in every[edge] if one.allows(CAR))
+            if all(lane.id in lanes for lane in every[edge] if lane.allows(CAR))
         ]
 
     @cached_property
-    def _edges(self) -> list[str]:
+    def _edge_names(self) -> list[str]:
         return sorted({lane.edge for lane in self._map.net.lanes.values()})
 
     @cached_property
-    def _column(self) -> dict[str, int]:
-        return {edge: column for column, edge in enumerate(self._edges)}
+    def _column_of_edge(self) -> dict[str, int]:
+        return {edge: column for column, edge in enumerate(self._edge_names)}
 
     @cached_property
     def _edge_length(self) -> FloatArray:
-        return np.array([max(self._lane(edge).length, 0.1) for edge in self._edges])
+        return np.array([max(self._first_lane(edge).length, 0.1) for edge in self._edge_names])
 
     @cached_property
     def _edge_speed(self) -> FloatArray:
-        return np.array([self._lane(edge).speed or UNKNOWN_LIMIT for edge in self._edges])
+        return np.array(
+            [self._first_lane(edge).speed or UNKNOWN_LIMIT for edge in self._edge_names]
+        )
 
-    def _lane(self, edge: str) -> RoadNetLane:
+    def _first_lane(self, edge: str) -> RoadNetLane:
         return self._map.net.edge_lanes[edge][0]
 
     @cached_property
     def _edge_of_node(self) -> Int32Array:
         places = self._map.lane_places
-        of_lane = [self._column[self._map.net.lanes[name].edge] for name in places.lanes]
+        of_lane = [self._column_of_edge[self._map.net.lanes[name].edge] for name in places.lanes]
         return np.where(places.lane >= 0, np.array(of_lane, dtype=np.int32)[places.lane], -1)
 
 

@@ -105,14 +105,14 @@ def story_plan(
         for where, _, part in rule_parts(rule, f"rules[{index}]"):
             for name, place in places_of(part):
                 if isinstance(place, str):
-                    plan.places[place] = _place(place, sumo_map, f"{where}.{name}")
+                    plan.places[place] = _story_place(place, sumo_map, f"{where}.{name}")
             light, movement = getattr(part, "light", None), getattr(part, "movement", None) or ""
             if light is not None:
-                plan.signals[light, movement] = _signal(light, movement, sumo_map, where)
+                plan.signals[light, movement] = _signal_link(light, movement, sumo_map, where)
     return plan
 
 
-def _place(node: str, sumo_map: SumoMap, where: str) -> StoryPlace:
+def _story_place(node: str, sumo_map: SumoMap, where: str) -> StoryPlace:
     graph = sumo_map.graph
     place = place_of(graph, node)
     if place is None:
@@ -126,7 +126,7 @@ def _place(node: str, sumo_map: SumoMap, where: str) -> StoryPlace:
     return StoryPlace(x, y, lane.edge, at[1], lane.index)
 
 
-def _signal(light: str, movement: str, sumo_map: SumoMap, where: str) -> tuple[str, int]:
+def _signal_link(light: str, movement: str, sumo_map: SumoMap, where: str) -> tuple[str, int]:
     lights = scenario_lights(sumo_map)
     found = find_light(lights, light)
     if found is None:

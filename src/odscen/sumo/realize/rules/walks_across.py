@@ -53,7 +53,11 @@ class WalkAcross(NamedTuple):
                 name += "_"
             taken.add(name)
             width, place = float(graph.walks.width[start]), walk_node_id(graph, start)
-            when = _there(place, width) if found or start != self.path[0] else {"appeared": {}}
+            when = (
+                _condition_at_place(place, width)
+                if found or start != self.path[0]
+                else {"appeared": {}}
+            )
             if found:
                 when = {"all": [{"rule": {"id": found[-1].id}}, when]}
             then = [{"walk": {"to": walk_node_id(graph, end)}}]
@@ -62,7 +66,7 @@ class WalkAcross(NamedTuple):
         return found
 
 
-def _there(place: str, width: float) -> dict[str, Any]:
+def _condition_at_place(place: str, width: float) -> dict[str, Any]:
     near = {"reaches": {"place": place, "within": width / 2.0 + _BESIDE}}
     abeam = {"place": place, "along": "longitudinal", "below": _ABEAM, "free": False}
     return {"all": [near, {"distance": abeam}]}
@@ -82,7 +86,7 @@ class RoadsAcross:
         self._router = region.walk_router
         self._edges = [sumo_map.net.lanes[name].edge for name in sumo_map.walk_places.lanes]
         self._edge_row = sumo_map.walk_places.lane
-        self._opposite = self._sides(usable & region.walks)
+        self._opposite = self._nodes_across(usable & region.walks)
         walks = self._graph.walks
         on = walks.kind == WalkKind.CROSSWALK
         pairs = np.stack([walks.source[on], walks.target[on]], axis=1)
@@ -102,14 +106,14 @@ class RoadsAcross:
         before: list[int] = path[:kept].tolist()
         crossings: list[tuple[int, int]] = []
         rest = path[kept:]
-        while len(crossings) < _MOST and (found := self._first(rest)) is not None:
+        while len(crossings) < _MOST and (found := self._first_crossing(rest)) is not None:
             place, end = found
             crossings.append((int(rest[place]), end))
             before += rest[: place + 1].tolist()
             rest = self._router.path(end, int(path[-1]))
         return WalkAcross(np.array([*before, *rest.tolist()], dtype=np.int32), tuple(crossings))
 
-    def _first(self, path: Int32Array) -> tuple[int, int] | None:
+    def _first_crossing(self, path: Int32Array) -> tuple[int, int] | None:
         """Place in a path from which it crosses a road first, and the node on the other side.
 
         That with the shortest walk in all, and of those that are as good the first.
@@ -131,7 +135,7 @@ class RoadsAcross:
         place = int(np.argmax(fits))
         return place, int(ends[place])
 
-    def _sides(self, usable: BoolArray) -> Int32Array:
+    def _nodes_across(self, usable: BoolArray) -> Int32Array:
         """Node on the other side of the road of each node, or -1; shape ``(P,)``."""
         walks = self._graph.walks
         roads = np.array([kind == "road" for kind in self._graph.segments.kinds], dtype=np.bool_)
@@ -144,10 +148,10 @@ class RoadsAcross:
         found = np.full(len(walks.x), -1, dtype=np.int32)
         for both in sides.values():
             for left in (True, False):
-                self._match(np.array(both[left], int), np.array(both[not left], int), found)
+                self._match_sides(np.array(both[left], int), np.array(both[not left], int), found)
         return found
 
-    def _match(self, own: Int32Array, others: Int32Array, found: Int32Array) -> None:
+    def _match_sides(self, own: Int32Array, others: Int32Array, found: Int32Array) -> None:
         if not len(own) or not len(others):
             return
         walks = self._graph.walks

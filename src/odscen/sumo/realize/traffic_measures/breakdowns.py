@@ -84,21 +84,25 @@ def breakdowns(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> tuple[
         If the network has no lane at the place of one.
     """
     incidents = [
-        one for one in scenario.measures if isinstance(one, LaneIncident) and one.begin < until
+        measure
+        for measure in scenario.measures
+        if isinstance(measure, LaneIncident) and measure.begin < until
     ]
     if not incidents:
         return ()
     found = MeasuredLanes(sumo_map)
-    return tuple(_breakdown(one, found, sumo_map, until) for one in incidents)
+    return tuple(_plan_breakdown(incident, found, sumo_map, until) for incident in incidents)
 
 
-def _breakdown(
+def _plan_breakdown(
     incident: LaneIncident, found: MeasuredLanes, sumo_map: SumoMap, until: float
 ) -> Breakdown:
-    lane, pos = _place(incident, found, sumo_map)
+    lane, pos = _place_of_incident(incident, found, sumo_map)
     speed = sumo_map.net.lanes[lane].speed
     wanted = speed * speed / (2.0 * COMFORT) + MORE_ROOM
-    start, start_pos, edges, driven = _upstream(sumo_map.net, lane, pos, wanted, incident.length)
+    start, start_pos, edges, driven = _departure_upstream(
+        sumo_map.net, lane, pos, wanted, incident.length
+    )
     duration = driven / speed + speed / (2.0 * COMFORT)
     return Breakdown(
         id=incident.id,
@@ -113,7 +117,9 @@ def _breakdown(
     )
 
 
-def _place(incident: LaneIncident, found: MeasuredLanes, sumo_map: SumoMap) -> tuple[str, float]:
+def _place_of_incident(
+    incident: LaneIncident, found: MeasuredLanes, sumo_map: SumoMap
+) -> tuple[str, float]:
     """SUMO lane and position of an incident."""
     nodes = found.places.lane_nodes(incident.lane)
     graph = sumo_map.graph.lanes
@@ -135,7 +141,7 @@ def _place(incident: LaneIncident, found: MeasuredLanes, sumo_map: SumoMap) -> t
     return lane.id, min(max(place[1] + ahead, min(incident.length, lane.length)), lane.length)
 
 
-def _upstream(
+def _departure_upstream(
     net: RoadNet, lane: str, pos: float, wanted: float, length: float
 ) -> tuple[str, float, tuple[str, ...], float]:
     """Where a vehicle departs that is to drive ``wanted`` metres to ``pos``: as far as roads go.

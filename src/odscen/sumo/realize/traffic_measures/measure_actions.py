@@ -82,55 +82,58 @@ class MeasureActions:
         """
         if not self.closings:
             return route
-        return self._departing(
-            self._ending(self._beginning(route, net), net, length=length), net, depart, vclass
+        return self._move_departure(
+            self._cut_ending(self._cut_beginning(route, net), net, length=length),
+            net,
+            depart,
+            vclass,
         )
 
-    def _beginning(self, route: Route, net: RoadNet) -> Route:
+    def _cut_beginning(self, route: Route, net: RoadNet) -> Route:
         first = net.edge_lanes[route.edges[0]][0]
         before = net.links_to.get(first.id, ()) if first.internal else ()
         if not before:
             return route
         lane = net.lanes[before[0].source]
         edges = (lane.edge, *route.edges[1:])
-        passed = {first.id, *(one.id for one in net.leaving(first.id))}
-        if passed.isdisjoint(self._lanes) and not self._meets(edges):
+        passed = {first.id, *(lane.id for lane in net.leaving(first.id))}
+        if passed.isdisjoint(self._closed_lanes) and not self._meets_closed_pair(edges):
             return route
         return replace(route, edges=edges, depart_lane=lane.index, depart_pos=lane.length)
 
-    def _ending(self, route: Route, net: RoadNet, *, length: float) -> Route:
+    def _cut_ending(self, route: Route, net: RoadNet, *, length: float) -> Route:
         edges = route.edges
-        if len(edges) < 3 or route.arrival_pos > length or edges[-2:] not in self._pairs:
+        if len(edges) < 3 or route.arrival_pos > length or edges[-2:] not in self._closed_pairs:
             return route
         pos = net.edge_length(edges[-2])
         return replace(route, edges=edges[:-1], arrival_lane=None, arrival_pos=pos)
 
-    def _departing(self, route: Route, net: RoadNet, depart: float, vclass: str) -> Route:
+    def _move_departure(self, route: Route, net: RoadNet, depart: float, vclass: str) -> Route:
         closed = {
             lane
-            for one in self.closings
-            if one.begin <= depart < one.end and vclass in one.banned
-            for lane in one.lanes
+            for closing in self.closings
+            if closing.begin <= depart < closing.end and vclass in closing.banned
+            for lane in closing.lanes
         }
         lanes = net.edge_lanes[route.edges[0]]
         if lanes[route.depart_lane].id not in closed:
             return route
-        rest = [one for one in lanes if one.id not in closed and one.allows(vclass)]
+        rest = [lane for lane in lanes if lane.id not in closed and lane.allows(vclass)]
         if not rest:
             return route
-        nearest = min(rest, key=lambda one: abs(one.index - route.depart_lane))
+        nearest = min(rest, key=lambda lane: abs(lane.index - route.depart_lane))
         return replace(route, depart_lane=nearest.index)
 
-    def _meets(self, edges: tuple[str, ...]) -> bool:
-        return any(pair in self._pairs for pair in pairwise(edges))
+    def _meets_closed_pair(self, edges: tuple[str, ...]) -> bool:
+        return any(pair in self._closed_pairs for pair in pairwise(edges))
 
     @cached_property
-    def _pairs(self) -> set[tuple[str, ...]]:
+    def _closed_pairs(self) -> set[tuple[str, ...]]:
         return {pair for period in self.closed for pair in period.pairs}
 
     @cached_property
-    def _lanes(self) -> set[str]:
-        return {lane for one in self.closings for lane in one.lanes}
+    def _closed_lanes(self) -> set[str]:
+        return {lane for closing in self.closings for lane in closing.lanes}
 
 
 def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> MeasureActions:
@@ -141,7 +144,7 @@ def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> M
     ScenarioError
         If a place is not on the map.
     """
-    active = [one for one in scenario.measures if one.begin < until]
+    active = [measure for measure in scenario.measures if measure.begin < until]
     if not active:
         return MeasureActions()
     found = MeasuredLanes(sumo_map)
@@ -156,13 +159,15 @@ def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> M
         for one in active
         if isinstance(one, RoadClosure | Roadworks | ChangedPermission) and closed_places(one)
     ]
-    lines = [*_rerouters(closings, found), *_signs(active, found, until)]
+    lines = [*_rerouter_lines(closings, found), *_speed_sign_lines(active, found, until)]
     xml = "\n".join(["<additional>", *lines, "</additional>", ""]) if lines else None
-    planned = sorted((_planned(one, found, sumo_map, until) for one in active), key=_when)
+    planned = sorted(
+        (_plan_measure(one, found, sumo_map, until) for one in active), key=_begin_and_id
+    )
     return MeasureActions(
         xml,
         tuple(planned),
-        tuple(_closed(closings, found, until)),
+        tuple(_closed_periods(closings, found, until)),
         tuple(closings),
     )
 
@@ -178,25 +183,25 @@ def narrowed(width: float) -> float:
     return less / 3.6
 
 
-def _when(measure: PlannedMeasure) -> tuple[float, str]:
+def _begin_and_id(measure: PlannedMeasure) -> tuple[float, str]:
     return measure.begin, measure.id
 
 
-def _rerouters(closings: Sequence[ClosedLanes], found: MeasuredLanes) -> Iterator[str]:
-    for one in closings:
-        if not one.lanes:
+def _rerouter_lines(closings: Sequence[ClosedLanes], found: MeasuredLanes) -> Iterator[str]:
+    for closing in closings:
+        if not closing.lanes:
             continue
-        edges = " ".join(found.predecessors(one.lanes))
-        yield f"    <rerouter id={quoteattr(f'closed.{one.id}')} edges={quoteattr(edges)}>"
-        yield f'        <interval begin="{one.begin:g}" end="{one.end:g}">'
-        for name in one.lanes:
-            who = _permission(found.net.lanes[name], one.banned)
+        edges = " ".join(found.predecessors(closing.lanes))
+        yield f"    <rerouter id={quoteattr(f'closed.{closing.id}')} edges={quoteattr(edges)}>"
+        yield f'        <interval begin="{closing.begin:g}" end="{closing.end:g}">'
+        for name in closing.lanes:
+            who = _remaining_permission(found.net.lanes[name], closing.banned)
             yield f"            <closingLaneReroute id={quoteattr(name)} {who}/>"
         yield "        </interval>"
         yield "    </rerouter>"
 
 
-def _permission(lane: RoadNetLane, banned: frozenset[str]) -> str:
+def _remaining_permission(lane: RoadNetLane, banned: frozenset[str]) -> str:
     """Say who may still use a lane; SUMO starts from all classes, not from those of the lane."""
     if lane.allowed is None:
         return f'disallow="{" ".join(sorted(banned))}"'
@@ -204,33 +209,35 @@ def _permission(lane: RoadNetLane, banned: frozenset[str]) -> str:
     return f'allow="{" ".join(left)}"' if left else 'disallow="all"'
 
 
-def _signs(measures: Sequence[Measure], found: MeasuredLanes, until: float) -> Iterator[str]:
-    limits = by_lane(_limits(measures, found, until))
+def _speed_sign_lines(
+    measures: Sequence[Measure], found: MeasuredLanes, until: float
+) -> Iterator[str]:
+    limits = by_lane(_limit_spans(measures, found, until))
     alike: dict[tuple[tuple[float, float], ...], list[str]] = {}
     for lane, spans in sorted(limits.items()):
-        alike.setdefault(_steps(spans, until), []).append(lane)
+        alike.setdefault(_limit_steps(spans, until), []).append(lane)
     for number, (steps, lanes) in enumerate(alike.items()):
         yield f'    <variableSpeedSign id="limit.{number}" lanes={quoteattr(" ".join(lanes))}>'
         yield from (f'        <step time="{time:g}" speed="{speed:g}"/>' for time, speed in steps)
         yield "    </variableSpeedSign>"
 
 
-def _limits(
+def _limit_spans(
     measures: Sequence[Measure], found: MeasuredLanes, until: float
 ) -> Iterator[tuple[str, float, float, float]]:
-    for one in measures:
-        if not isinstance(one, SpeedLimit | Roadworks):
+    for measure in measures:
+        if not isinstance(measure, SpeedLimit | Roadworks):
             continue
-        if isinstance(one, Roadworks) and one.speed is None and one.width is None:
+        if isinstance(measure, Roadworks) and measure.speed is None and measure.width is None:
             continue
-        for lane in sorted({lane for name in one.places for lane in found.lanes(name)}):
-            speed = found.net.lanes[lane].speed if one.speed is None else one.speed
-            if isinstance(one, Roadworks) and one.width is not None:
-                speed = max(SLOWEST, speed - narrowed(one.width))
-            yield lane, one.begin, end_of(one, until), round(speed, 4)
+        for lane in sorted({lane for name in measure.places for lane in found.lanes(name)}):
+            speed = found.net.lanes[lane].speed if measure.speed is None else measure.speed
+            if isinstance(measure, Roadworks) and measure.width is not None:
+                speed = max(SLOWEST, speed - narrowed(measure.width))
+            yield lane, measure.begin, end_of(measure, until), round(speed, 4)
 
 
-def _steps(
+def _limit_steps(
     spans: Sequence[tuple[float, float, float]], until: float
 ) -> tuple[tuple[float, float], ...]:
     """When which limit holds; -1 is the lane's own."""
@@ -245,23 +252,23 @@ def _steps(
     return tuple(steps)
 
 
-def _closed(
+def _closed_periods(
     closings: Sequence[ClosedLanes], found: MeasuredLanes, until: float
 ) -> Iterator[ClosedPeriod]:
-    classes = sorted({vclass for one in closings for vclass in one.banned})
-    for begin, end in periods(((one.begin, one.end) for one in closings), until):
+    classes = sorted({vclass for closing in closings for vclass in closing.banned})
+    for begin, end in periods(((closing.begin, closing.end) for closing in closings), until):
         for vclass in classes:
             closed = frozenset(
                 lane
-                for one in closings
-                if one.begin <= begin and end <= one.end and vclass in one.banned
-                for lane in one.lanes
+                for closing in closings
+                if closing.begin <= begin and end <= closing.end and vclass in closing.banned
+                for lane in closing.lanes
             )
             if pairs := found.broken_links(closed, vclass):
                 yield ClosedPeriod(begin, end, vclass, pairs)
 
 
-def _planned(
+def _plan_measure(
     measure: Measure, found: MeasuredLanes, sumo_map: SumoMap, until: float
 ) -> PlannedMeasure:
     if isinstance(measure, SignalOutage):

@@ -47,7 +47,7 @@ class MeasuredLanes:
 
     def lanes(self, name: str) -> tuple[str, ...]:
         """SUMO lanes of a segment or lane, or those inside the junction of a turn; sorted."""
-        return self._of(self.find(name).nodes)
+        return self._lanes_of_nodes(self.find(name).nodes)
 
     def closed_by(self, names: Iterable[str]) -> tuple[str, ...]:
         """SUMO lanes that have to be closed so that no vehicle enters these places; sorted.
@@ -60,16 +60,16 @@ class MeasuredLanes:
         for name in names:
             place = self.find(name)
             if place.turn:
-                closed |= self._turn(place)
+                closed |= self._lanes_of_turn(place)
             else:
-                inside.update(self._of(place.nodes))
+                inside.update(self._lanes_of_nodes(place.nodes))
         whole = self._whole_edges(inside)
         closed |= {
             name
             for name in inside
             if self.net.lanes[name].edge not in whole and not self.net.lanes[name].internal
         }
-        closed |= self._entries(inside, whole)
+        closed |= self._entry_lanes(inside, whole)
         return tuple(sorted(closed))
 
     def predecessors(self, lanes: Iterable[str]) -> tuple[str, ...]:
@@ -78,7 +78,7 @@ class MeasuredLanes:
         own = {self.net.lanes[name].edge for name in wanted if not self.net.lanes[name].internal}
         before = {
             self.net.lanes[link.source].edge
-            for link in self._links
+            for link in self._normal_links
             if link.via in wanted or self.net.lanes[link.target].edge in own
         }
         return tuple(sorted(own | before))
@@ -89,7 +89,7 @@ class MeasuredLanes:
             return ()
         touched: set[tuple[str, str]] = set()
         still: set[tuple[str, str]] = set()
-        for link in self._links:
+        for link in self._normal_links:
             lanes = [self.net.lanes[name] for name in (link.source, link.via, link.target) if name]
             if not all(lane.allows(vclass) for lane in lanes):
                 continue
@@ -112,7 +112,7 @@ class MeasuredLanes:
                 lines.append(tuple(xy.ravel().tolist()))
         return tuple(lines)
 
-    def _of(self, nodes: BoolArray) -> tuple[str, ...]:
+    def _lanes_of_nodes(self, nodes: BoolArray) -> tuple[str, ...]:
         """SUMO lanes of which more than half of the nodes are among these."""
         rows = self._map.lane_places.lane
         count = len(self._map.lane_places.lanes)
@@ -121,13 +121,16 @@ class MeasuredLanes:
         found = np.flatnonzero((own > 0) & (2 * own > every)).tolist()
         return tuple(sorted(self._map.lane_places.lanes[row] for row in found))
 
-    def _turn(self, place: MeasurePlace) -> set[str]:
-        source, target = set(self._of(place.source)), set(self._of(place.target))
-        inside = set(self._of(place.nodes))
+    def _lanes_of_turn(self, place: MeasurePlace) -> set[str]:
+        source, target = (
+            set(self._lanes_of_nodes(place.source)),
+            set(self._lanes_of_nodes(place.target)),
+        )
+        inside = set(self._lanes_of_nodes(place.nodes))
         has_nodes = self._with_nodes
         return {
             link.via or link.target
-            for link in self._links
+            for link in self._normal_links
             if link.source in source and link.target in target
             if link.via is None or link.via in inside or link.via not in has_nodes
         }
@@ -138,13 +141,17 @@ class MeasuredLanes:
         return {
             edge
             for edge in edges
-            if all(one.id in inside for one in self.net.edge_lanes[edge] if one.allows(MOTOR))
+            if all(
+                edge_lane.id in inside
+                for edge_lane in self.net.edge_lanes[edge]
+                if edge_lane.allows(MOTOR)
+            )
         }
 
-    def _entries(self, inside: set[str], whole: set[str]) -> set[str]:
+    def _entry_lanes(self, inside: set[str], whole: set[str]) -> set[str]:
         """Lanes inside junctions that lead from elsewhere onto whole edges, or are meant."""
         entries = set()
-        for link in self._links:
+        for link in self._normal_links:
             source, target = self.net.lanes[link.source], self.net.lanes[link.target]
             entering = target.edge in whole and source.edge not in whole
             if link.via is not None and (entering or link.via in inside):
@@ -152,12 +159,13 @@ class MeasuredLanes:
         return entries
 
     @cached_property
-    def _links(self) -> tuple[Link, ...]:
+    def _normal_links(self) -> tuple[Link, ...]:
         """Links from normal lanes to normal lanes."""
         return tuple(
             link
             for link in self.net.links
-            if not self._lane(link.source).internal and not self._lane(link.target).internal
+            if not self._road_lane(link.source).internal
+            and not self._road_lane(link.target).internal
         )
 
     @cached_property
@@ -168,7 +176,7 @@ class MeasuredLanes:
             self._map.lane_places.lanes[int(row)] for row in np.unique(rows[rows >= 0])
         )
 
-    def _lane(self, name: str) -> RoadNetLane:
+    def _road_lane(self, name: str) -> RoadNetLane:
         return self.net.lanes[name]
 
 

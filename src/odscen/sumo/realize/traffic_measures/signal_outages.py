@@ -30,36 +30,38 @@ def with_outages(
 ) -> tuple[RealizedLight, ...]:
     """Let lights switch as the measures of a scenario say; without any, the same lights."""
     outages = [
-        one for one in scenario.measures if isinstance(one, SignalOutage) and one.begin < until
+        measure
+        for measure in scenario.measures
+        if isinstance(measure, SignalOutage) and measure.begin < until
     ]
     if not outages:
         return lights
     return tuple(
-        _switched(
+        _switch_light(
             light, sumo, [o for o in outages if o.junction in (sumo.id, *sumo.junctions)], until
         )
         for light, sumo in zip(lights, sumo_map.lights, strict=True)
     )
 
 
-def _switched(
+def _switch_light(
     light: RealizedLight, sumo: SumoLight, outages: list[SignalOutage], until: float
 ) -> RealizedLight:
     if not outages:
         return light
     usual = light.programs[0].id if light.programs else NET_PROGRAM
     switches: list[tuple[float, str]] = [(0.0, usual)]
-    for one in sorted(outages, key=lambda outage: outage.begin):
-        switches.append((one.begin, one.shows))
-        if one.end is not None and one.end < until:
-            switches.append((end_of(one, until), usual))
+    for signal_outage in sorted(outages, key=lambda outage: outage.begin):
+        switches.append((signal_outage.begin, signal_outage.shows))
+        if signal_outage.end is not None and signal_outage.end < until:
+            switches.append((end_of(signal_outage, until), usual))
     programs = light.programs
-    if any(one.shows == FLASHING for one in outages):
-        programs = (*programs, _flashing(sumo))
+    if any(outage.shows == FLASHING for outage in outages):
+        programs = (*programs, _flashing_program(sumo))
     return replace(light, programs=programs, switches=tuple(switches))
 
 
-def _flashing(light: SumoLight) -> SumoProgram:
+def _flashing_program(light: SumoLight) -> SumoProgram:
     """All vehicles give way; who walks has right of way, as at any crosswalk."""
     state = "".join("O" if link.turn == CROSSED else "o" for link in light.links)
     phase = SumoPhase(_AROUND, state, FLASHING)

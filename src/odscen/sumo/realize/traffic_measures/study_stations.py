@@ -22,7 +22,7 @@ def planned_stations(
     """Stations as lines across SUMO lanes, and what cannot be measured, in words."""
     found, notes = [], []
     for _, station in scenario.study.stations:
-        lines = [_line(nodes, sumo_map) for _, nodes in station.lines]
+        lines = [_line_places(nodes, sumo_map) for _, nodes in station.lines]
         missing = [
             node
             for (_, nodes), line in zip(station.lines, lines, strict=True)
@@ -33,17 +33,17 @@ def planned_stations(
             notes.append(f"{station.id}: not measured, the network has no lane at {missing[0]}")
             continue
         placed = [tuple(place for place in line if place is not None) for line in lines]
-        found.append(PlannedStation(station.id, _kind(station), *placed))
+        found.append(PlannedStation(station.id, _kind_of_station(station), *placed))
     return tuple(found), notes
 
 
-def _kind(station: Detector | TravelTimeSection | Cordon) -> StationKind:
+def _kind_of_station(station: Detector | TravelTimeSection | Cordon) -> StationKind:
     if isinstance(station, Detector):
         return "detector"
     return "cordon" if isinstance(station, Cordon) else "section"
 
 
-def _line(nodes: Sequence[str], sumo_map: SumoMap) -> list[tuple[str, float] | None]:
+def _line_places(nodes: Sequence[str], sumo_map: SumoMap) -> list[tuple[str, float] | None]:
     places = [place_of(sumo_map.graph, node) for node in nodes]
     return [
         None if place is None or place.walk else sumo_map.lane_places.of(place.node)

@@ -28,32 +28,32 @@ def line_users(scenario: Scenario, region: Region, *, until: float) -> Iterator[
     The scenario has been checked. Dwell times are drawn by the seed, the line, and the numbers of
     trip and stop, so that other trips and lines change nothing.
     """
-    nodes = {stop.id: _node(region, stop.node) for stop in scenario.transit.stops}
+    nodes = {stop.id: _required_node(region, stop.node) for stop in scenario.transit.stops}
     for line in scenario.transit.lines:
-        goal = _goal(scenario, line, region, nodes)
-        for number, depart in enumerate(_departures(scenario, line)):
+        goal = _goal_of_line(scenario, line, region, nodes)
+        for number, depart in enumerate(_departure_times(scenario, line)):
             if depart >= until:
                 break
             yield RoadUser(
                 id=f"{line.id}.{number}",
                 category=line.category,
-                spawn=_node(region, line.start),
+                spawn=_required_node(region, line.start),
                 goal=goal,
                 depart=max(depart, FIRST),
                 flow=line.id,
-                visits=_visits(scenario, line, number, depart, nodes),
+                visits=_stop_visits(scenario, line, number, depart, nodes),
                 design=Actor(id=line.id, category=line.category, spawn="any", model=line.model),
             )
 
 
-def _departures(scenario: Scenario, line: TransitLine) -> tuple[float, ...]:
+def _departure_times(scenario: Scenario, line: TransitLine) -> tuple[float, ...]:
     if line.headway is None:
         return line.departures
     end = scenario.simulation.duration if line.end is None else line.end
     return tuple(np.round(np.arange(line.begin, end, line.headway), 2).tolist())
 
 
-def _visits(
+def _stop_visits(
     scenario: Scenario, line: TransitLine, number: int, depart: float, nodes: Mapping[str, int]
 ) -> tuple[StopVisit, ...]:
     visits = []
@@ -71,15 +71,17 @@ def _visits(
     return tuple(visits)
 
 
-def _goal(scenario: Scenario, line: TransitLine, region: Region, nodes: Mapping[str, int]) -> int:
+def _goal_of_line(
+    scenario: Scenario, line: TransitLine, region: Region, nodes: Mapping[str, int]
+) -> int:
     """Goal of all trips of a line: as given, or an end of the region drawn by the seed."""
     if line.goal is not None:
-        return _node(region, line.goal)
+        return _required_node(region, line.goal)
     last = nodes[line.stops[-1].stop]
     return int(stream(scenario.seed, "goal", line.id).choice(region.router.goal_candidates(last)))
 
 
-def _node(region: Region, name: str) -> int:
+def _required_node(region: Region, name: str) -> int:
     place = place_of(region.graph, name)
     if place is None:  # the scenario has been checked
         raise AssertionError(name)

@@ -75,13 +75,13 @@ def planned_parking(
     lanes, segments = sumo_map.graph.lanes, sumo_map.graph.segments
     return tuple(
         PlannedParking(
-            one.area.id,
-            str(segments.ids[int(lanes.segment[one.area.node])]),
-            len(one.area.places),
-            round(sum(place.x for place in one.area.places) / len(one.area.places), 2),
-            round(sum(place.y for place in one.area.places) / len(one.area.places), 2),
+            position.area.id,
+            str(segments.ids[int(lanes.segment[position.area.node])]),
+            len(position.area.places),
+            round(sum(place.x for place in position.area.places) / len(position.area.places), 2),
+            round(sum(place.y for place in position.area.places) / len(position.area.places), 2),
         )
-        for one in positions
+        for position in positions
     )
 
 
@@ -101,40 +101,44 @@ def parking_xml(
     """
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<additional>"]
     lanes = sumo_map.graph.lanes
-    for one in positions:
+    for position in positions:
         spaces = [
-            _space(place, float(lanes.z[node]), sumo_map)
-            for node, place in zip(one.area.nodes, one.area.places, strict=True)
+            _space_element(place, float(lanes.z[node]), sumo_map)
+            for node, place in zip(position.area.nodes, position.area.places, strict=True)
         ]
-        own = begins.get(one.area.id, 0)
-        lines += _area_lines(one, begin_area(one.area.id), spaces[:own])
-        lines += _area_lines(one, one.area.id, spaces[own:])
-    positions = [one for one in positions if begins.get(one.area.id, 0) < len(one.area.places)]
-    for edge in dict.fromkeys(one.edge for one in positions):
-        here = [one for one in positions if one.edge == edge]
+        own = begins.get(position.area.id, 0)
+        lines += _area_lines(position, begin_area(position.area.id), spaces[:own])
+        lines += _area_lines(position, position.area.id, spaces[own:])
+    positions = [
+        position
+        for position in positions
+        if begins.get(position.area.id, 0) < len(position.area.places)
+    ]
+    for edge in dict.fromkeys(position.edge for position in positions):
+        here = [position for position in positions if position.edge == edge]
         lines += [
             f'    <rerouter id="parking.{here[0].area.id}" edges="{edge}">',
             '        <interval begin="0" end="1e9">',
         ]
         lines += [
-            f'            <parkingAreaReroute id="{one.area.id}" visible="true"/>'
-            for one in _known_from(here, positions, lanes)
+            f'            <parkingAreaReroute id="{position.area.id}" visible="true"/>'
+            for position in _known_from(here, positions, lanes)
         ]
         lines += ["        </interval>", "    </rerouter>"]
     return "\n".join([*lines, "</additional>", ""])
 
 
-def _area_lines(one: ParkingPosition, name: str, spaces: Sequence[str]) -> list[str]:
+def _area_lines(parking_position: ParkingPosition, name: str, spaces: Sequence[str]) -> list[str]:
     if not spaces:
         return []
     start = (
-        f'    <parkingArea id="{name}" lane="{one.lane}" startPos="{one.begin:.2f}" '
-        f'endPos="{one.end:.2f}" roadsideCapacity="0">'
+        f'    <parkingArea id="{name}" lane="{parking_position.lane}" startPos="{parking_position.begin:.2f}" '
+        f'endPos="{parking_position.end:.2f}" roadsideCapacity="0">'
     )
     return [start, *spaces, "    </parkingArea>"]
 
 
-def _space(place: ParkingPlace, z: float, sumo_map: SumoMap) -> str:
+def _space_element(place: ParkingPlace, z: float, sumo_map: SumoMap) -> str:
     """One place: SUMO has the front of a car there, and counts angles from south, clockwise not."""
     body = min(DEFAULT_BODY[Category.CAR].length, place.length)
     dx, dy = sumo_map.net_offset
@@ -154,11 +158,13 @@ def _known_from(
     """Areas of an edge, then the nearest others."""
     x, y = float(lanes.x[here[0].area.node]), float(lanes.y[here[0].area.node])
 
-    def away(one: ParkingPosition) -> tuple[float, str]:
-        node = one.area.node
-        return round(math.hypot(float(lanes.x[node]) - x, float(lanes.y[node]) - y), 2), one.area.id
+    def away(parking_position: ParkingPosition) -> tuple[float, str]:
+        node = parking_position.area.node
+        return round(
+            math.hypot(float(lanes.x[node]) - x, float(lanes.y[node]) - y), 2
+        ), parking_position.area.id
 
-    others = sorted((one for one in every if one.edge != here[0].edge), key=away)
+    others = sorted((position for position in every if position.edge != here[0].edge), key=away)
     return [*here, *others[:ALTERNATIVES]]
 
 

@@ -26,7 +26,10 @@ class ParkingOfTrips:
 
     def __init__(self, scenario: Scenario, sumo_map: SumoMap, region: Region) -> None:
         demand = scenario.demand
-        areas = [one.area for one in parking_positions(sumo_map, region.lanes).values()]
+        areas = [
+            parking_position.area
+            for parking_position in parking_positions(sumo_map, region.lanes).values()
+        ]
         lanes = region.graph.lanes
         router = region.router_over(sumo_map.drivable)
         self._choice = ParkingChoice(scenario, areas, lanes, router)
@@ -40,15 +43,19 @@ class ParkingOfTrips:
 
     def applied(self, users: Sequence[RoadUser]) -> tuple[list[RoadUser], list[str]]:
         """Trips with their starts and goals in parking areas, and in words what is left out."""
-        chosen = self._choice.choose([self._trip(user) for user in users if self._may_park(user)])
-        missed = sum(one.missed for one in chosen.values())
+        chosen = self._choice.choose(
+            [self._parkable_trip(user) for user in users if self._may_park(user)]
+        )
+        missed = sum(trip.missed for trip in chosen.values())
         parked = [
-            _parked(user, chosen[user.id].begin, chosen[user.id].end) if user.id in chosen else user
+            _with_parking(user, chosen[user.id].begin, chosen[user.id].end)
+            if user.id in chosen
+            else user
             for user in users
         ]
-        return parked, list(self._words(missed))
+        return parked, list(self._describe_missed(missed))
 
-    def _words(self, missed: int) -> list[str]:
+    def _describe_missed(self, missed: int) -> list[str]:
         left_out = {
             f"{missed} ends of trips are on the road: no free parking place within reach": missed,
             f"{self._unreached} parking places left out: no lane for cars beside them, or of an "
@@ -61,7 +68,7 @@ class ParkingOfTrips:
     def _may_park(self, user: RoadUser) -> bool:
         return user.category is Category.CAR and user.flow in self._end and user.depart >= FIRST
 
-    def _trip(self, user: RoadUser) -> ParkableTrip:
+    def _parkable_trip(self, user: RoadUser) -> ParkableTrip:
         return ParkableTrip(
             id=user.id,
             start=user.spawn,
@@ -83,12 +90,14 @@ def places_to_begin(users: Sequence[RoadUser]) -> dict[str, int]:
             steps += [(appears_at(user), 1), (user.depart, -1)]
     # Who comes when another leaves needs a place of its own: it may leave a little later.
     return {
-        area: max(accumulate(step for _, step in sorted(steps, key=lambda one: (one[0], -one[1]))))
+        area: max(
+            accumulate(step for _, step in sorted(steps, key=lambda step: (step[0], -step[1])))
+        )
         for area, steps in sorted(changes.items())
     }
 
 
-def _parked(user: RoadUser, begin: Parked | None, end: Parked | None) -> RoadUser:
+def _with_parking(user: RoadUser, begin: Parked | None, end: Parked | None) -> RoadUser:
     if begin is not None:
         stay = ParkingStay(begin.area.id, begin.stay)
         user = replace(user, spawn=begin.area.node, begins=stay)

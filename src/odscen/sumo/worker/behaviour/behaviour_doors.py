@@ -49,7 +49,7 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
     InputError
         If there is none, it cannot be imported or made, or an option is not possible.
     """
-    given = [one for one in (door.name, door.command, door.socket) if one is not None]
+    given = [name for name in (door.name, door.command, door.socket) if name is not None]
     if len(given) != 1:
         raise InputError("a behaviour model is given by its name or as a command, not both")
     if door.socket is not None:
@@ -57,9 +57,9 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
     if door.command is not None:
         if door.options:
             raise InputError("a command takes its options in its own line", element="behaviour")
-        return PipedDriver(_words(door.command), seed, door.time_limit)
+        return PipedDriver(_split_command(door.command), seed, door.time_limit)
     name = door.name or ""
-    found = _found(name)
+    found = _find_behaviour(name)
     options = values_for(found, door.options, name=name, others=True)
     try:
         made = found(**options) if isinstance(found, type) else found
@@ -94,7 +94,7 @@ def is_installed(door: BehaviourDoor) -> bool:
 
 def installed_behaviours() -> tuple[OfferedModel, ...]:
     """Models that ship and those of installed packages, by name, with their options."""
-    return offered_models(installed_names(GROUP, _SHIPPED), _found)
+    return offered_models(installed_names(GROUP, _SHIPPED), _find_behaviour)
 
 
 def chosen_behaviour(name: str, options: Mapping[str, OptionValue]) -> BehaviourDoor:
@@ -110,11 +110,11 @@ def chosen_behaviour(name: str, options: Mapping[str, OptionValue]) -> Behaviour
     known = installed_names(GROUP, _SHIPPED)
     if name not in known:
         raise NotFoundError("behaviour model", name, known)
-    values = values_for(_found(name), options, name=name)
-    return BehaviourDoor(name=name, options={one: values[one] for one in options})
+    values = values_for(_find_behaviour(name), options, name=name)
+    return BehaviourDoor(name=name, options={option: values[option] for option in options})
 
 
-def _words(command: str) -> tuple[str, ...]:
+def _split_command(command: str) -> tuple[str, ...]:
     try:
         words = tuple(shlex.split(command))
     except ValueError as error:
@@ -124,7 +124,7 @@ def _words(command: str) -> tuple[str, ...]:
     return words
 
 
-def _found(name: str) -> Any:
+def _find_behaviour(name: str) -> Any:
     if name == IDM:
         from odscen.learning.behaviour.intelligent_driver import IntelligentDriver
 

@@ -79,7 +79,7 @@ class BehaviourRun:
             If it fails, or asks for what cannot be.
         """
         if self._session is not session:
-            self._begin(session)
+            self._begin_session(session)
         left = self._drive_one_step(session.time, taken)
         kept = None if left is None else left()
         if kept is not None:  # the model holds on to it, and may look at it later
@@ -95,14 +95,14 @@ class BehaviourRun:
         try:
             action, controlled = self._model.act(seen, self._state)
         except OdscenError as error:
-            raise self._failure(time, str(error)) from error
+            raise self._behaviour_failure(time, str(error)) from error
         except Exception as error:  # whatever code from outside may raise
-            raise self._failure(time, f"act failed: {error!r}") from error
+            raise self._behaviour_failure(time, f"act failed: {error!r}") from error
         try:
             asked = CheckedAction(action, controlled, len(names))
-            self._drive(seen.index, names, asked, taken)
+            self._drive_vehicles(seen.index, names, asked, taken)
         except InputError as error:
-            raise self._failure(time, str(error)) from error
+            raise self._behaviour_failure(time, str(error)) from error
         return weakref.ref(seen)
 
     def close(self) -> None:
@@ -122,7 +122,7 @@ class BehaviourRun:
         """Inverse of :meth:`state`."""
         self._earlier = set(state)
 
-    def _begin(self, session: Session) -> None:
+    def _begin_session(self, session: Session) -> None:
         self._session, self._road = session, session.driven_vehicles()
         self._sight = RoadSight(self._road, self._plan, session.time)
         count = len(self._sight.scene.vehicle_id)
@@ -135,7 +135,7 @@ class BehaviourRun:
         except Exception as error:
             raise SimulationError(f"behaviour {self._name}: init failed: {error!r}") from error
 
-    def _drive(
+    def _drive_vehicles(
         self, index: Int32Array, names: list[str], asked: CheckedAction, taken: Collection[str]
     ) -> None:
         """Do what is asked of the vehicles on the road, rows of the scene ``index``."""
@@ -143,12 +143,12 @@ class BehaviourRun:
             self._names = names
             gone = np.ones(len(self._mode), dtype=np.bool_)
             gone[index] = False
-            self._forget(gone)
+            self._forget_rows(gone)
             self._earlier.intersection_update(names)
         free = np.ones(len(names), dtype=np.bool_)
         if taken:
             free[:] = [name not in taken for name in names]
-            self._forget(index[~free])
+            self._forget_rows(index[~free])
             self._earlier.difference_update(taken)
         mine = np.zeros(len(names), dtype=np.bool_)
         mine[asked.rows] = True
@@ -161,9 +161,9 @@ class BehaviourRun:
             set_speed = self._road.set_speed
             for name, speed in zip(map(names.__getitem__, some), speeds, strict=True):
                 set_speed(name, speed)
-            for row in self._otherwise(rows, asked):
+            for row in self._rows_asked_more(rows, asked):
                 name = names[row]
-                self._act(int(index[row]), row, name, asked)
+                self._act_on_vehicle(int(index[row]), row, name, asked)
             back = free & ~mine & (self._mode[index] > 0)
             if self._earlier:
                 back |= free & ~mine & np.array([name in self._earlier for name in names])
@@ -171,11 +171,11 @@ class BehaviourRun:
                 name = names[row]
                 self._earlier.discard(name)
                 self._road.release(name)
-            self._forget(index[back])
+            self._forget_rows(index[back])
         except self._road.errors as error:
             raise InputError(f"vehicle {name!r}: SUMO cannot: {error}") from error
 
-    def _forget(self, rows: Any) -> None:
+    def _forget_rows(self, rows: Any) -> None:
         self._mode[rows], self._speed[rows] = 0, np.nan
 
     def _taken_over(
@@ -205,7 +205,7 @@ class BehaviourRun:
         self._speed[index[rows]] = speed
         return rows[new].tolist(), speed[new].tolist()
 
-    def _otherwise(self, rows: IntArray, asked: CheckedAction) -> list[int]:
+    def _rows_asked_more(self, rows: IntArray, asked: CheckedAction) -> list[int]:
         """Rows of vehicles that are asked for more than a speed."""
         more = asked.kind[rows] >= DrivingKind.LANE_POSITION
         if asked.change is not None:
@@ -213,7 +213,7 @@ class BehaviourRun:
         found: list[int] = rows[more].tolist()
         return found
 
-    def _act(self, vehicle: int, row: int, name: str, asked: CheckedAction) -> None:
+    def _act_on_vehicle(self, vehicle: int, row: int, name: str, asked: CheckedAction) -> None:
         kind = asked.kind[row]
         if asked.change is not None and asked.change[row]:
             self._road.change_lane(name, int(asked.change[row]), self._plan.step_length)
@@ -230,5 +230,5 @@ class BehaviourRun:
             y += half * math.sin(hdg) + self._plan.net_offset[1]
             self._road.put(name, x, y, float(angle_deg_from_hdg(hdg)))
 
-    def _failure(self, time: float, words: str) -> SimulationError:
+    def _behaviour_failure(self, time: float, words: str) -> SimulationError:
         return SimulationError(f"behaviour {self._name} at {time:g} s: {words}")

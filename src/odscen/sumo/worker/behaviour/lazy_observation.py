@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import Int32Array
 
-_FIELDS = tuple(one.name for one in fields(RoadObservation))
+_FIELDS = tuple(field.name for field in fields(RoadObservation))
 
 
 class LazyObservation(RoadObservation):
@@ -37,13 +37,13 @@ class LazyObservation(RoadObservation):
         index: Int32Array,
         read: Callable[[str, RoadObservation], Mapping[str, Any]],
     ) -> None:
-        self._set({"time": time, "index": index, "_read": read})
+        self._set_fields({"time": time, "index": index, "_read": read})
 
     def __getattr__(self, name: str) -> Any:
         # Python asks here for slots that hold nothing yet.
         if name not in _FIELDS:
             raise AttributeError(f"an observation has no {name!r}")
-        self._set(self._read(name, self))
+        self._set_fields(self._read(name, self))
         return object.__getattribute__(self, name)
 
     def read_all(self) -> None:
@@ -51,6 +51,6 @@ class LazyObservation(RoadObservation):
         for name in _FIELDS:
             getattr(self, name)
 
-    def _set(self, values: Mapping[str, Any]) -> None:
+    def _set_fields(self, values: Mapping[str, Any]) -> None:
         for name, value in values.items():
             object.__setattr__(self, name, value)  # it is frozen for everyone else

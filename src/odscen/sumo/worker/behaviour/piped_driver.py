@@ -55,65 +55,65 @@ class _Peer:
     def init(self, rng: np.random.Generator, scene: BehaviourScene) -> None:
         """Start it, and tell it the scene."""
         del rng  # it has the seed
-        self._connect()
+        self._open_connection()
         os.set_blocking(self._to, False)
         os.set_blocking(self._back, False)
-        self._ask(scene_bytes(scene, self._seed))
+        self._ask_peer(scene_bytes(scene, self._seed))
 
     def act(self, observation: RoadObservation, state: Any) -> tuple[DrivingAction, BoolArray]:
         """Ask it."""
         del state
-        return action_from_bytes(self._ask(observation_bytes(observation)), len(observation))
+        return action_from_bytes(self._ask_peer(observation_bytes(observation)), len(observation))
 
     def close(self) -> None:
         """Say that the run is over."""
 
-    def _connect(self) -> None:
+    def _open_connection(self) -> None:
         raise NotImplementedError
 
-    def _ended(self) -> str:
+    def _explain_end(self) -> str:
         """Why it has ended."""
         raise NotImplementedError
 
-    def _ask(self, message: bytes) -> bytes:
+    def _ask_peer(self, message: bytes) -> bytes:
         end = time.monotonic() + self._time_limit
-        self._write(framed(message), end)
-        size = HEAD.unpack(self._read(HEAD.size, end))[0]
+        self._write_all(framed(message), end)
+        size = HEAD.unpack(self._read_all(HEAD.size, end))[0]
         if size > MOST_BYTES:
             raise InputError(f"its answer has {size:,} bytes; {MOST_BYTES:,} are the most")
-        return self._read(size, end)
+        return self._read_all(size, end)
 
-    def _write(self, data: bytes, end: float) -> None:
+    def _write_all(self, data: bytes, end: float) -> None:
         left = memoryview(data)
         while left:
-            self._wait([], [self._to], end)
+            self._wait_ready([], [self._to], end)
             try:
                 left = left[os.write(self._to, left) :]
             except OSError as error:
-                raise InputError(self._ended()) from error
+                raise InputError(self._explain_end()) from error
 
-    def _read(self, size: int, end: float) -> bytes:
+    def _read_all(self, size: int, end: float) -> bytes:
         blocks: list[bytes] = []
         while size:
-            self._wait([self._back], [], end)
+            self._wait_ready([self._back], [], end)
             try:
                 block = os.read(self._back, min(size, _BLOCK))
             except OSError as error:
-                raise InputError(self._ended()) from error
+                raise InputError(self._explain_end()) from error
             if not block:
-                raise InputError(self._ended())
+                raise InputError(self._explain_end())
             blocks.append(block)
             size -= len(block)
         return b"".join(blocks)
 
-    def _wait(self, read: list[int], write: list[int], end: float) -> None:
+    def _wait_ready(self, read: list[int], write: list[int], end: float) -> None:
         left = end - time.monotonic()
         ready = select.select(read, write, [], max(left, 0.0))
         if not any(ready):
-            self._stop()
+            self._stop_peer()
             raise InputError(f"it took more than {self._time_limit:g} s for a step")
 
-    def _stop(self) -> None:
+    def _stop_peer(self) -> None:
         """End it."""
 
 
@@ -126,7 +126,7 @@ class PipedDriver(_Peer):
         self._process: subprocess.Popen[bytes] | None = None
         self._said: BinaryIO
 
-    def _connect(self) -> None:
+    def _open_connection(self) -> None:
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
         try:
             self._process = subprocess.Popen(
@@ -150,7 +150,7 @@ class PipedDriver(_Peer):
                 self._process.kill()
                 self._process.wait()
 
-    def _ended(self) -> str:
+    def _explain_end(self) -> str:
         code = None
         if self._process is not None:
             with suppress(subprocess.TimeoutExpired):
@@ -161,7 +161,7 @@ class PipedDriver(_Peer):
         how = "it has closed its output" if code is None else f"it ended with exit code {code}"
         return f"{how}{said}"
 
-    def _stop(self) -> None:
+    def _stop_peer(self) -> None:
         if self._process is not None:
             self._process.kill()
 
@@ -174,7 +174,7 @@ class SocketDriver(_Peer):
         self._path = path
         self._socket: socket.socket
 
-    def _connect(self) -> None:
+    def _open_connection(self) -> None:
         self._socket = socket.socket(socket.AF_UNIX)
         try:
             self._socket.connect(self._path)
@@ -187,5 +187,5 @@ class SocketDriver(_Peer):
         if hasattr(self, "_socket"):
             self._socket.close()
 
-    def _ended(self) -> str:
+    def _explain_end(self) -> str:
         return "it has closed its socket"

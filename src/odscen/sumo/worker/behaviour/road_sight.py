@@ -42,7 +42,7 @@ class RoadSight:
         lanes = road.lanes()
         self._lanes = {lane.id: lane for lane in lanes}
         self._lane_row = {lane.id: row for row, lane in enumerate(lanes)}
-        self.scene = self._scene(lanes, plan, time)
+        self.scene = self._make_scene(lanes, plan, time)
         self._inside = frozenset(via for lane in lanes for _, via in lane.links if via)
         self._lights = SeenLights(road)
         count = len(self._vehicles)
@@ -71,28 +71,28 @@ class RoadSight:
             self._names = names
             self._rows = [self._row[name] for name in names]
             self._index = np.array(self._rows, dtype=np.int32)
-        return LazyObservation(time, self._index.copy(), self._read), names
+        return LazyObservation(time, self._index.copy(), self._read_field), names
 
-    def _read(self, field: str, seen: RoadObservation) -> dict[str, Any]:
+    def _read_field(self, field: str, seen: RoadObservation) -> dict[str, Any]:
         """Read a field of this step, and those that come with it."""
         if field in _GETTERS:
             return {field: self._road.numbers(_GETTERS[field], self._names)}
         if field in ("x", "y", "hdg"):
-            return self._bodies()
+            return self._body_centres()
         if field == "lane":
             return {"lane": self._lanes_now()}
         if field in ("leader", "gap"):
             length = self.scene.vehicle_length[self._index]
             order = LaneOrder(seen.lane, seen.pos, length)
-            leader, gap = order.leaders(self._ways(), self.scene.lane_length)
+            leader, gap = order.leaders(self._lanes_ahead(), self.scene.lane_length)
             return {"leader": leader, "gap": gap}
         if field == "light":
-            self._ways()
+            self._lanes_ahead()
             return {"light": self._lights.ahead(self._link[self._index])}
-        ahead, can = self._ways(), self._can[self._index]
+        ahead, can = self._lanes_ahead(), self._can[self._index]
         return {"ahead": ahead, "can_left": can[:, 0], "can_right": can[:, 1]}
 
-    def _bodies(self) -> dict[str, FloatArray]:
+    def _body_centres(self) -> dict[str, FloatArray]:
         """Centres of bodies, from the middle of their fronts."""
         x, y = self._road.fronts(self._names)
         half = 0.5 * self.scene.vehicle_length[self._index]
@@ -131,7 +131,7 @@ class RoadSight:
             if self._route_index[row] != self._road.route_index(name):
                 self._moved[row] = name
 
-    def _ways(self) -> Int32Array:
+    def _lanes_ahead(self) -> Int32Array:
         """Bring what is ahead of vehicles up to date; rows of lanes ``(N, AHEAD)``."""
         self._lanes_now()
         if self._moved:
@@ -152,20 +152,20 @@ class RoadSight:
         edges, kind = self._road.coming_edges(name), self._road.vehicle_class(name)
         key = lane, edges[: AHEAD + 1], kind
         if key not in self._paths:
-            self._paths[key] = self._path(*key)
+            self._paths[key] = self._path_ahead(*key)
         path, left, right, target = self._paths[key]
         self._ahead[row] = path
         self._can[row] = left, right
         self._link[row] = self._lights.number(lane, target)
 
-    def _path(
+    def _path_ahead(
         self, lane: str, edges: tuple[str, ...], kind: str
     ) -> tuple[list[int], bool, bool, str]:
         """Rows of the lanes ahead, whether either lane beside leads on, where the lane leads."""
         found: list[int] = []
         first, one, left = "", self._lanes[lane], list(edges)
         while len(found) < AHEAD:
-            target, via = self._onward(one, left)
+            target, via = self._lane_onward(one, left)
             first = first or target
             if not target:
                 break
@@ -184,7 +184,7 @@ class RoadSight:
         padded = (found + [-1] * AHEAD)[:AHEAD]
         return padded, beside[0], beside[1], first
 
-    def _onward(self, lane: LaneFacts, edges: Sequence[str]) -> tuple[str, str]:
+    def _lane_onward(self, lane: LaneFacts, edges: Sequence[str]) -> tuple[str, str]:
         """Lane that one leads to along some edges, and the lane in between; empty: none."""
         if lane.id in self._inside:
             return lane.links[0] if lane.links else ("", "")
@@ -199,26 +199,29 @@ class RoadSight:
         lane = self._lanes[str(self.scene.lane_id[row])]
         if lane.allowed and kind not in lane.allowed:
             return False
-        return not edges or bool(self._onward(lane, edges)[0])
+        return not edges or bool(self._lane_onward(lane, edges)[0])
 
-    def _scene(self, lanes: Sequence[LaneFacts], plan: Plan, time: float) -> BehaviourScene:
+    def _make_scene(self, lanes: Sequence[LaneFacts], plan: Plan, time: float) -> BehaviourScene:
         """Arrays of vehicles and lanes."""
         vehicles = self._vehicles
         shapes = [np.array(lane.shape, dtype=np.float64).reshape(-1, 2) for lane in lanes]
         points = np.concatenate([np.empty((0, 2)), *shapes]) - np.array(plan.net_offset)
-        left, right = _beside(lanes)
+        left, right = _lanes_beside(lanes)
         return BehaviourScene(
             step_length=plan.step_length,
             time=time,
-            vehicle_id=np.array([one.id for one in vehicles], dtype=np.str_),
-            vehicle_category=np.array([str(one.category) for one in vehicles], dtype=np.str_),
-            vehicle_length=np.array([one.length for one in vehicles]),
-            vehicle_width=np.array([one.width for one in vehicles]),
-            desired_speed=np.array(
-                [np.nan if one.speed is None else one.speed for one in vehicles], dtype=np.float64
+            vehicle_id=np.array([vehicle.id for vehicle in vehicles], dtype=np.str_),
+            vehicle_category=np.array(
+                [str(vehicle.category) for vehicle in vehicles], dtype=np.str_
             ),
-            speed_factor=np.array([one.speed_factor for one in vehicles]),
-            ego=np.array([one.ego for one in vehicles], dtype=np.bool_),
+            vehicle_length=np.array([vehicle.length for vehicle in vehicles]),
+            vehicle_width=np.array([vehicle.width for vehicle in vehicles]),
+            desired_speed=np.array(
+                [np.nan if vehicle.speed is None else vehicle.speed for vehicle in vehicles],
+                dtype=np.float64,
+            ),
+            speed_factor=np.array([vehicle.speed_factor for vehicle in vehicles]),
+            ego=np.array([vehicle.ego for vehicle in vehicles], dtype=np.bool_),
             lane_id=np.array([lane.id for lane in lanes], dtype=np.str_),
             lane_length=np.array([lane.length for lane in lanes]),
             lane_limit=np.array([lane.limit for lane in lanes]),
@@ -231,7 +234,7 @@ class RoadSight:
         )
 
 
-def _beside(lanes: Sequence[LaneFacts]) -> tuple[Int32Array, Int32Array]:
+def _lanes_beside(lanes: Sequence[LaneFacts]) -> tuple[Int32Array, Int32Array]:
     """Rows of the lanes beside; those of an edge follow each other from the right."""
     left = np.full(len(lanes), -1, dtype=np.int32)
     right = left.copy()

@@ -97,7 +97,7 @@ class DrivenVehicles:
         lane = self._sumo.lane
         found = []
         for edge, names in sorted(self._lanes.of_edge.items()):
-            for name in sorted(names, key=lambda one: (len(one), one)):
+            for name in sorted(names, key=lambda name: (len(name), name)):
                 allowed = frozenset(lane.getAllowed(name))
                 if allowed == {"pedestrian"}:
                     continue

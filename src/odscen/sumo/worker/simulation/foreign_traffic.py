@@ -76,15 +76,15 @@ class ForeignTraffic:
         for name in [name for name in self._known if name not in named]:
             self._take_out(name)
         for name, user in named.items():
-            if name in self._known and self._move(name, user, again=True):
+            if name in self._known and self._move_user(name, user, again=True):
                 continue
             self._take_out(name)
-            if self._add(name, user):
+            if self._add_user(name, user):
                 self._known[name] = user.kind == _PEDESTRIAN
-                self._move(name, user)
+                self._move_user(name, user)
 
-    def _add(self, name: str, user: ForeignUser) -> bool:
-        sumo, kind = self._sumo, self._kind(user)
+    def _add_user(self, name: str, user: ForeignUser) -> bool:
+        sumo, kind = self._sumo, self._type_for(user)
         try:
             if user.kind == _PEDESTRIAN:
                 edge, pos, _ = sumo.simulation.convertRoad(user.x, user.y, False, _PEDESTRIAN)
@@ -96,7 +96,7 @@ class ForeignTraffic:
             return False
         return True
 
-    def _kind(self, user: ForeignUser) -> str:
+    def _type_for(self, user: ForeignUser) -> str:
         """Id of the type of such a body, which is made if there is none."""
         types = self._sumo.vehicletype
         name = f"{PREFIX}{user.kind} {user.length:.2f} {user.width:.2f}"
@@ -111,7 +111,7 @@ class ForeignTraffic:
                 types.setParameter(name, f"has.{device}.device", "false")
         return name
 
-    def _move(self, name: str, user: ForeignUser, *, again: bool = False) -> bool:
+    def _move_user(self, name: str, user: ForeignUser, *, again: bool = False) -> bool:
         if not self._known[name]:
             at = EgoPose(user.x, user.y, user.angle_deg, user.speed)
             return self._place(name, at, again=again)
@@ -154,7 +154,7 @@ class ForeignLights:
         link that crosses it may go.
         """
         for light, letters in states.items():
-            links = self._links.get(light) or self._links.setdefault(light, self._of(light))
+            links = self._links.get(light) or self._links.setdefault(light, self._links_of(light))
             shown = [
                 links.greens[link] if letter == "G" else letter
                 for link, letter in enumerate(letters)
@@ -165,7 +165,7 @@ class ForeignLights:
                     shown[link] = "r" if busy else "G"
             self._sumo.trafficlight.setRedYellowGreenState(light, "".join(shown))
 
-    def _of(self, light: str) -> _Links:
+    def _links_of(self, light: str) -> _Links:
         lights, foes = self._sumo.trafficlight, self._sumo.lane.getInternalFoes
         own = lights.getProgram(light)
         phases = [
@@ -174,7 +174,9 @@ class ForeignLights:
             if logic.programID == own
             for phase in logic.phases
         ]
-        lanes = [{one[2] for one in links if one[2]} for links in lights.getControlledLinks(light)]
+        lanes = [
+            {link[2] for link in links if link[2]} for links in lights.getControlledLinks(light)
+        ]
         crossing = [{foe for lane in sorted(via) for foe in foes(lane)} for via in lanes]
         return _Links(
             "".join("g" if any(p[k] == "g" for p in phases) else "G" for k in range(len(lanes))),

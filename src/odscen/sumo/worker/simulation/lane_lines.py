@@ -30,7 +30,7 @@ class LaneLines:
         kind, row = one.getVehicleClass(vehicle), lanes.index(own)
         rows = {row + by, row - by}
         return tuple(
-            self._line(vehicle, lanes[n], kind)
+            self._line_ahead(vehicle, lanes[n], kind)
             for n in sorted(rows)
             if 0 <= n < len(lanes) and self._lanes.admits(lanes[n], kind)
         )
@@ -44,10 +44,12 @@ class LaneLines:
         kind = one.getVehicleClass(vehicle)
         lanes = self._lanes.in_order(self._sumo.lane.getEdgeID(own))
         return tuple(
-            self._line(vehicle, lane, kind) for lane in lanes if self._lanes.admits(lane, kind)
+            self._line_ahead(vehicle, lane, kind)
+            for lane in lanes
+            if self._lanes.admits(lane, kind)
         )
 
-    def _line(self, vehicle: str, lane: str, kind: str) -> Shape:
+    def _line_ahead(self, vehicle: str, lane: str, kind: str) -> Shape:
         """Centre line of a lane and of those that it leads to, along the route if it does."""
         lanes, one = self._sumo.lane, self._sumo.vehicle
         route = set(one.getRoute(vehicle)[max(one.getRouteIndex(vehicle), 0) :])
@@ -62,7 +64,7 @@ class LaneLines:
             while inside:
                 line += lanes.getShape(inside)
                 metres += lanes.getLength(inside)
-                inside = next((one[4] for one in lanes.getLinks(inside)), "")
+                inside = next((getLink[4] for getLink in lanes.getLinks(inside)), "")
             lane = link[0]
             line += lanes.getShape(lane)
             metres += lanes.getLength(lane)

@@ -206,7 +206,7 @@ class MovedActors:
                     here, goal, "", -1.0, 0, -1.0, persons.getLanePosition(person), walk.arrival
                 )
                 edges = tuple(edge for stage in stages for edge in stage.edges)
-            if not edges or not self._walkable(edges[0]):
+            if not edges or not self._is_walkable(edges[0]):
                 return False
             persons.removeStages(person)
             persons.appendWalkingStage(person, list(edges), walk.arrival)
@@ -214,7 +214,7 @@ class MovedActors:
             return False
         return True
 
-    def _walkable(self, edge: str) -> bool:
+    def _is_walkable(self, edge: str) -> bool:
         return any(self._lanes.admits(lane, "pedestrian") for lane in self._lanes.of_edge[edge])
 
     def goal_edge(self, vehicle: str) -> str:
@@ -248,25 +248,25 @@ class MovedActors:
         """End the trip of a vehicle where it is."""
         self._sumo.vehicle.remove(vehicle, self._sumo.REMOVE_ARRIVED)
 
-    def insert(self, name: str, one: HeldActor, speed: float | None) -> bool:
+    def insert(self, name: str, held_actor: HeldActor, speed: float | None) -> bool:
         """Let a road user depart as soon as there is room; false if SUMO cannot.
 
         A vehicle at no higher speed than SUMO takes there, see :meth:`begin_at`.
         """
-        own = one.attributes
+        own = held_actor.attributes
         try:
-            if one.person:
+            if held_actor.person:
                 persons = self._sumo.person
                 pos = float(own["departPos"])
-                persons.add(name, one.edges[0], pos, _NOW, own["type"])
-                persons.appendWalkingStage(name, list(one.edges), float(own["arrivalPos"]))
+                persons.add(name, held_actor.edges[0], pos, _NOW, own["type"])
+                persons.appendWalkingStage(name, list(held_actor.edges), float(own["arrivalPos"]))
             else:
                 route, begin = f"{name} appears", own["departSpeed"]
                 if speed is not None:
                     begin = f"{min(speed, float(own['mostSpeed'])):.4f}"
                 elif begin != "avg":
                     begin = f"{min(float(begin), float(own['mostSpeed'])):.4f}"
-                self._sumo.route.add(route, one.edges)
+                self._sumo.route.add(route, held_actor.edges)
                 self._sumo.vehicle.add(
                     name, route, own["type"], "now", own["departLane"], own["departPos"],
                     begin, own["arrivalLane"], own["arrivalPos"],
@@ -298,7 +298,12 @@ class MovedActors:
         lights = self._sumo.trafficlight
         own = lights.getProgram(light)
         phases = next(
-            (one.phases for one in lights.getAllProgramLogics(light) if one.programID == own), ()
+            (
+                getAllProgramLogic.phases
+                for getAllProgramLogic in lights.getAllProgramLogics(light)
+                if getAllProgramLogic.programID == own
+            ),
+            (),
         )
         now = lights.getPhase(light)
         for ahead in range(len(phases)):

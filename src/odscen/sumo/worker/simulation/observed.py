@@ -84,7 +84,7 @@ class StepLists(NamedTuple):
         """One from its JSON."""
         step = cls(*row)
         fronts = {name: None if one is None else Front(*one) for name, one in step.fronts.items()}
-        touching = [Collision(*one) for one in step.collisions]
+        touching = [Collision(*collision) for collision in step.collisions]
         return step._replace(collisions=touching, fronts=fronts)
 
 

@@ -57,16 +57,19 @@ class Session:
         self._sumo = sumo
         self._simulation = sumo.simulation
         self._errors = sumo_errors(sumo)
-        self._step = _native(sumo, "simulation", "step")
-        self._time = _native(sumo, "simulation", "getTime")
-        self._expected = _native(sumo, "simulation", "getMinExpectedNumber")
+        self._step = _native_function(sumo, "simulation", "step")
+        self._time = _native_function(sumo, "simulation", "getTime")
+        self._expected = _native_function(sumo, "simulation", "getMinExpectedNumber")
         self._vehicle, self._person = (
-            (_native(sumo, domain, "getPosition3D"), _native(sumo, domain, "getAngle"))
+            (
+                _native_function(sumo, domain, "getPosition3D"),
+                _native_function(sumo, domain, "getAngle"),
+            )
             for domain in ("vehicle", "person")
         )
         self._foreign: ForeignTraffic | None = None
         self._happenings = tuple(
-            (_native(sumo, "simulation", count), _native(sumo, "simulation", ids))
+            (_native_function(sumo, "simulation", count), _native_function(sumo, "simulation", ids))
             for count, ids in _HAPPENINGS
         )
 
@@ -94,12 +97,12 @@ class Session:
 
         Those that other programs drive do not count.
         """
-        return int(self._expected()) - self._strangers()
+        return int(self._expected()) - self._count_strangers()
 
     def running(self) -> int:
         """How many vehicles and persons of the run are on the road now."""
         on_road = int(self._sumo.vehicle.getIDCount() + self._sumo.person.getIDCount())
-        return on_road - self._strangers()
+        return on_road - self._count_strangers()
 
     def foreign_traffic(self) -> ForeignTraffic:
         """Road users that other programs drive."""
@@ -132,7 +135,7 @@ class Session:
         """Puts a vehicle where another program has driven it."""
         return Placing(self._sumo, self._errors, self.lanes)
 
-    def _strangers(self) -> int:
+    def _count_strangers(self) -> int:
         return 0 if self._foreign is None else len(self._foreign)
 
     def happened(self) -> StepLists | None:
@@ -152,14 +155,14 @@ class Session:
         for name in (
             *step.departed, *step.teleports_ended, *step.emergency_stops, *step.unparked
         ):  # fmt: skip
-            fronts[name] = self._front(self._vehicle, name)
+            fronts[name] = self._front_of(self._vehicle, name)
         for name in step.departed_persons:
-            fronts[name] = self._front(self._person, name)
+            fronts[name] = self._front_of(self._person, name)
         return step
 
     def vehicle_front(self, vehicle: str) -> Front | None:
         """Pose of a vehicle on the road, ``None`` if it is not (or no longer) there."""
-        return self._front(self._vehicle, vehicle)
+        return self._front_of(self._vehicle, vehicle)
 
     def vehicles(self) -> tuple[str, ...]:
         """Ids of all vehicles on the road."""
@@ -208,11 +211,11 @@ class Session:
 
     def vehicle_poses(self) -> Poses:
         """Poses of all vehicles; 1.5 microseconds each, a fifth of what subscriptions cost."""
-        return self._poses(self._sumo.vehicle, self._sumo.vehicle.getSignals)
+        return self._read_poses(self._sumo.vehicle, self._sumo.vehicle.getSignals)
 
     def person_poses(self) -> Poses:
         """Poses of all persons."""
-        return self._poses(self._sumo.person, None)
+        return self._read_poses(self._sumo.person, None)
 
     def vehicle_places(self, ids: Sequence[str]) -> list[tuple[str, float]]:
         """Lane of each vehicle (empty: none) and metres along it."""
@@ -226,12 +229,12 @@ class Session:
 
     def moved_actors(self) -> MovedActors:
         """Hand of rules on single road users."""
-        native = partial(_native, self._sumo)
+        native = partial(_native_function, self._sumo)
         return MovedActors(self._sumo, self._errors, self.lanes, native, self.knows)
 
     def driven_vehicles(self) -> DrivenVehicles:
         """Hand of behaviour models on all vehicles."""
-        native = partial(_native, self._sumo)
+        native = partial(_native_function, self._sumo)
         return DrivenVehicles(self._sumo, self._errors, native, self.lanes)
 
     def vehicles_by_lane(self) -> dict[str, int]:
@@ -252,7 +255,7 @@ class Session:
         """
         share = self._sumo.inductionloop.getLastStepOccupancy
         count = self._sumo.lanearea.getLastStepVehicleNumber
-        loops, areas = self._detectors
+        loops, areas = self._detector_ids
         return {
             name: share(name) > 0.0 if name in loops else count(name) > 0
             for name in detectors
@@ -260,7 +263,7 @@ class Session:
         }
 
     @cached_property
-    def _detectors(self) -> tuple[frozenset[str], frozenset[str]]:
+    def _detector_ids(self) -> tuple[frozenset[str], frozenset[str]]:
         """Ids of loops and of areas."""
         loops, areas = self._sumo.inductionloop, self._sumo.lanearea
         return frozenset(loops.getIDList()), frozenset(areas.getIDList())
@@ -297,7 +300,7 @@ class Session:
                 f"SUMO could not save its state at {self.time:g} s: {error}"
             ) from error
 
-    def _poses(self, domain: Any, signals: Callable[[str], int] | None) -> Poses:
+    def _read_poses(self, domain: Any, signals: Callable[[str], int] | None) -> Poses:
         import numpy as np
 
         ids = domain.getIDList()
@@ -313,7 +316,7 @@ class Session:
             np.array(bits, dtype=np.int64),
         )
 
-    def _front(self, pose: tuple[Any, Any], name: str) -> Front | None:
+    def _front_of(self, pose: tuple[Any, Any], name: str) -> Front | None:
         place, direction = pose
         try:
             (x, y, z), angle = place(name), direction(name)
@@ -368,7 +371,7 @@ def sumo_errors(sumo: Any) -> tuple[type[Exception], ...]:
     return sumo.TraCIException, sumo.FatalTraCIError, RuntimeError
 
 
-def _native(sumo: Any, domain: str, name: str) -> Any:
+def _native_function(sumo: Any, domain: str, name: str) -> Any:
     """Return the C function of libsumo behind one of Python, which costs a call in every step."""
     getter = getattr(getattr(sumo, domain), name)
     return getattr(getattr(sumo, "_libsumo", None), f"{domain}_{name}", getter)
@@ -376,4 +379,4 @@ def _native(sumo: Any, domain: str, name: str) -> Any:
 
 def _of_the_run(happened: Sequence[Any]) -> list[Any]:
     """Leave out what happened to road users that other programs drive, but collisions."""
-    return [one for one in happened if not (isinstance(one, str) and is_foreign(one))]
+    return [name for name in happened if not (isinstance(name, str) and is_foreign(name))]

@@ -55,7 +55,7 @@ class StopDoors:
         simulation = self._simulation
         if simulation.getStopStartingVehiclesNumber():
             for name in simulation.getStopStartingVehiclesIDList():
-                self._stop(name, time)
+                self._note_stop(name, time)
         if simulation.getStopEndingVehiclesNumber():
             for name in simulation.getStopEndingVehiclesIDList():
                 self._open.pop(name, None)
@@ -65,10 +65,10 @@ class StopDoors:
             bits[:] = [self._open.get(name, (0, 0.0))[0] for name in ids]
         return bits
 
-    def _stop(self, name: str, time: float) -> None:
+    def _note_stop(self, name: str, time: float) -> None:
         state = self._vehicle.getStopState(name)
         kerb, road = VehicleSignal.DOOR_OPEN_RIGHT, VehicleSignal.DOOR_OPEN_LEFT
-        if self._lefthand:
+        if self._is_lefthand:
             kerb, road = road, kerb
         if state & _AT_BUS_STOP:
             self._open[name] = int(kerb), math.inf
@@ -76,7 +76,7 @@ class StopDoors:
             self._open[name] = int(road), time + GETTING_OUT
 
     @cached_property
-    def _lefthand(self) -> bool:
+    def _is_lefthand(self) -> bool:
         """Whether traffic keeps to the left: the network's word, which libsumo has no call for."""
         with Path(self._simulation.getOption("net-file")).open("rb") as file:
             head = file.read(_HEAD)

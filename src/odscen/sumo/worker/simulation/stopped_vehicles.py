@@ -81,14 +81,21 @@ class StoppedVehicles:
         own = self._lanes.of_edge[lanes.getEdgeID(lane)]
         following = vehicle.getRoute(name)[index + 1]
         leading = {
-            one
-            for one in own
-            if any(lanes.getEdgeID(link[0]) == following for link in lanes.getLinks(one))
+            name
+            for name in own
+            if any(lanes.getEdgeID(link[0]) == following for link in lanes.getLinks(name))
         }
         if lane not in leading:
             return bool(leading)
         # It may lead on there and no further: SUMO wants another lane, so many to the left.
-        wants = next((one[3] for one in vehicle.getBestLanes(name) if one[0] == lane), 0)
+        wants = next(
+            (
+                getBestLane[3]
+                for getBestLane in vehicle.getBestLanes(name)
+                if getBestLane[0] == lane
+            ),
+            0,
+        )
         return True if wants else None
 
     def _stopped_leader(self, name: str, junction: float) -> str | None:

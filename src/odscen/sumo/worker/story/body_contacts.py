@@ -72,7 +72,7 @@ class BodyContacts:
             one = view.actor(name)
             if one is None:
                 continue
-            for other in self._others(one, road, view, moves):
+            for other in self._possible_contacts(one, road, view, moves):
                 pair = min(one.id, other.id), max(one.id, other.id)
                 if pair not in touching and overlap(one.corners, other.corners):
                     touching.add(pair)
@@ -81,34 +81,38 @@ class BodyContacts:
         self._touching = touching
         known = road.collisions() if begun else set()
         return [
-            _contact(one, other, time, step)
+            _contact_event(one, other, time, step)
             for one, other in begun
             if frozenset((one.id, other.id)) not in known
         ]
 
-    def _others(
-        self, one: ActorView, road: MovedActors, view: StoryView, moves: Mapping[str, WantedMove]
+    def _possible_contacts(
+        self,
+        actor_view: ActorView,
+        road: MovedActors,
+        view: StoryView,
+        moves: Mapping[str, WantedMove],
     ) -> Iterator[ActorView]:
         """Those whose bodies may overlap with another's."""
         time = view.time
         for name in view.names:
             seen = None if name in moves else self._seen.get(name)
-            if seen is not None and _still_far(one, seen[1], time - seen[0]):
+            if seen is not None and _still_far(actor_view, seen[1], time - seen[0]):
                 continue
             other = view.actor(name)
-            if other is None or other is one:
+            if other is None or other is actor_view:
                 continue
             self._seen[name] = time, other
-            if _near(one, other):
+            if _bodies_near(actor_view, other):
                 yield other
-        lane = road.lane_of(one.id, person=one.person)
+        lane = road.lane_of(actor_view.id, person=actor_view.person)
         if not lane:
             return
         for name, _ in road.bodies_near(lane):
             planned = self._planned.get(name)
             if planned is not None and name not in view.names:
                 found = stranger(road, planned, self._offset)
-                if found is not None and _near(one, found):
+                if found is not None and _bodies_near(actor_view, found):
                     yield found
 
 
@@ -122,21 +126,21 @@ def _still_far(one: ActorView, other: ActorView, seconds: float) -> bool:
     return abs(one.x - other.x) > reach or abs(one.y - other.y) > reach
 
 
-def _near(one: ActorView, other: ActorView) -> bool:
+def _bodies_near(one: ActorView, other: ActorView) -> bool:
     reach = (one.length + one.width + other.length + other.width) / 2.0
     return abs(one.x - other.x) < reach and abs(one.y - other.y) < reach
 
 
-def _contact(one: ActorView, other: ActorView, time: float, step: float) -> Event:
+def _contact_event(one: ActorView, other: ActorView, time: float, step: float) -> Event:
     """Event of a contact that began in the last step: bodies are taken back along their speed."""
     early, late = 0.0, step
     for _ in range(_HALVINGS):
         back = (early + late) / 2.0
-        if overlap(_before(one, back).corners, _before(other, back).corners):
+        if overlap(_view_before(one, back).corners, _view_before(other, back).corners):
             early = back
         else:
             late = back
-    first, second = _before(one, early), _before(other, early)
+    first, second = _view_before(one, early), _view_before(other, early)
     (ax, ay), (bx, by) = one.velocity, other.velocity
     hitting = max((first, second), key=lambda body: (body.speed, body.id))
     hit = second if hitting is first else first
@@ -153,9 +157,9 @@ def _contact(one: ActorView, other: ActorView, time: float, step: float) -> Even
     )
 
 
-def _before(one: ActorView, seconds: float) -> ActorView:
-    vx, vy = one.velocity
-    return replace(one, x=one.x - vx * seconds, y=one.y - vy * seconds)
+def _view_before(actor_view: ActorView, seconds: float) -> ActorView:
+    vx, vy = actor_view.velocity
+    return replace(actor_view, x=actor_view.x - vx * seconds, y=actor_view.y - vy * seconds)
 
 
 def _touching_point(one: ActorView, other: ActorView) -> tuple[float, float]:

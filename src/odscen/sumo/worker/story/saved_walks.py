@@ -47,12 +47,12 @@ def mend_walks(state: Path, arrivals: Mapping[str, float], edge_of: Callable[[st
             name = None
         elif name is not None and name in arrivals:
             following = _REMOVED.search(lines[number + 1])
-            lines[number] = _mended(line, arrivals[name], following and edge_of(following[1]))
+            lines[number] = _mend_walk(line, arrivals[name], following and edge_of(following[1]))
     raw = "".join(lines).encode()
     state.write_bytes(gzip.compress(raw, compresslevel=6, mtime=0))
 
 
-def _mended(line: str, arrival: float, stopped: str | None) -> str:
+def _mend_walk(line: str, arrival: float, stopped: str | None) -> str:
     walk = _WALK.match(line)
     if walk is None:
         return line

@@ -61,11 +61,11 @@ class StoryHands:
         """Do what rules have asked for in this step."""
         for one in asked:
             if isinstance(one, WantedActor):
-                self._appear(road, one, time)
+                self._put_on_road(road, one, time)
             elif isinstance(one, WantedEnd):
                 self.over = True
             else:
-                self._switch(road, one, time)
+                self._switch_light(road, one, time)
 
     def departures(self, road: MovedActors) -> None:
         """Give those who have appeared the speed with which SUMO would not have let them depart."""
@@ -92,13 +92,13 @@ class StoryHands:
         known = self._plan.places[place]
         actor = self._actors[name]
         if known.edge is None:
-            self._lose(name, time, f"{place!r} is not on SUMO's network")
+            self._lose_actor(name, time, f"{place!r} is not on SUMO's network")
         elif actor.person:
             return SavedWalk((known.edge,), known.pos)
         elif road.lead_to(name, known.edge, through=True):
             self._goals[name] = place
         else:
-            self._lose(name, time, f"no route leads from here to {place!r}")
+            self._lose_actor(name, time, f"no route leads from here to {place!r}")
         return None
 
     def state(self) -> dict[str, Any]:
@@ -116,45 +116,51 @@ class StoryHands:
         self._goals = dict(state["goals"])
         self._faster = dict(state["faster"])
 
-    def _appear(self, road: MovedActors, one: WantedActor, time: float) -> None:
-        held = self._plan.held.get(one.actor)
-        if held is None or one.actor in self._added:
-            self._lose(one.actor, time, "it cannot appear: it has no route, or it was there")
+    def _put_on_road(self, road: MovedActors, wanted_actor: WantedActor, time: float) -> None:
+        held = self._plan.held.get(wanted_actor.actor)
+        if held is None or wanted_actor.actor in self._added:
+            self._lose_actor(
+                wanted_actor.actor, time, "it cannot appear: it has no route, or it was there"
+            )
             return
-        self._added.add(one.actor)
-        if not road.insert(one.actor, held, one.speed):
-            self._lose(one.actor, time, "SUMO does not let it appear")
+        self._added.add(wanted_actor.actor)
+        if not road.insert(wanted_actor.actor, held, wanted_actor.speed):
+            self._lose_actor(wanted_actor.actor, time, "SUMO does not let it appear")
             return
         if not held.person:
             own = held.attributes
-            begin = own["departSpeed"] if one.speed is None else one.speed
+            begin = own["departSpeed"] if wanted_actor.speed is None else wanted_actor.speed
             if begin != "avg" and float(begin) > float(own["mostSpeed"]):
-                self._faster[one.actor] = float(begin)
-        if one.at is not None:
-            x, y, hdg = one.at
-            half = self._actors[one.actor].length / 2.0
+                self._faster[wanted_actor.actor] = float(begin)
+        if wanted_actor.at is not None:
+            x, y, hdg = wanted_actor.at
+            half = self._actors[wanted_actor.actor].length / 2.0
             x += half * math.cos(hdg) + self._offset[0]
             y += half * math.sin(hdg) + self._offset[1]
-            if not held.person and road.off_lanes(x, y, width=self._actors[one.actor].width):
-                why = (
-                    f"it appears where it is placed, as {one.at[0]:g}, {one.at[1]:g} is on no lane"
-                )
-                self._lose(one.actor, time, why)
+            if not held.person and road.off_lanes(
+                x, y, width=self._actors[wanted_actor.actor].width
+            ):
+                why = f"it appears where it is placed, as {wanted_actor.at[0]:g}, {wanted_actor.at[1]:g} is on no lane"
+                self._lose_actor(wanted_actor.actor, time, why)
                 return
             put = road.put_person if held.person else road.put_vehicle
-            put(one.actor, x, y, float(angle_deg_from_hdg(hdg)))
+            put(wanted_actor.actor, x, y, float(angle_deg_from_hdg(hdg)))
 
-    def _switch(self, road: MovedActors, one: WantedSignal, time: float) -> None:
-        light, link = self._plan.signals[one.light, one.movement or ""]
-        if one.shows == DARK:
+    def _switch_light(self, road: MovedActors, wanted_signal: WantedSignal, time: float) -> None:
+        light, link = self._plan.signals[wanted_signal.light, wanted_signal.movement or ""]
+        if wanted_signal.shows == DARK:
             if light not in self._dark:
                 self._dark[light] = road.program(light)
                 road.run_program(light, DARK)
             return
         if light in self._dark:
             road.run_program(light, self._dark.pop(light))
-        if one.movement is not None and not road.jump_to_green(light, link):
-            self._lose(one.light, time, f"movement {one.movement!r} has green in no stage")
+        if wanted_signal.movement is not None and not road.jump_to_green(light, link):
+            self._lose_actor(
+                wanted_signal.light,
+                time,
+                f"movement {wanted_signal.movement!r} has green in no stage",
+            )
 
-    def _lose(self, name: str, time: float, why: str) -> None:
+    def _lose_actor(self, name: str, time: float, why: str) -> None:
         self.lost.append(Event(time, EventKind.RULE_FAILED, name, detail=why))

@@ -42,7 +42,7 @@ class StoryRun:
     """The rules of one run, and what SUMO was made to do for them."""
 
     def __init__(self, story: StoryPlan, plan: Plan) -> None:
-        names = set(_names(story))
+        names = set(_names_in_story(story))
         self._plan = story
         self._planned = {actor.id: actor for actor in plan.actors}
         self._actors = {actor.id: actor for actor in plan.actors if actor.id in names}
@@ -53,7 +53,7 @@ class StoryRun:
             net_offset=plan.net_offset,
             rule_changes=self._engine.rule_changes,
         )
-        self._read(story)
+        self._read_wishes(story)
         self._hands = StoryHands(story, self._planned, net_offset=plan.net_offset)
         self._rules = story.rules
         self._contacts = BodyContacts(self._planned, plan.net_offset)
@@ -88,8 +88,8 @@ class StoryRun:
         self._rules = (*self._rules, *more.rules)
         self._plan.places.update(more.places)
         self._plan.signals.update(more.signals)
-        self._read(more)
-        for name in _names(more):
+        self._read_wishes(more)
+        for name in _names_in_story(more):
             if name in self._planned:
                 self._actors[name] = self._planned[name]
         self._view.others_named()
@@ -98,7 +98,7 @@ class StoryRun:
         """Look at all rules in each step: not SUMO alone drives."""
         self._engine.patient = False
 
-    def _read(self, story: StoryPlan) -> None:
+    def _read_wishes(self, story: StoryPlan) -> None:
         """Let the view read what rules ask of actors."""
         self._view.whole |= _asked_by(story, _MORE)
         self._view.always |= _asked_by(story, _LASTING)
@@ -108,7 +108,7 @@ class StoryRun:
         self._road = session.moved_actors()
         self._hands.begin(self._road)
         for name, move in self._moves.items():
-            self._act(self._road, name, move, None)
+            self._act_on_actor(self._road, name, move, None)
 
     @property
     def waits(self) -> bool:
@@ -134,14 +134,14 @@ class StoryRun:
             self._jumps = recorder.jumps
             self._look_at_all()
         self._hands.departures(road)
-        self._view.look(road, time, self._step, self._driven() if moved else {})
+        self._view.look(road, time, self._step, self._moved_person_speeds() if moved else {})
         self._hands.arrivals(road, recorder, time)
         contacts = self._contacts.look(road, self._view, moved, time, self._step)
         if contacts:
             self._look_at_all()
         wanted, events = self._engine.step(self._view)
         if contacts or events:
-            recorder.events.extend([*contacts, *map(self._event, events)])
+            recorder.events.extend([*contacts, *map(self._rule_event, events)])
         if not moved and not wanted and not self._engine.asked:
             return
         self._lost = self._hands.lost = []
@@ -149,7 +149,7 @@ class StoryRun:
         self._moves = {}
         for name, move in wanted.items():
             if self._view.actor(name) is not None:
-                self._act(road, name, move, moved.get(name))
+                self._act_on_actor(road, name, move, moved.get(name))
                 if not move.vanishes:
                     self._moves[name] = move
         if self._lost:
@@ -160,7 +160,7 @@ class StoryRun:
         self._engine.look_at_all()
         self._contacts.look_at_all()
 
-    def _driven(self) -> dict[str, float]:
+    def _moved_person_speeds(self) -> dict[str, float]:
         """Speeds of persons that rules have moved, m/s."""
         return {
             name: move.speed or 0.0
@@ -199,17 +199,17 @@ class StoryRun:
         for name, kept in state["moves"].items():
             pose = kept["pose"]
             lights = None if kept["lights"] is None else tuple(kept["lights"])
-            pose = None if pose is None else Pose(*_numbers(pose))
+            pose = None if pose is None else Pose(*_pose_numbers(pose))
             data = {**kept, "pose": pose, "goal": None, "lights": lights}
             self._moves[name] = WantedMove(**data)
         self._fastest = dict(state["fastest"])
-        self._waits = {name: Pose(*_numbers(pose)) for name, pose in state["waits"].items()}
+        self._waits = {name: Pose(*_pose_numbers(pose)) for name, pose in state["waits"].items()}
         self._walks = {
             name: SavedWalk(tuple(edges), arrival)
             for name, (edges, arrival) in state["walks"].items()
         }
 
-    def _act(
+    def _act_on_actor(
         self, road: MovedActors, name: str, move: WantedMove, before: WantedMove | None
     ) -> None:
         if move.vanishes:
@@ -225,7 +225,7 @@ class StoryRun:
         ignored = move.ignore_red, move.ignore_right_of_way
         changed = ignored != (before.ignore_red, before.ignore_right_of_way)
         if changed or move.speed is not None or before.speed is not None:
-            self._let(road, name, move.speed)
+            self._allow_speed(road, name, move.speed)
             road.drive(
                 name,
                 move.speed,
@@ -237,12 +237,12 @@ class StoryRun:
             road.show_lights(name, move.lights)
         if move.keeps_lane != before.keeps_lane:
             road.keep_lane(name, keeps=move.keeps_lane)
-        self._lead(road, name, move)
+        self._keep_goal(road, name, move)
         if (pose := move.pose) is not None:
             x, y = pose.x + self._offset[0], pose.y + self._offset[1]
             road.put_vehicle(name, x, y, float(angle_deg_from_hdg(pose.hdg)))
 
-    def _lead(self, road: MovedActors, name: str, move: WantedMove) -> None:
+    def _keep_goal(self, road: MovedActors, name: str, move: WantedMove) -> None:
         """Keep the goal of a vehicle that is put somewhere: SUMO forgets its route beside it."""
         if move.goal is not None:
             self._goal_edges.pop(name, None)
@@ -254,7 +254,7 @@ class StoryRun:
         if edge is not None and road.goal_edge(name) != edge and not road.lead_to(name, edge):
             self._lose_way(name, "no route leads from where it is to its goal")
 
-    def _let(self, road: MovedActors, name: str, speed: float | None) -> None:
+    def _allow_speed(self, road: MovedActors, name: str, speed: float | None) -> None:
         """Let a vehicle go faster than its type, while a rule wants it."""
         own = self._fastest.get(name)
         if speed is None:
@@ -276,7 +276,7 @@ class StoryRun:
             self._put_person(road, name, move.pose)
             return
         if move.rejoins and name in self._walks:
-            if self._resume(road, name, self._walks[name]):
+            if self._resume_walk(road, name, self._walks[name]):
                 del self._walks[name]
             elif (one := self._view.actor(name)) is not None:
                 self._waits[name] = Pose(one.x, one.y, one.hdg)
@@ -295,10 +295,10 @@ class StoryRun:
         walk = self._hands.new_goal(road, name, move.goal or "", self._view.time)
         if walk is not None and (name in self._walks or move.pose is not None):
             self._walks[name] = walk
-        elif walk is not None and not self._resume(road, name, walk):
+        elif walk is not None and not self._resume_walk(road, name, walk):
             self._lose_way(name, "no walk leads from where it is to its new goal")
 
-    def _resume(self, road: MovedActors, name: str, walk: SavedWalk) -> bool:
+    def _resume_walk(self, road: MovedActors, name: str, walk: SavedWalk) -> bool:
         resumes = road.resume_walk(name, walk)
         if resumes:
             self._sent[name] = walk.arrival
@@ -317,7 +317,7 @@ class StoryRun:
         time = self._view.time
         self._lost.append(Event(time, EventKind.RULE_FAILED, name, x=x, y=y, detail=why))
 
-    def _event(self, event: StoryEvent) -> Event:
+    def _rule_event(self, event: StoryEvent) -> Event:
         one = self._view.actor(event.actor)
         return Event(
             event.time,
@@ -331,7 +331,7 @@ class StoryRun:
         )
 
 
-def _names(story: StoryPlan) -> Iterator[str]:
+def _names_in_story(story: StoryPlan) -> Iterator[str]:
     for rule in story.rules:
         yield rule.actor
         for _, _, part in rule_parts(rule, ""):
@@ -350,6 +350,6 @@ def _asked_by(story: StoryPlan, kinds: frozenset[str]) -> set[str]:
     }
 
 
-def _numbers(pose: Any) -> tuple[float, float, float]:
+def _pose_numbers(pose: Any) -> tuple[float, float, float]:
     x, y, hdg = pose
     return float(x), float(y), float(hdg)

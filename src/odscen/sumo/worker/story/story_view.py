@@ -104,7 +104,7 @@ class StoryView:
         planned = self._actors.get(name)
         found = None
         if planned is not None and name not in self._gone:
-            found = self._person(planned) if planned.person else self._vehicle(planned)
+            found = self._view_person(planned) if planned.person else self._view_vehicle(planned)
             if found is None and name in self._gains and not self._road.knows(name):
                 self._gone.add(name)  # asking SUMO for it would cost more than all who are there
         views[name] = found
@@ -128,7 +128,7 @@ class StoryView:
         """Whether an actor has left the road for good."""
         return name in self._gone
 
-    def _there(self, name: str) -> ActorView:
+    def _required_actor(self, name: str) -> ActorView:
         one = self.actor(name)
         if one is None:
             raise KeyError(name)
@@ -143,26 +143,26 @@ class StoryView:
 
     def lane_distance(self, actor: str, to: str | Point) -> float | None:
         """Metres along the lanes from the centre of an actor to another's, or to a place."""
-        own = self._there(actor)
+        own = self._required_actor(actor)
         if own.person:
             return None
         ahead = own.length / 2.0
         other = self.actor(to) if isinstance(to, str) else None
         if other is not None:
             if other.person:
-                where = self._near((other.x, other.y))
+                where = self._nearest_lane_position((other.x, other.y))
             else:
                 where, ahead = self._road.road_place(other.id), ahead - other.length / 2.0
         else:
-            where = self._where(to)
+            where = self._lane_position_of(to)
         metres = self._road.driving_distance(actor, *where)
         if metres is None and other is None:
-            return _under(own, self.place(to))
+            return _metres_under_body(own, self.place(to))
         return None if metres is None or metres < _BEHIND else metres + ahead
 
     def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
         """Centre line of the lane ``by`` lanes to the left of an actor's."""
-        own = self._there(actor)
+        own = self._required_actor(actor)
         for shape in self._road.lane_lines.beside(actor, by):
             line = tuple((x - self._offset[0], y - self._offset[1]) for x, y in shape)
             left = -beside(line, (own.x, own.y)).left
@@ -209,30 +209,30 @@ class StoryView:
         self._last = {name: (x, y, v) for name, (x, y, v) in state["last"].items()}
         self._restored = {name: Stood(*one) for name, one in state.get("seen", {}).items()}
 
-    def _where(self, place: str | Point) -> tuple[str, float, int]:
+    def _lane_position_of(self, place: str | Point) -> tuple[str, float, int]:
         if not isinstance(place, str):
-            return self._near(place)
+            return self._nearest_lane_position(place)
         known = self._plan.places[place]
         if known.edge is None:
-            return self._near((known.x, known.y))
+            return self._nearest_lane_position((known.x, known.y))
         return known.edge, known.pos, known.lane
 
-    def _near(self, place: Point) -> tuple[str, float, int]:
+    def _nearest_lane_position(self, place: Point) -> tuple[str, float, int]:
         if place not in self._nearest:
             x, y = place[0] + self._offset[0], place[1] + self._offset[1]
             self._nearest[place] = self._road.nearest_road(x, y)
         return self._nearest[place]
 
-    def _vehicle(self, planned: PlannedActor) -> ActorView | None:
+    def _view_vehicle(self, planned: PlannedActor) -> ActorView | None:
         if planned.id not in self.whole:
             moves = self._road.motion(planned.id)
-            return None if moves is None else self._view(planned, *moves)
+            return None if moves is None else self._make_view(planned, *moves)
         seen = self._road.vehicle(planned.id)
         if seen is None:
             return None
         x, y, angle, speed, faster, travelled, lane, left = seen
         off_road = not lane or abs(left) > self._half_width(lane)
-        return self._view(planned, x, y, angle, speed, faster, travelled, off_road=off_road)
+        return self._make_view(planned, x, y, angle, speed, faster, travelled, off_road=off_road)
 
     def _half_width(self, lane: str) -> float:
         known = self._half_widths.get(lane)
@@ -240,7 +240,7 @@ class StoryView:
             known = self._half_widths[lane] = self._road.lane_width(lane) / 2.0
         return known
 
-    def _person(self, planned: PlannedActor) -> ActorView | None:
+    def _view_person(self, planned: PlannedActor) -> ActorView | None:
         seen = self._road.person(planned.id)
         if seen is None:
             return None
@@ -251,12 +251,12 @@ class StoryView:
         self._travelled[planned.id] = self._travelled.get(planned.id, 0.0) + moved
         self._last[planned.id] = seen.x, seen.y, speed
         travelled, faster = self._travelled[planned.id], (speed - before) / self._step
-        return self._view(
+        return self._make_view(
             planned, seen.x, seen.y, seen.angle_deg, speed, faster, travelled,
             off_road=not seen.lane,
         )  # fmt: skip
 
-    def _view(
+    def _make_view(
         self,
         planned: PlannedActor,
         front_x: float,
@@ -285,15 +285,15 @@ class StoryView:
         )  # fmt: skip
 
 
-def _under(one: ActorView, place: Point) -> float | None:
+def _metres_under_body(actor_view: ActorView, place: Point) -> float | None:
     """Metres that a place is ahead of a body's centre if it is under the body.
 
     Where the front has left the edge of the place, SUMO knows of no way there any more.
     """
-    c, s = math.cos(one.hdg), math.sin(one.hdg)
-    dx, dy = place[0] - one.x, place[1] - one.y
+    c, s = math.cos(actor_view.hdg), math.sin(actor_view.hdg)
+    dx, dy = place[0] - actor_view.x, place[1] - actor_view.y
     ahead, aside = dx * c + dy * s, dy * c - dx * s
-    inside = abs(ahead) <= one.length / 2.0 + 1.0 and abs(aside) <= one.width
+    inside = abs(ahead) <= actor_view.length / 2.0 + 1.0 and abs(aside) <= actor_view.width
     return ahead if inside else None
 
 

@@ -95,8 +95,8 @@ class Callers:
             for n, (now, then) in enumerate(zip(shown, wanted, strict=True))
             if (then in "Gg" and now not in "Gg") or (then == "G" and now == "g")
         }
-        seen = [(one.id, one.movements) for one in self.areas]
-        seen += [(one.id, one.movements) for one in self.buses]
+        seen = [(area.id, area.movements) for area in self.areas]
+        seen += [(bus.id, bus.movements) for bus in self.buses]
         return any_of(f"a:{name} > 0" for name, own in seen if missing & set(own))
 
     def people(self, shown: str, wanted: str) -> str:
@@ -106,20 +106,22 @@ class Callers:
             for n, (now, then) in enumerate(zip(shown, wanted, strict=True))
             if then in "Gg" and now not in "Gg"
         }
-        return any_of(f"w:{one.id} > 0" for one in self.places if missing & set(one.movements))
+        return any_of(
+            f"w:{place.id} > 0" for place in self.places if missing & set(place.movements)
+        )
 
     def stuck(self, shown: str) -> str:
         """Say that a vehicle finds no gap in a green that gives way."""
         yielding = {n for n, letter in enumerate(shown) if letter == "g"}
-        areas = (one for one in self.areas if yielding & set(one.movements))
-        return any_of(f"w:{one.id} > {STUCK:g}" for one in areas)
+        areas = (area for area in self.areas if yielding & set(area.movements))
+        return any_of(f"w:{area.id} > {STUCK:g}" for area in areas)
 
 
 def any_of(expressions: Iterable[str]) -> str:
     """SUMO's expression for one of several; empty for none."""
-    return " or ".join(f"({one})" for one in expressions if one)
+    return " or ".join(f"({expression})" for expression in expressions if expression)
 
 
 def all_of(expressions: Iterable[str]) -> str:
     """SUMO's expression for all of several; empty for none."""
-    return " and ".join(f"({one})" for one in expressions if one)
+    return " and ".join(f"({expression})" for expression in expressions if expression)

@@ -62,7 +62,7 @@ def called_light(
     ``None`` where there is nothing to choose: fewer than two stages, one for vehicles that none
     prolong, or movements of which is not known where they meet.
     """
-    green = {p.stage: _green(p.state) for p in phases if p.stage}
+    green = {p.stage: _green_links(p.state) for p in phases if p.stage}
     variants = StageVariants(phases, view)
     if not variants.usable:
         return None
@@ -77,7 +77,7 @@ def called_light(
             ends[name] = f"end{name}"
             conditions[ends[name]] = ended_with_buses(ended, buses, green[name])
     if not all(
-        one.green.stage in ends for kinds in variants.of_stage for one in kinds if one.drive
+        kind.green.stage in ends for kinds in variants.of_stage for kind in kinds if kind.drive
     ):
         return None
     walks = {n for n, one in enumerate(view.movements) if one.walk}
@@ -88,5 +88,5 @@ def called_light(
     return CalledLight(plan, (*loops, *places), areas, conditions)
 
 
-def _green(state: str) -> set[int]:
+def _green_links(state: str) -> set[int]:
     return {n for n, letter in enumerate(state) if letter in "Gg"}

@@ -56,57 +56,63 @@ class _Called:
     ways: dict[tuple[_Key, _Key], int] = field(default_factory=dict)
 
     def build(self) -> PhasePlan:
-        all_variants = [one for variants in self.variants.of_stage for one in variants]
-        self._main()
+        all_variants = [variant for variants in self.variants.of_stage for variant in variants]
+        self._lay_main_cycle()
         main = len(self.phases)
-        for one in all_variants:
-            if _key(one) not in self.greens:
-                self.greens[_key(one)] = self._add(one.green)
-        for one in all_variants:
-            exits = [way for other in self._others(one) if (way := self._exit(one, other))]
-            if one.stage == self._home:
-                self._rest(one, exits)
+        for variant in all_variants:
+            if _variant_key(variant) not in self.greens:
+                self.greens[_variant_key(variant)] = self._add_phase(variant.green)
+        for variant in all_variants:
+            exits = [
+                way
+                for other in self._other_variants(variant)
+                if (way := self._lay_exit(variant, other))
+            ]
+            if variant.stage == self._find_home_stage:
+                self._let_rest(variant, exits)
             else:
-                self._follow(self.greens[_key(one)], (*exits, self._back(one)))
+                self._set_following(
+                    self.greens[_variant_key(variant)], (*exits, self._way_back(variant))
+                )
         return PhasePlan(tuple(self.phases), main)
 
     @property
-    def _home(self) -> int:
+    def _find_home_stage(self) -> int:
         """Stage with vehicles that has the longest green: there the light rests."""
         driven = [variants[0] for variants in self.variants.of_stage if variants[0].drive]
-        return max(driven, key=lambda one: (one.green.seconds, -one.stage)).stage
+        return max(driven, key=lambda variant: (variant.green.seconds, -variant.stage)).stage
 
-    def _main(self) -> None:
+    def _lay_main_cycle(self) -> None:
         """The map's cycle: all stages in order, with their crossings."""
         stages = self.variants.of_stage
         for number, (first, *_) in enumerate(stages):
-            self.greens[_key(first)] = self._add(first.green)
-            following = _key(stages[(number + 1) % len(stages)][0])
+            self.greens[_variant_key(first)] = self._add_phase(first.green)
+            following = _variant_key(stages[(number + 1) % len(stages)][0])
             between = self.variants.between(number) or [SumoPhase(1.0, first.green.state, "")]
-            self.ways[_key(first), following] = len(self.phases)
+            self.ways[_variant_key(first), following] = len(self.phases)
             self.phases += between
-        self._follow(len(self.phases) - 1, (0,))
+        self._set_following(len(self.phases) - 1, (0,))
 
-    def _others(self, one: StageVariant) -> list[StageVariant]:
+    def _other_variants(self, stage_variant: StageVariant) -> list[StageVariant]:
         """Variants of other stages in the order in which they come."""
         stages = self.variants.of_stage
-        order = [*range(one.stage + 1, len(stages)), *range(one.stage)]
+        order = [*range(stage_variant.stage + 1, len(stages)), *range(stage_variant.stage)]
         return [other for number in order for other in stages[number]]
 
     # Ways and what calls them
 
-    def _exit(self, one: StageVariant, other: StageVariant) -> int | None:
+    def _lay_exit(self, one: StageVariant, other: StageVariant) -> int | None:
         """First phase of the way to a stage that somebody calls; ``None`` if nobody can."""
-        call = self._called(one, other)
+        call = self._call_condition(one, other)
         if not call:
             return None
-        at = self._way(one, other)
+        at = self._way_between(one, other)
         end = self.ends.get(one.green.stage, "")
         early = all_of((end, call)) if end else ""
         self.phases[at] = replace(self.phases[at], early=early, final=call)
         return at
 
-    def _called(self, one: StageVariant, other: StageVariant) -> str:
+    def _call_condition(self, one: StageVariant, other: StageVariant) -> str:
         """Name of the condition that somebody calls a variant while another has green.
 
         People call one with crossings, vehicles one without.
@@ -117,78 +123,84 @@ class _Called:
         else:
             found = self.callers.vehicles(shown, wanted)
         following = (one.stage + 1) % len(self.variants.of_stage)
-        if one.stage == self._home and other is self.variants.of_stage[following][-1]:
+        if one.stage == self._find_home_stage and other is self.variants.of_stage[following][-1]:
             found = any_of((found, self.callers.stuck(shown)))
-        return self._condition(one, other, found)
+        return self._add_condition(one, other, found)
 
-    def _condition(self, one: StageVariant, other: StageVariant, expression: str) -> str:
+    def _add_condition(self, one: StageVariant, other: StageVariant, expression: str) -> str:
         if not expression:
             return ""
-        name = f"call{_name(one)}to{_name(other)}"
+        name = f"call{_variant_name(one)}to{_variant_name(other)}"
         self.conditions[name] = expression
         return name
 
-    def _way(self, one: StageVariant, other: StageVariant) -> int:
-        pair = _key(one), _key(other)
+    def _way_between(self, one: StageVariant, other: StageVariant) -> int:
+        pair = _variant_key(one), _variant_key(other)
         if pair not in self.ways:
-            self.ways[pair] = self._laid(self.variants.way(one, other), self.greens[_key(other)])
+            self.ways[pair] = self._lay_way(
+                self.variants.way(one, other), self.greens[_variant_key(other)]
+            )
         return self.ways[pair]
 
-    def _laid(self, way: list[SumoPhase], target: int) -> int:
+    def _lay_way(self, way: list[SumoPhase], target: int) -> int:
         first = len(self.phases)
         for number, phase in enumerate(way, start=first + 1):
             last = number == first + len(way)
             self.phases.append(replace(phase, following=(target if last else number,)))
         return first
 
-    def _back(self, one: StageVariant) -> int:
+    def _way_back(self, stage_variant: StageVariant) -> int:
         """Way to the main stage where nobody calls; its first phase is its own."""
-        home = self.variants.of_stage[self._home][-1]
-        way = self.variants.way(one, home)
-        at = self._laid(way, self.greens[_key(home)])
-        early = self.ends.get(one.green.stage, "")
+        home = self.variants.of_stage[self._find_home_stage][-1]
+        way = self.variants.way(stage_variant, home)
+        at = self._lay_way(way, self.greens[_variant_key(home)])
+        early = self.ends.get(stage_variant.green.stage, "")
         self.phases[at] = replace(self.phases[at], early=early, final="1")
         return at
 
     # Resting
 
-    def _rest(self, one: StageVariant, exits: list[int]) -> None:
+    def _let_rest(self, stage_variant: StageVariant, exits: list[int]) -> None:
         """Let the main stage last while nobody calls another; then it is prolonged anew."""
-        green = one.green
+        green = stage_variant.green
         rest, prolonged = len(self.phases), len(self.phases) + 1
         called = any_of(self.phases[way].final for way in exits)
-        asked = f"asked{_name(one)}"
+        asked = f"asked{_variant_name(stage_variant)}"
         self.conditions[asked] = called or "0"
-        self._add(replace(green, seconds=1.0, least=1.0, most=RESTING))
-        self._add(replace(green, seconds=1.0, least=1.0, early=asked))
-        walk = None if one.walk else self._start_walking(one, asked)
-        self._follow(rest, (prolonged,) if walk is None else (walk, prolonged))
-        self._follow(prolonged, (*exits, rest))
-        self._follow(self.greens[_key(one)], (*exits, rest))
+        self._add_phase(replace(green, seconds=1.0, least=1.0, most=RESTING))
+        self._add_phase(replace(green, seconds=1.0, least=1.0, early=asked))
+        walk = None if stage_variant.walk else self._start_walking(stage_variant, asked)
+        self._set_following(rest, (prolonged,) if walk is None else (walk, prolonged))
+        self._set_following(prolonged, (*exits, rest))
+        self._set_following(self.greens[_variant_key(stage_variant)], (*exits, rest))
 
-    def _start_walking(self, one: StageVariant, asked: str) -> int | None:
+    def _start_walking(self, stage_variant: StageVariant, asked: str) -> int | None:
         """Way on which crossings get green in a stage that rests."""
-        walking = self.variants.of_stage[one.stage][0]
-        waits = self.callers.people(one.green.state, walking.green.state) if walking.walk else ""
+        walking = self.variants.of_stage[stage_variant.stage][0]
+        waits = (
+            self.callers.people(stage_variant.green.state, walking.green.state)
+            if walking.walk
+            else ""
+        )
         if not waits:
             return None
-        at = self._way(one, walking)
-        call = self._condition(one, walking, waits)
+        at = self._way_between(stage_variant, walking)
+        call = self._add_condition(stage_variant, walking, waits)
         early = all_of((call, f"{asked} < 1"))
         self.phases[at] = replace(self.phases[at], early=early)
         return at
 
-    def _add(self, phase: SumoPhase) -> int:
+    def _add_phase(self, phase: SumoPhase) -> int:
         self.phases.append(phase)
         return len(self.phases) - 1
 
-    def _follow(self, at: int, following: tuple[int, ...]) -> None:
+    def _set_following(self, at: int, following: tuple[int, ...]) -> None:
         self.phases[at] = replace(self.phases[at], following=following)
 
 
-def _key(one: StageVariant) -> _Key:
-    return one.stage, one.walk
+def _variant_key(stage_variant: StageVariant) -> _Key:
+    return stage_variant.stage, stage_variant.walk
 
 
-def _name(one: StageVariant) -> str:
-    return f"{one.stage + 1}{'walk' if one.walk else ''}"
+def _variant_name(stage_variant: StageVariant) -> str:
+    return f"{stage_variant.stage + 1}{'walk' if stage_variant.walk else ''}"

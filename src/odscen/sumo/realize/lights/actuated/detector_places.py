@@ -82,7 +82,7 @@ def _loop_place(loop: PlacedLoop, light: SumoLight, sumo_map: SumoMap) -> _Place
             if loop.lane.startswith(area) or area.startswith(loop.lane)
         ]
         return tuple(waiting[:1])
-    points = _along(loop.lane, loop.pos, loop.pos + loop.length, sumo_map)
+    points = _points_along(loop.lane, loop.pos, loop.pos + loop.length, sumo_map)
     if not points:
         return _before_stop_line(loop, light)
     return points[0], points[-1]
@@ -95,7 +95,7 @@ def _area_place(lane: str | None, length: float, sumo_map: SumoMap) -> _Place:
     pieces: list[_Place] = []
     while lane is not None and length > 0.0:
         whole = sumo_map.net.lanes[lane].length
-        pieces.append(_along(lane, max(whole - length, 0.0), whole, sumo_map))
+        pieces.append(_points_along(lane, max(whole - length, 0.0), whole, sumo_map))
         length -= whole
         lane = lane_before(sumo_map.net, lane)
     points = [point for piece in reversed(pieces) for point in piece]
@@ -105,7 +105,7 @@ def _area_place(lane: str | None, length: float, sumo_map: SumoMap) -> _Place:
     return tuple((float(x), float(y)) for x, y in shapely.get_coordinates(line))
 
 
-def _along(lane: str, begin: float, end: float, sumo_map: SumoMap) -> _Place:
+def _points_along(lane: str, begin: float, end: float, sumo_map: SumoMap) -> _Place:
     """Points between two positions of a lane, ends included; none of a lane too short for nodes."""
     places, lanes = sumo_map.lane_places, sumo_map.graph.lanes
     row = places.lanes.index(lane) if lane in places.lanes else -2

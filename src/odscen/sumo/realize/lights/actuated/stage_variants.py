@@ -53,18 +53,18 @@ class StageVariants:
     def __init__(self, phases: Sequence[SumoPhase], light: Light) -> None:
         self._light = light
         self._walks = {n for n, one in enumerate(light.movements) if one.walk}
-        groups = _groups(phases, light)
+        groups = _group_movements(phases, light)
         self._program = DesignedProgram(
             JunctionTiming(junction=light.names[0]), light, "actuated", groups=groups
         )
         self.phases = list(phases)
         self.stages = [n for n, phase in enumerate(phases) if phase.stage]
-        self.of_stage = [self._variants(n, phases[at]) for n, at in enumerate(self.stages)]
+        self.of_stage = [self._variants_of_stage(n, phases[at]) for n, at in enumerate(self.stages)]
 
     @property
     def usable(self) -> bool:
         """Whether there is something to choose: stages for vehicles and others, known to meet."""
-        drives = any(one.drive for variants in self.of_stage for one in variants)
+        drives = any(variant.drive for variants in self.of_stage for variant in variants)
         several = all(self.of_stage) and len(self.of_stage) > 1 and self.stages[0] == 0
         return several and drives and bool(self._light.meetings)
 
@@ -79,44 +79,48 @@ class StageVariants:
         found = []
         for seconds, state, name in change_steps(self._program, one.planned, other.planned):
             letters = (
-                _careful(letter, was, then)
+                _careful_letter(letter, was, then)
                 for letter, was, then in zip(state, before, behind, strict=True)
             )
             found.append(SumoPhase(seconds, "".join(letters), name))
         return found or [SumoPhase(1.0, before, one.green.name)]
 
-    def _variants(self, number: int, phase: SumoPhase) -> tuple[StageVariant, ...]:
+    def _variants_of_stage(self, number: int, phase: SumoPhase) -> tuple[StageVariant, ...]:
         """With crossings first; none for a stage in which nobody has green."""
         green = {n for n, letter in enumerate(phase.state) if letter in "Gg"}
         walks, drive = green & self._walks, bool(green - self._walks)
-        full = self._planned(phase)
+        full = self._planned_stage(phase)
         found = []
         if walks or drive:
             found.append(StageVariant(number, bool(walks), drive, phase, full))
         if walks and drive:
-            names = frozenset(self._program.group_of[n] for n in walks if self._known(n))
+            names = frozenset(self._program.group_of[n] for n in walks if self._is_known(n))
             rest = full._replace(
                 groups=full.groups - names, permissive=full.permissive - names, least=LEAST_CALLED
             )
-            found.append(StageVariant(number, False, True, self._dark(phase, full, rest), rest))
+            found.append(
+                StageVariant(number, False, True, self._without_crossings(phase, full, rest), rest)
+            )
         elif drive:
             found[0] = found[0]._replace(green=shorter(phase))
         return tuple(found)
 
-    def _known(self, movement: int) -> bool:
+    def _is_known(self, movement: int) -> bool:
         return movement in self._program.group_of
 
-    def _planned(self, phase: SumoPhase) -> PlannedStage:
-        names = {n: self._program.group_of[n] for n in range(len(phase.state)) if self._known(n)}
+    def _planned_stage(self, phase: SumoPhase) -> PlannedStage:
+        names = {n: self._program.group_of[n] for n in range(len(phase.state)) if self._is_known(n)}
         groups = frozenset(name for n, name in names.items() if phase.state[n] in "Gg")
         permissive = frozenset(name for n, name in names.items() if phase.state[n] == "g")
         return PlannedStage(
             phase.stage, groups, permissive, phase.seconds, phase.least, phase.most, False
         )
 
-    def _dark(self, phase: SumoPhase, full: PlannedStage, rest: PlannedStage) -> SumoPhase:
+    def _without_crossings(
+        self, phase: SumoPhase, full: PlannedStage, rest: PlannedStage
+    ) -> SumoPhase:
         """Phase without its crossings: who gave way to those who walk need not any more."""
-        busy, free = (stage_state(self._program, one) for one in (full, rest))
+        busy, free = (stage_state(self._program, stage) for stage in (full, rest))
         letters = []
         for n, letter in enumerate(phase.state):
             if n in self._walks:
@@ -131,12 +135,12 @@ def shorter(phase: SumoPhase) -> SumoPhase:
     return replace(phase, least=min(phase.least, LEAST_CALLED)) if phase.prolonged else phase
 
 
-def _careful(letter: str, was: str, then: str) -> str:
+def _careful_letter(letter: str, was: str, then: str) -> str:
     """Letter on a way; what gives way before or behind it does so on it, too."""
     return "g" if letter == "G" and "g" in (was, then) else letter
 
 
-def _groups(phases: Sequence[SumoPhase], light: Light) -> dict[str, DesignedGroup]:
+def _group_movements(phases: Sequence[SumoPhase], light: Light) -> dict[str, DesignedGroup]:
     """Movements of one approach that always show the same, but for who gives way."""
     columns: dict[tuple[str, ...], list[int]] = {}
     for n, one in enumerate(light.movements):
