@@ -125,11 +125,11 @@ def test_runs_whose_workers_die_are_tried_one_by_one_and_given_up_last(tmp_path:
     order = orders.next(2)
     assert order is not None
     executor = DaskExecutor(place(), None)
-    assert executor._taken(Died(), order) == []
+    assert executor._take_outcomes(Died(), order) == []
     assert [len(one.runs) for one in executor._again] == [1, 1]
     single = executor._again[0]
-    assert executor._taken(Died(), single) == []
-    (lost,) = executor._taken(Died(), single)
+    assert executor._take_outcomes(Died(), single) == []
+    (lost,) = executor._take_outcomes(Died(), single)
     assert lost.name == single.runs[0][0].name
     assert lost.row["status"] == "failed"
     assert "have died again and again" in lost.row["detail"]
@@ -168,7 +168,7 @@ def test_a_map_that_was_lost_with_its_workers_is_sent_again(tmp_path: Path) -> N
     assert order is not None
     executor = DaskExecutor(place(), None)
     executor._packs["signal_crossing"] = Lost()
-    assert executor._taken(Lost(), order) == []
+    assert executor._take_outcomes(Lost(), order) == []
     assert executor._packs == {}
     assert executor._again == [order]
     assert executor._deaths == {}

@@ -91,7 +91,7 @@ def test_every_way_to_fail_says_what_happened(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, problem: str
 ) -> None:
     program = fake(tmp_path, script)
-    monkeypatch.setattr(netconvert, "_program", lambda: (program, {}))
+    monkeypatch.setattr(netconvert, "_find_program", lambda: (program, {}))
     with pytest.raises(ToolError, match=problem):
         run_netconvert([], files={}, limits=NetconvertLimits(0.1, 1 << 30))
 

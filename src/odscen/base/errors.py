@@ -163,7 +163,8 @@ class DamagedFile(NamedTuple):
     found: str
 
     def __str__(self) -> str:
-        return f"{self.file}: expected {_shorten_digest(self.expected)}, found {_shorten_digest(self.found)}"
+        expected, found = _shorten_digest(self.expected), _shorten_digest(self.found)
+        return f"{self.file}: expected {expected}, found {found}"
 
 
 class DamagedError(InputError):

@@ -175,7 +175,8 @@ def _junction_values(old: Junction, new: Junction, names: Mapping[str, str]) -> 
     name = f"junction {shown_id(old.id)}"
     ways = {f"road {priority.high} over road {priority.low}" for priority in old.priorities}
     others = {
-        f"road {names.get(priority.high, priority.high)} over road {names.get(priority.low, priority.low)}"
+        f"road {names.get(priority.high, priority.high)} "
+        f"over road {names.get(priority.low, priority.low)}"
         for priority in new.priorities
     }
     for said in sorted(ways - others):

@@ -234,8 +234,11 @@ def installed_assets() -> Assets:
 def _own_assets(source: AssetSource) -> Assets:
     """What a source offers, all of the right kind; raises what its code raises, or a TypeError."""
     own = Assets.of(source)
-    for offered, kind in (*((blueprint, Blueprint) for blueprint in own.blueprints.values()),
-                          *((preset, WeatherPreset) for preset in own.presets.values())):  # fmt: skip
+    typed: list[tuple[object, type[object]]] = [
+        (blueprint, Blueprint) for blueprint in own.blueprints.values()
+    ]
+    typed += [(preset, WeatherPreset) for preset in own.presets.values()]
+    for offered, kind in typed:
         if not isinstance(offered, kind):
             raise TypeError(f"{offered!r} is no {kind.__name__}")
     return own

@@ -58,9 +58,9 @@ def test_a_served_model_answers_as_it_does_in_process() -> None:
     ("data", "words"),
     [
         (b"nothing", "is no .npy array"),
-        (messages._npy(np.zeros(3)), "no field 'controlled'"),
-        (messages._npy(np.zeros(3, dtype=[("controlled", "?"), ("sped", "f8")])), "'sped'"),
-        (messages._npy(np.zeros(2, dtype=[("controlled", "?")])), r"shape \(2,\), not \(3,\)"),
+        (messages._pack_npy(np.zeros(3)), "no field 'controlled'"),
+        (messages._pack_npy(np.zeros(3, dtype=[("controlled", "?"), ("sped", "f8")])), "'sped'"),
+        (messages._pack_npy(np.zeros(2, dtype=[("controlled", "?")])), r"shape \(2,\), not \(3,\)"),
     ],
 )
 def test_an_answer_that_is_none_is_refused(data: bytes, words: str) -> None:

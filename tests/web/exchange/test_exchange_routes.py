@@ -347,7 +347,7 @@ def test_a_format_of_a_package_is_listed_downloaded_and_read(
         (name,) = files = opened(client, sampled, to="actors")
         assert name == f"{sampled}.actors.csv"
         # A child that waits for work has been started before the package was there.
-        monkeypatch.setattr(child_process, "_taken", child_process._Child)
+        monkeypatch.setattr(child_process, "_take_child", child_process._Child)
         parts = [("files", (name, files[name]))]
         started = client.post("/api/imports/actors", files=parts)
         assert "names no map" in job(client, started)["error"]["message"]

@@ -84,7 +84,8 @@ class DemandTrial:
     def words(self) -> str:
         """One line for people."""
         return (
-            f"{_format_percent(self.share)} of the demand and {_format_percent(MARGIN - 1.0)} more, "
+            f"{_format_percent(self.share)} of the demand and "
+            f"{_format_percent(MARGIN - 1.0)} more, "
             f"{self.vehicles:,} road users in {self.seconds / 60.0:.0f} min, seed {self.seed}: "
             f"{self.headline}"
         )
@@ -105,7 +106,8 @@ class DemandSizing:
         also = f"; {_format_percent(min(refused))} is too much" if refused else ""
         amount = f" ({self.trips:,.0f} trips)" if self.trips else ""
         return (
-            f"{_format_percent(self.share)} of the demand{amount} fits: with {_format_percent(MARGIN - 1.0)} "
+            f"{_format_percent(self.share)} of the demand{amount} fits: "
+            f"with {_format_percent(MARGIN - 1.0)} "
             f"more its busiest hour is usable with {SEEDS} seeds{also} ({len(self.trials)} runs)"
         )
 
@@ -241,7 +243,10 @@ class _Trials:
                 backlog = True
             if backlog:
                 level = UsabilityLevel.NOT_USABLE
-                headline = f"{level}: more than {_format_percent(BACKLOG)} had no room to depart at one time"
+                headline = (
+                    f"{level}: more than {_format_percent(BACKLOG)} "
+                    "had no room to depart at one time"
+                )
         plan = prepared.plan
         usable = level == UsabilityLevel.USABLE
         trial = DemandTrial(share, plan.seed, len(plan.actors), plan.until, usable, headline)

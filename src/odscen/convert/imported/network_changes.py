@@ -133,7 +133,10 @@ def _compare_lights(before: LaneTable, after: LaneTable) -> Iterator[NetworkChan
                 f"stages {_describe_stages(was[name])} before, {_describe_stages(now[name])} now"
             )
             if _describe_stages(was[name]) == _describe_stages(now[name]):
-                detail = f"stages {_describe_stages(now[name])} as before, with green for other connections"
+                detail = (
+                    f"stages {_describe_stages(now[name])} as before, "
+                    "with green for other connections"
+                )
             yield NetworkChange("program changed", element, detail)
 
 

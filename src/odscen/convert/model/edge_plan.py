@@ -32,6 +32,12 @@ TO_JUNCTION = 12.0
 BETWEEN = 8.0
 """Metres between gaps of one road: with less, no edge lies between them."""
 
+SHORTEST = 1.0
+"""Metres of an edge, at least, that stays between gaps of two junctions."""
+
+MOST_TRIMMED = 1.0
+"""Metres that each of these gaps gives for it, at most: what stop lines are off crosswalks."""
+
 STUB = 0.5
 """Metres of road that stay beyond a gap at a dead end."""
 
@@ -88,11 +94,34 @@ def _merge_gaps(road: Road, gaps: list[RoadGap]) -> tuple[RoadGap, ...]:
             start = 0.0
         if behind < min(TO_JUNCTION, before) and _at_junction(road, "end"):
             end = road.length
-        if found and start - found[-1].end < BETWEEN:
-            found[-1] = RoadGap(found[-1].start, max(found[-1].end, end))
+        found.append(RoadGap(start, end))
+    groups: list[list[RoadGap]] = []
+    for gap in found:
+        if groups and gap.start - max(group.end for group in groups[-1]) < BETWEEN:
+            groups[-1].append(gap)
         else:
-            found.append(RoadGap(start, end))
-    return tuple(found)
+            groups.append([gap])
+    return tuple(gap for group in groups for gap in _joined_gaps(road, group))
+
+
+def _joined_gaps(road: Road, gaps: list[RoadGap]) -> list[RoadGap]:
+    """One gap of several that are close; two where one would make two junctions one.
+
+    A short road between two junctions, with a crosswalk at each end, keeps an edge where its gaps
+    are farthest apart: without it both junctions would be one, and their lights lost.
+    """
+    start, end = gaps[0].start, max(gap.end for gap in gaps)
+    whole = [RoadGap(start, end)]
+    from_both = _at_junction(road, "start") and _at_junction(road, "end")
+    if len(gaps) == 1 or start > 0.0 or end < road.length or not from_both:
+        return whole
+    ends = [max(gap.end for gap in gaps[: n + 1]) for n in range(len(gaps) - 1)]
+    spaces = [gap.start - before for gap, before in zip(gaps[1:], ends, strict=True)]
+    widest = max(range(len(spaces)), key=lambda n: (spaces[n], -n))
+    short = max(0.0, SHORTEST - spaces[widest]) / 2.0
+    if short > MOST_TRIMMED:
+        return whole
+    return [RoadGap(start, ends[widest] - short), RoadGap(gaps[widest + 1].start + short, end)]
 
 
 def _at_junction(road: Road, end: str) -> bool:

@@ -89,7 +89,8 @@ class _Written:
             )
             if lane.xodr:
                 yield text + ">"
-                yield f'            <param key="origId" value="{_quote_attribute(" ".join(lane.xodr))}"/>'
+                xodr = _quote_attribute(" ".join(lane.xodr))
+                yield f'            <param key="origId" value="{xodr}"/>'
                 yield "        </lane>"
             else:
                 yield text + "/>"
@@ -111,7 +112,8 @@ class _Written:
         count = len(junction.requests)
         for index, request in enumerate(junction.requests):
             yield (
-                f'        <request index="{index}" response="{_format_bits(request.yields_to, count)}"'
+                f'        <request index="{index}"'
+                f' response="{_format_bits(request.yields_to, count)}"'
                 f' foes="{_format_bits(request.foes, count)}" cont="{int(request.waits_inside)}"/>'
             )
         if junction.xodr:

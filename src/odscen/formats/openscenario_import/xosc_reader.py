@@ -98,7 +98,8 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
     if len(source.graph.walks.x) == 0:
         _on_wheels(report, entities.values())
     positions = PositionReader(
-        report, source.graph, source.road_point, source.lane_t, _side_of_y(root), varied=source.varied,
+        report, source.graph, source.road_point, source.lane_t, _side_of_y(root),
+        varied=source.varied,
         on_trajectory=trajectory_place,
     )  # fmt: skip
     story, init, board, found = _begin_story(source, positions, entities, ego)

@@ -382,7 +382,8 @@ def counts_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
     yield from found
     if not found:
         for contradiction in contradictions(counts, region.graph):
-            message = f"{contradiction.begin:g} to {contradiction.end:g} s: {contradiction.message}; not all can be met"
+            begin, end = contradiction.begin, contradiction.end
+            message = f"{begin:g} to {end:g} s: {contradiction.message}; not all can be met"
             segments = dict.fromkeys(
                 n for place in contradiction.places for n in place_segments(place)
             )

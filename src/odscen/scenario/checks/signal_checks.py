@@ -312,7 +312,8 @@ def signal_problems(
         where = f"signals.junctions[{index}]"
         light = find_light(lights, timing.junction)
         if light is None:
-            message = f"there is no traffic light in junction {timing.junction!r}; {_describe_known_lights(lights)}"
+            known = _describe_known_lights(lights)
+            message = f"there is no traffic light in junction {timing.junction!r}; {known}"
             yield error("unknown_light", f"{where}.junction", message)
             continue
         if light.names in timed:

@@ -145,7 +145,8 @@ class _Treatment:
             arrow = self._find_arrow_stage(cleared, stages, with_approach)
             if arrow is None:
                 new = ProgramStage(
-                    id=_choose_free_id({stage.id for stage in stages}), protected=tuple(sorted(self._own)),
+                    id=_choose_free_id({stage.id for stage in stages}),
+                    protected=tuple(sorted(self._own)),
                     green=ARROW_GREEN,
                 )  # fmt: skip
                 at = [stage.id for stage in cleared].index(with_approach[-1]) + 1

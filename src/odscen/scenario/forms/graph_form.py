@@ -87,7 +87,8 @@ def write_graphml(graph: nx.MultiDiGraph) -> str:
         for node, data in graph.nodes(data=True)
     )
     lines = (
-        f"<edge source={_quote_name(source)} target={_quote_name(target)}>{_write_data('e', data)}</edge>"
+        f"<edge source={_quote_name(source)} target={_quote_name(target)}>"
+        f"{_write_data('e', data)}</edge>"
         for source, target, data in edges
     )
     return "\n".join(

@@ -861,12 +861,14 @@ ACTIONS = {
         ActionKind(
             "speed", "reach `to` at a `rate`, `over` seconds or `within` metres; then keep it, as "
             "far as traffic allows. Shapes: `step`, `linear`, `cosine`", "m/s, m/s², s, m",
-            "`setSpeed` each step", "SpeedAction", _MIRRORED, _begin_speed, finish=_begin_keep_speed,
+            "`setSpeed` each step", "SpeedAction", _MIRRORED, _begin_speed,
+            finish=_begin_keep_speed,
         ),
         ActionKind(
             "brake", "brake with `by` to a standstill, whatever the vehicle type allows; SUMO "
             "drives on after `hold` seconds, without it not before `go` or `release`", "m/s², s",
-            "`setSpeed` each step", "SpeedAction to 0", _MIRRORED, _begin_brake, finish=_after_braking,
+            "`setSpeed` each step", "SpeedAction to 0", _MIRRORED, _begin_brake,
+            finish=_after_braking,
         ),
         ActionKind(
             "stop", "stand after exactly `within` metres, at once without it; until `go`", "m",

@@ -401,7 +401,9 @@ CONDITIONS = {
             "relative_speed", "own speed less that of `to` along the own heading", "m/s",
             _EXTRAPOLATED, "RelativeSpeedCondition", _MIRRORED, _relative_speed,
         ),
-        ConditionKind("speed", "speed", "m/s", _EXTRAPOLATED, "SpeedCondition", _MIRRORED, _read_speed),
+        ConditionKind(
+            "speed", "speed", "m/s", _EXTRAPOLATED, "SpeedCondition", _MIRRORED, _read_speed,
+        ),
         ConditionKind(
             "acceleration", "acceleration along the heading, negative when braking", "m/s²",
             "on whole steps", "AccelerationCondition", _MIRRORED, _read_acceleration,

@@ -98,16 +98,14 @@ class SceneTemplate:
         """
         known = {parameter.name: parameter for parameter in self.parameters}
         for name, value in given.items():
-            template_parameter = known.get(name)
-            if template_parameter is None:
+            number = known.get(name)
+            if number is None:
                 raise InputError(
                     f"template {self.name!r} has no parameter {name!r}; it has {', '.join(known)}"
                 )
-            if not (
-                math.isfinite(value) and template_parameter.low <= value <= template_parameter.high
-            ):
+            if not (math.isfinite(value) and number.low <= value <= number.high):
                 raise InputError(
-                    f"{name} must be {template_parameter.low:g} to {template_parameter.high:g} {template_parameter.unit}, not {value:g}"
+                    f"{name} must be {number.low:g} to {number.high:g} {number.unit}, not {value:g}"
                 )
         usual = {
             parameter.name: parameter.default

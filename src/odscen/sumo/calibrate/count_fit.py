@@ -212,7 +212,8 @@ def counts_apart(scenario: Scenario, sumo_map: SumoMap) -> CountsApart:
     for part in scenario.demand.counts:
         for contradiction in contradictions(part, sumo_map.graph):
             problems.append(
-                f"{contradiction.counts}, {contradiction.begin:g} to {contradiction.end:g} s: {contradiction.message}"
+                f"{contradiction.counts}, {contradiction.begin:g} to {contradiction.end:g} s: "
+                f"{contradiction.message}"
             )
             for place in contradiction.places:
                 opposed.setdefault(

@@ -199,7 +199,8 @@ def prior_cells(scenario: Scenario) -> list[MatrixCell]:
     lengths = {round(end - begin, 6) for begin, end in slices}
     if len(lengths) > 1:
         raise InputError(
-            f"slices of the counts are {', '.join(f'{length:g}' for length in sorted(lengths))} s long"
+            f"slices of the counts are {', '.join(f'{length:g}' for length in sorted(lengths))} s "
+            "long"
         )
     cells = []
     for index, matrix in enumerate(scenario.demand.matrices):

@@ -212,7 +212,8 @@ class _Weather:
         if weather.get("temperature") or weather.get("atmosphericPressure"):
             report.mark(weather, "approximated", "without temperature and pressure of the air")
         readers = {
-            "Sun": self._read_sun, "Fog": self._read_fog, "Precipitation": self._read_rain, "Wind": self._read_wind,
+            "Sun": self._read_sun, "Fog": self._read_fog,
+            "Precipitation": self._read_rain, "Wind": self._read_wind,
         }  # fmt: skip
         for element in weather.iterchildren("*"):
             if str(element.tag) in readers:

@@ -132,7 +132,8 @@ def _area_lines(parking_position: ParkingPosition, name: str, spaces: Sequence[s
     if not spaces:
         return []
     start = (
-        f'    <parkingArea id="{name}" lane="{parking_position.lane}" startPos="{parking_position.begin:.2f}" '
+        f'    <parkingArea id="{name}" lane="{parking_position.lane}" '
+        f'startPos="{parking_position.begin:.2f}" '
         f'endPos="{parking_position.end:.2f}" roadsideCapacity="0">'
     )
     return [start, *spaces, "    </parkingArea>"]

@@ -140,7 +140,8 @@ class StoryHands:
             if not held.person and road.off_lanes(
                 x, y, width=self._actors[wanted_actor.actor].width
             ):
-                why = f"it appears where it is placed, as {wanted_actor.at[0]:g}, {wanted_actor.at[1]:g} is on no lane"
+                x, y = wanted_actor.at[:2]
+                why = f"it appears where it is placed, as {x:g}, {y:g} is on no lane"
                 self._lose_actor(wanted_actor.actor, time, why)
                 return
             put = road.put_person if held.person else road.put_vehicle
