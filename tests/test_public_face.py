@@ -1,4 +1,4 @@
-"""What ``import odscen`` gives: there, documented, cheap, and used as README shows it."""
+"""What ``import odscen`` gives: there, documented, cheap, and used as the first steps show it."""
 
 from __future__ import annotations
 
@@ -128,8 +128,8 @@ def test_importing_it_loads_nothing_heavy() -> None:
     assert done == ["odscen odscen.base odscen.base.version", ""]
 
 
-def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_example_of_the_first_steps_runs(tmp_path: Path) -> None:
+    text = (ROOT / "docs/first-steps.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     source = next(path for path in odscen.shipped_maps() if path.stem == "roundabout")
     (tmp_path / "Town01.xodr").write_bytes(source.read_bytes())

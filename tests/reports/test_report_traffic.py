@@ -76,8 +76,9 @@ def test_a_junction_has_its_level_delay_and_worst_time():
     rows = cells(section)
     row = next(row for row in rows if row[0] == "j10")
     assert row[:4] == ["j10", "signal", "D", "47.4"]
-    assert row[6] == "360"
-    assert row[8] == "0:30, 90 s"
+    assert row[7] == "360"
+    assert row[4] == "delay on approaches and inside"
+    assert row[9] == "0:30, 90 s"
     assert "r1 &gt; j10 &gt; r2" in str(section)
 
 

@@ -186,10 +186,13 @@ def unseal_files(folder: Path, names: Collection[str]) -> None:
         write_sums(folder, {name: one for name, one in sums.items() if name not in names})
 
 
-def check_files(folder: Path, *, only: Collection[str] | None = None) -> None:
+def check_files(
+    folder: Path, *, only: Collection[str] | None = None, may_miss: Collection[str] = ()
+) -> None:
     """Compare files of a folder with their checksums, all of them or some.
 
     One that has none was written by a process that was killed before it could write that down.
+    Those in ``may_miss`` may have been deleted, as they are made anew.
 
     Raises
     ------
@@ -200,9 +203,10 @@ def check_files(folder: Path, *, only: Collection[str] | None = None) -> None:
     if sums is None:
         say_unchecked(folder)
         return
-    refuse_damaged(
-        folder, {name: one for name, one in sums.items() if only is None or name in only}
-    )
+    asked = {name: known for name, known in sums.items() if only is None or name in only}
+    wrong = damaged_files(folder, asked, may_miss=may_miss)
+    if wrong:
+        raise DamagedError(str(folder), wrong)
 
 
 def seal(data: Mapping[str, Any], *, indent: int | None = None) -> str:

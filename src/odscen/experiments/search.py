@@ -23,6 +23,7 @@ from odscen.base.text_files import write_text
 from odscen.experiments.closeness import criticality
 from odscen.experiments.journal import KeptRuns
 from odscen.experiments.sweeps import (
+    ARCHIVE_FILE,
     CaseRuns,
     SweepSettings,
     begin_folder,
@@ -97,7 +98,7 @@ def pair_coverage(places: FloatArray, *, cells: int = CELLS) -> float:
 FORMAT: Final = "odscen-search"
 VERSION: Final = 1
 _SUMMARIES: Final = f"runs/case-*/{layout.SUMMARY_FILE}"
-SEARCH_FILE, ARCHIVE_FILE = "search.json", "criticals.json"
+SEARCH_FILE: Final = "search.json"
 
 
 @dataclass(frozen=True, slots=True)

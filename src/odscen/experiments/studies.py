@@ -431,7 +431,7 @@ def carry_out_study(
         grid = read_study(out)
         refuse_other_odscen(out)
         if (out / SUMS_FILE).is_file():
-            check_files(out)
+            check_files(out, may_miss=(TABLE_FILE,))
         clear_leftovers(out)
         with StudyJournal(out) as journal:
             if again:

@@ -183,7 +183,7 @@ def begin_folder(
         if file.read_text(encoding="utf-8") != files[name]:
             raise ConflictError(f"{out} holds another {what} ({name} differs); name another folder")
     if there and (out / SUMS_FILE).is_file():
-        check_files(out)
+        check_files(out, may_miss=(TABLE_FILE, PAGE_FILE, ARCHIVE_FILE))
     for name in files.keys() - there.keys():
         write_text(out / name, files[name])
     seal_files(out, files)
@@ -191,6 +191,8 @@ def begin_folder(
 
 TABLE_FILE: Final = "cases.parquet"
 PAGE_FILE: Final = "sweep.html"
+ARCHIVE_FILE: Final = "criticals.json"
+"""Of a search."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

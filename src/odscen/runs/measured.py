@@ -19,6 +19,7 @@ from odscen.figures.by_place.facilities import (
 from odscen.figures.by_place.group_figures import group_sums
 from odscen.figures.by_place.lane_parts import lane_parts, part_sums, parts_on_clock
 from odscen.figures.by_place.lane_places import LanePlaces
+from odscen.figures.by_place.outside_queue import outside_waits, with_outside
 from odscen.figures.by_place.parking_use import ParkingUse
 from odscen.figures.by_place.queue_metres import positions
 from odscen.figures.by_place.queues import queue_lengths
@@ -200,8 +201,8 @@ def _measure_traffic(
         lanes,
         places,
         end=end,
-        queues=None if rows is None else queue_lengths(rows, places, clock),
-        facilities=_measure_facilities(records, parts, places, clock),
+        queues=None if rows is None else queue_lengths(rows, places, clock, since=times.warm_up),
+        facilities=_measure_facilities(records, parts, places, clock, times, end=end),
         times=times,
         clock=clock,
         parts=parts,
@@ -209,7 +210,13 @@ def _measure_traffic(
 
 
 def _measure_facilities(
-    records: _Records, parts: pl.DataFrame, places: LanePlaces, clock: pl.DataFrame
+    records: _Records,
+    parts: pl.DataFrame,
+    places: LanePlaces,
+    clock: pl.DataFrame,
+    times: AnalysisTimes,
+    *,
+    end: float,
 ) -> FacilityData | None:
     """Kinds of facilities, control delay and density; ``None`` without the run's SUMO files."""
     facts, rows = records.facts, records.rows
@@ -217,12 +224,25 @@ def _measure_facilities(
         return None
     movements = movement_facilities(places, facts)
     passed = None if rows is None else vehicle_passages(rows, places, facts)
-    groups = group_of = None
+    groups = group_of = waits = None
     if rows is not None and passed is not None:
+        trips = read_trips(records.run)
+        if trips is not None:
+            waits = outside_waits(facts.drivers, trips, places, facts, end=end)
         programs, states = records.lights
         groups, group_of = group_sums(
-            rows, passed, places, facts, clock, programs=programs, states=states
+            rows,
+            passed,
+            places,
+            facts,
+            clock,
+            programs=programs,
+            states=states,
+            waits=waits,
+            since=times.warm_up,
         )
+        if waits is not None:
+            passed = with_outside(passed, waits)
     by_junction, by_movement = (
         (None, None) if passed is None else passage_sums(passed, movements, clock)
     )

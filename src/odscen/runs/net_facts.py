@@ -163,8 +163,8 @@ def _giving_way(net: NetConnections) -> dict[str, list[str]]:
     return found
 
 
-def _metres(text: str | None) -> float | None:
-    """A place along a lane, if it is a number and not one of SUMO's words."""
+def _number(text: str | None) -> float | None:
+    """A place or a time, if it is a number and not one of SUMO's words."""
     try:
         return None if text is None else float(text)
     except ValueError:
@@ -188,6 +188,7 @@ def _read_drivers(routes: Path) -> pl.DataFrame:
             factor = float(found.get("speedFactor", "1"))
             serves = found.find("stop") is not None
             top = min(speed, desired * factor)
+            route = found.find("route")
             rows.append(
                 (
                     found.get("id"),
@@ -196,7 +197,9 @@ def _read_drivers(routes: Path) -> pl.DataFrame:
                     length,
                     heavy,
                     serves,
-                    _metres(found.get("arrivalPos")),
+                    _number(found.get("arrivalPos")),
+                    _number(found.get("depart")),
+                    None if route is None else route.get("edges"),
                 )
             )
     schema = {
@@ -207,5 +210,7 @@ def _read_drivers(routes: Path) -> pl.DataFrame:
         "heavy": pl.Boolean,
         "serves": pl.Boolean,
         "arrival_pos": pl.Float64,
+        "depart": pl.Float64,
+        "edges": pl.String,
     }
     return pl.DataFrame(rows, schema=schema, orient="row")

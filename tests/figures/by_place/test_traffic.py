@@ -199,6 +199,7 @@ def test_ten_vehicles_have_a_level_and_nine_do_not():
         )
         row = only(traffic_figures(lanes, PLACES, end=60.0).junctions, junction="j2")
         assert (row["delay"], row["level"]) == (pytest.approx(36.0), level)
+        assert row["graded_by"] == "delay on approaches and inside"
 
 
 def test_intervals_without_anybody_are_there_too():
@@ -216,7 +217,9 @@ def test_a_queue_is_who_stands_at_one_time_on_all_ways_to_a_junction():
                                            schema=names, orient="row")])  # fmt: skip
     clock = pl.DataFrame({"begin": [0.0, 20.0], "end": [20.0, 40.0]})
     found = queue_lengths(steps.lazy(), PLACES, clock)
-    assert found.rows() == [("j2", 0.0, 20.0, 1.0, 1.0), ("j2", 20.0, 40.0, 4.0, 3.0)]
+    assert found.rows() == [("j2", 0.0, 20.0, 1.0, 1.0, 3.0), ("j2", 20.0, 40.0, 4.0, 3.0, 3.0)]
+    later = queue_lengths(steps.lazy(), PLACES, clock, since=20.0)
+    assert later["queue_p95_run"].to_list() == [3.0, 3.0]
     assert queue_lengths(steps.lazy().drop("vehicle_lane"), PLACES, clock) is None
 
 
@@ -230,6 +233,7 @@ def test_files_say_the_same_and_their_units(tmp_path):
         table = pl.read_csv(tmp_path / "figures" / f"{name}.csv")
         assert table.height == getattr(figures, name).height
         words = {"segment", "junction", "movement", "control", "facility", "level", "lane_group"}
+        words |= {"graded_by"}
         assert set(table.columns) - words <= set(COLUMN_UNITS)
     data = json.loads(figures_json(RunData(traffic=figures), figures))
     assert data["segments"][0]["co2"] == 5.0

@@ -90,8 +90,8 @@ class NetFacts:
         it gives way to, and its ``turn``: SUMO's letter, mirrored where one drives on the left.
     drivers
         ``id``, ``factor`` on limits, ``max_speed`` (m/s), ``length`` (m), whether a vehicle is
-        ``heavy``, whether it ``serves`` stops, and its ``arrival_pos`` (m along its last lane, null
-        if not known).
+        ``heavy``, whether it ``serves`` stops, its ``arrival_pos`` (m along its last lane), its
+        planned ``depart`` (s) and the ``edges`` of its route; the last three null if not known.
     follows
         ``lane`` and ``following``: lanes, those in junctions included, by which one drives on.
     shapes

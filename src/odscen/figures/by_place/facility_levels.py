@@ -124,6 +124,33 @@ def place_level(*, capacity: bool = False) -> pl.Expr:
     return pl.when(failed).then(pl.lit("F")).otherwise(level)
 
 
+def place_measure() -> pl.Expr:
+    """By what a junction or movement is graded; null where HCM grades none."""
+    import polars as pl
+
+    col = pl.col
+    some = col("facility") == Facility.TWO_WAY_STOP.value
+    control = (
+        pl.when(some).then(pl.lit("control delay of minor movements"))
+        .otherwise(pl.lit("control delay"))
+    )  # fmt: skip
+    known = col("control_delay").is_not_null()
+    ungraded = col("facility").is_in(_UNGRADED).fill_null(value=False)
+    found = pl.when(known).then(control).otherwise(pl.lit("delay on approaches and inside"))
+    return pl.when(~ungraded).then(found)
+
+
+def segment_measure() -> pl.Expr:
+    """By what a segment is graded."""
+    import polars as pl
+
+    highway = pl.col("facility") == Facility.HIGHWAY.value
+    return (
+        pl.when(highway).then(pl.lit("cars per km and lane"))
+        .otherwise(pl.lit("speed over free-flow speed"))
+    )  # fmt: skip
+
+
 def segment_level(free_seconds: pl.Expr) -> pl.Expr:
     """Level of a segment: of highways by density, of others by speed over free-flow speed.
 

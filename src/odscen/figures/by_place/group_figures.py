@@ -12,6 +12,7 @@ from odscen.figures.by_place.capacity import (
 )
 from odscen.figures.by_place.lane_groups import LaneGroups, lane_groups
 from odscen.figures.by_place.level_of_service import FEWEST
+from odscen.figures.by_place.outside_queue import outside_sums, with_outside
 from odscen.figures.by_place.queue_metres import SUMS, WORST, queue_backs, queue_sums, record_step
 from odscen.figures.by_place.unsignalised import unsignalised_sums
 
@@ -24,13 +25,13 @@ if TYPE_CHECKING:
     from odscen.figures.by_place.lane_places import LanePlaces
     from odscen.records.light_programs import LightProgram
 
-GROUP_SUMS = ("demand", "capacity", *SUMS)
+GROUP_SUMS = ("demand", "capacity", "outside_seconds", *SUMS)
 """Columns that sum up over time."""
 GROUP_WORST = WORST
 """Columns of which the highest of all intervals counts."""
 GROUP_FIXED = ("lanes", "storage", "saturation_flow", "headways")
 """Columns that are the same in all intervals."""
-GROUP_RATES = ("vc", "queue_metres", "overflow", "spillback")
+GROUP_RATES = ("vc", "outside", "queue_metres", "overflow", "spillback")
 """Columns that are quotients of the sums."""
 LEAST_PERIOD = 300.0
 """Seconds from which an interval has v/c: in less there may be one green, or none."""
@@ -57,6 +58,8 @@ def group_sums(
     *,
     programs: Sequence[LightProgram] = (),
     states: pl.DataFrame | None = None,
+    waits: pl.DataFrame | None = None,
+    since: float = 0.0,
 ) -> tuple[pl.DataFrame, pl.DataFrame]:
     """Sums of lane groups by interval, and the lane group of each movement.
 
@@ -70,6 +73,11 @@ def group_sums(
         ``begin`` and ``end`` of each interval, s.
     programs, states
         Of the traffic lights, and what they showed; without them there is no capacity at lights.
+    waits
+        Who waited outside, from :func:`odscen.figures.by_place.outside_queue.outside_waits`;
+        ``None`` if that is not known.
+    since
+        Seconds from which the run is analysed.
 
     Returns
     -------
@@ -79,12 +87,13 @@ def group_sums(
     import polars as pl
 
     groups = lane_groups(places, facts)
-    demand = demand_sums(passed, groups, clock)
+    wanted = passed if waits is None else with_outside(passed, waits)
+    demand = demand_sums(wanted, groups, clock)
     step = record_step(trajectories)
     backs = queue_backs(trajectories, groups, facts, period=step)
     parts = [demand]
     if backs is not None:
-        parts.append(queue_sums(backs, groups, clock, step=step))
+        parts.append(queue_sums(backs, groups, clock, step=step, since=since))
     capacity = unsignalised_sums(passed, groups, places, facts, clock)
     if states is not None:
         greens = shown_greens(programs, states, clock, facts)
@@ -92,12 +101,18 @@ def group_sums(
             [_capacity_of_groups(passed, groups, facts, greens), capacity], how="diagonal_relaxed"
         )
     parts.append(capacity)
+    if waits is not None:
+        parts.append(outside_sums(waits, groups.ways, clock))
     seen = pl.concat([part.select("lane_group") for part in parts[:2]]).unique()
     table = groups.groups.join(seen, on="lane_group", how="semi").join(clock, how="cross")
     for part in parts:
         table = table.join(part, on=("lane_group", "begin"), how="left")
     table = pl.concat([no_groups(), table.drop("room")], how="diagonal_relaxed")
-    zero = ["demand", *((*SUMS, *WORST) if backs is not None else ())]
+    zero = [
+        "demand",
+        *(() if waits is None else ("outside_seconds",)),
+        *((*SUMS, *WORST) if backs is not None else ()),
+    ]
     flow = pl.col("saturation_flow", "headways").max().over("lane_group")
     table = table.with_columns(pl.col(zero).fill_null(0), flow)
     return (
@@ -116,7 +131,7 @@ def _capacity_of_groups(
 
 
 def group_rates() -> list[pl.Expr]:
-    """What is a quotient of the sums: ``vc``, ``queue_metres``, ``overflow``, ``spillback``."""
+    """What is a quotient of the sums, as in :data:`GROUP_RATES`."""
     import polars as pl
 
     col = pl.col
@@ -124,6 +139,7 @@ def group_rates() -> list[pl.Expr]:
     enough = (col("capacity") > 0.0) & (seconds >= LEAST_PERIOD)
     return [
         pl.when(enough).then(col("demand") / col("capacity")).alias("vc"),
+        (col("outside_seconds") / seconds).alias("outside"),
         (col("queue_metre_seconds") / seconds).alias("queue_metres"),
         (col("overflow_seconds") / seconds).alias("overflow"),
         (col("spillback_seconds") / seconds).alias("spillback"),

@@ -13,6 +13,7 @@ the one that their lane leads to.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -89,8 +90,8 @@ _PASSES = 3
 
 SUMS = ("queue_metre_seconds", "overflow_seconds", "spillback_seconds")
 """Columns that sum up over time."""
-WORST = ("queue_metres_p95", "queue_metres_max")
-"""Columns of which the highest counts over time."""
+WORST = ("queue_metres_p95", "queue_metres_max", "queue_metres_p95_run")
+"""Columns of which the highest counts over time; the last is the same in all intervals."""
 
 
 def queue_backs(
@@ -355,7 +356,12 @@ def _find_queued(
 
 
 def queue_sums(
-    backs: pl.DataFrame, groups: LaneGroups, clock: pl.DataFrame, *, step: float
+    backs: pl.DataFrame,
+    groups: LaneGroups,
+    clock: pl.DataFrame,
+    *,
+    step: float,
+    since: float = 0.0,
 ) -> pl.DataFrame:
     """Queues of lane groups by interval.
 
@@ -367,17 +373,31 @@ def queue_sums(
         ``begin`` and ``end`` of each interval.
     step
         Seconds between two records.
+    since
+        Seconds from which the run is analysed.
 
     Returns
     -------
     ``lane_group``, ``begin``, ``queue_metre_seconds``, ``overflow_seconds`` (the queue was longer
     than the lanes of the group), ``spillback_seconds`` (it reached the junction behind),
-    ``queue_metres_p95`` and ``queue_metres_max``; without intervals without a queue.
+    ``queue_metres_p95`` and ``queue_metres_max``, and ``queue_metres_p95_run``, that of all that is
+    analysed; without intervals without a queue.
     """
     import polars as pl
 
     col = pl.col
     rank = ((col("end") - col("begin")).first() / step * _SHARE).floor().cast(pl.Int64)
+    ordered = col("metres").sort(descending=True)
+    moments = max(float(clock["end"][-1]) - since, 0.0) / step
+    run = (
+        backs.filter(col("time") >= since)
+        .group_by("lane_group")
+        .agg(
+            queue_metres_p95_run=ordered.get(
+                math.floor(moments * _SHARE), null_on_oob=True
+            ).fill_null(0.0)
+        )
+    )
     return (
         backs.sort("time")
         .join_asof(clock.sort("begin"), left_on="time", right_on="begin", coalesce=False)
@@ -389,9 +409,10 @@ def queue_sums(
             queue_metre_seconds=col("metres").sum() * step,
             overflow_seconds=(col("metres") > col("storage")).sum() * step,
             spillback_seconds=(col("metres") > col("room") - SPACE).sum() * step,
-            queue_metres_p95=col("metres").sort(descending=True).get(rank, null_on_oob=True)
-            .fill_null(0.0),
+            queue_metres_p95=ordered.get(rank, null_on_oob=True).fill_null(0.0),
             queue_metres_max=col("metres").max(),
         )
+        .join(run, on="lane_group", how="left")
+        .with_columns(col("queue_metres_p95_run").fill_null(0.0))
         .sort("lane_group", "begin")
     )  # fmt: skip

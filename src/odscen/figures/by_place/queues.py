@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from odscen.figures.by_place.traffic_sums import INTERVAL
@@ -19,7 +20,7 @@ _NEEDED = ("timestep_time", "vehicle_lane", "vehicle_speed")
 
 
 def queue_lengths(
-    trajectories: pl.LazyFrame, places: LanePlaces, clock: pl.DataFrame
+    trajectories: pl.LazyFrame, places: LanePlaces, clock: pl.DataFrame, *, since: float = 0.0
 ) -> pl.DataFrame | None:
     """Greatest queue, and that which 95 % of the moments do not exceed; junction and interval.
 
@@ -33,10 +34,13 @@ def queue_lengths(
     clock
         ``begin`` and ``end`` of each interval, from
         :func:`odscen.figures.by_place.traffic_sums.intervals`.
+    since
+        Seconds from which the run is analysed.
 
     Returns
     -------
-    ``None`` if lane or speed were not recorded.
+    ``junction``, ``begin``, ``end``, ``queue_max``, ``queue_p95``, and ``queue_p95_run``: that of
+    all moments that are analysed. ``None`` if lane or speed were not recorded.
     """
     import polars as pl
 
@@ -68,6 +72,14 @@ def queue_lengths(
     # Moments without a queue have no row: the rank is counted from the longest.
     rank = (pl.col("moments").first() * _SHARE).floor().cast(pl.Int64)
     ordered = pl.col("queue").sort(descending=True)
+    analysed = pl.col("begin") >= since - 1e-6
+    number = int(moments.filter(analysed).select(pl.len()).collect().item())
+    of_run = ordered.get(math.floor(number * _SHARE), null_on_oob=True)
+    run = (
+        standing.filter(analysed)
+        .group_by("junction")
+        .agg(queue_p95_run=of_run.fill_null(0).cast(pl.Float64))
+    )
     return (
         standing.join(in_interval, on="begin")
         .group_by("junction", *INTERVAL)
@@ -75,6 +87,8 @@ def queue_lengths(
             queue_max=pl.col("queue").max().cast(pl.Float64),
             queue_p95=ordered.get(rank, null_on_oob=True).fill_null(0).cast(pl.Float64),
         )
+        .join(run, on="junction", how="left")
+        .with_columns(pl.col("queue_p95_run").fill_null(0.0))
         .sort("junction", "begin")
         .collect(engine="streaming")
     )

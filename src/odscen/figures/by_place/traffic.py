@@ -48,7 +48,9 @@ from odscen.figures.by_place.analysis_times import WHOLE_RUN, AnalysisTimes, on_
 from odscen.figures.by_place.facility_levels import (
     CONTROL,
     place_level,
+    place_measure,
     segment_level,
+    segment_measure,
     with_control,
     with_density,
 )
@@ -83,7 +85,9 @@ TableName = Literal["network", "segments", "junctions", "movements", "lane_group
 TABLES: tuple[TableName, ...] = get_args(TableName)
 
 _KEYS = ("segment", "movement", "lane_group", "junction", "control", "facility")
-_QUEUES = ("queue_max", "queue_p95")
+_QUEUES = ("queue_max", "queue_p95", "queue_p95_run")
+_OF_RUN = {"queue_p95": "queue_p95_run", "queue_metres_p95": "queue_metres_p95_run"}
+"""Columns that have another over all of what is analysed, and not the highest of the intervals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +110,9 @@ class TrafficFigures:
     - ``length``: km, ``L`` of the definitions above.
     - ``seconds``, ``time_loss``, ``standing_seconds`` (vehicle-seconds), ``distance`` (m): what
       the others are made of.
+
+    Of segments, junctions and movements, ``level`` and ``graded_by``: the figure that its bounds
+    are of (null where HCM grades none).
 
     Attributes
     ----------
@@ -227,7 +234,11 @@ def _over_run(columns: tuple[str, ...]) -> tuple[list[str], list[pl.Expr]]:
         pl.when(pl.col(name).count() > 0).then(pl.col(name).sum()).alias(name) for name in sums
     ]
     greatest = ("length", *_QUEUES, *GROUP_WORST, *GROUP_FIXED, "lane_metres")
-    highest = [pl.col(name).max() for name in greatest if name in columns]
+    highest = [
+        pl.col(_OF_RUN[name] if _OF_RUN.get(name) in columns else name).max().alias(name)
+        for name in greatest
+        if name in columns
+    ]
     return keys, [pl.col("begin").min(), pl.col("end").max(), *added, *highest]
 
 
@@ -276,6 +287,7 @@ def _rate_columns(columns: tuple[str, ...]) -> tuple[list[pl.Expr], list[pl.Expr
             more["level"] = place_level(capacity=True)
         else:
             more = {"level": place_level(), "throughput": col("vehicles")}
+        more["graded_by"] = place_measure()
     elif "segment" in columns:
         metres = col("length") * 1000.0
         free_seconds = col("seconds") - col("time_loss")
@@ -285,6 +297,7 @@ def _rate_columns(columns: tuple[str, ...]) -> tuple[list[pl.Expr], list[pl.Expr
         rates["lane_density"] = col("car_seconds") / 3.6 / hours / col("lane_metres")
         rates["spread"] = pl.when(col("seconds") > 0).then(col(SPREAD) / col("seconds"))
         more["level"] = segment_level(free_seconds)
+        more["graded_by"] = segment_measure()
     else:
         rates["running"] = col("seconds") / seconds
     first = (*(key for key in _KEYS if key in columns), *INTERVAL)

@@ -25,8 +25,9 @@ COLUMNS = (
     _make_column(
         "control_delay",
         "s",
-        "control delay per vehicle that entered, from trajectories: slowing down, queue and "
-        "getting up to speed. Junction at a two-way stop: of the minor movements",
+        "control delay per vehicle that entered or wanted to, from trajectories: waiting outside "
+        "for room to depart, slowing down, queue and getting up to speed. Junction at a two-way "
+        "stop: of the minor movements",
     ),
     _make_column("passages", "veh", "vehicles that `control_delay` is the mean of", whole=True),
     _make_column("control_seconds", "veh*s", f"their control delay; {_SUM}"),
@@ -77,14 +78,16 @@ COLUMNS = (
     _make_column(
         "queue_p95",
         "veh",
-        "95th percentile queue: what it does not exceed 95 % of the time. Over the run: of the "
-        "worst interval",
+        "95th percentile queue: what it does not exceed 95 % of the time, of the interval or of "
+        "all that is analysed",
     ),
+    _make_column("queue_p95_run", "veh", "that of all that is analysed, in each row"),
     _make_column(
         "demand",
         "veh",
         "lane group (movement: of its lane group): would have come to the stop line in the "
-        "interval without control delay, from trajectories; those still queued at the end too",
+        "interval without control delay, from trajectories; those still queued at the end too, "
+        "and who waited outside for room to depart",
         whole=True,
     ),
     _make_column(
@@ -104,7 +107,15 @@ COLUMNS = (
     _make_column(
         "queue_metres_p95", "m", "what it does not exceed 95 % of the time, as `queue_p95`"
     ),
+    _make_column("queue_metres_p95_run", "m", "that of all that is analysed, in each row"),
     _make_column("queue_metres_max", "m", "its maximum"),
+    _make_column(
+        "outside",
+        "veh",
+        "lane group: mean number that waited outside for room to depart, and go through it first; "
+        "movement: of its lane group",
+    ),
+    _make_column("outside_seconds", "veh*s", f"their time there; {_SUM}"),
     _make_column(
         "overflow", "", "share of the time in which the queue is longer than its lanes (`storage`)"
     ),
