@@ -34,6 +34,7 @@ ALL = (
     "long_run",
     "live_view",
     "server_load",
+    "sizes",
     "carla_mirror",
     "canvas",
     "in_browser",

@@ -48,6 +48,10 @@ def test_seeds_are_a_count_a_list_or_a_range(given: Any, seeds: tuple[int, ...])
         ({"only_variants": True}, "there must be one"),
         ({"samples": 3}, "nothing is varied"),
         ({"vary": [{"parameter": "gap", "from": 1, "to": 2}]}, "number of steps"),
+        (
+            {"vary": [{"parameter": "gap", "from": 1, "to": 2, "steps": 3e7}]},
+            "gap has 30,000,000 values",
+        ),
         ({"run": {"meso": True, "criticality": True}}, "cannot be measured in meso"),
         ({"keep": "some"}, "keep"),
     ],
@@ -92,6 +96,10 @@ def test_scenarios_are_sampled_on_each_map_that_matches(tmp_path: Path) -> None:
         ({"vary": [{"parameter": "gap", "values": [1]}]}, "no parameter 'gap'; it has per_minute"),
         ({"scenarios": ["crossing*", "crossing.scenario.json"]}, "are called 'crossing'"),
         ({"seeds": "1-1000000", "variant": [WARM]}, "2,000,000 runs; at most 1,000,000"),
+        (
+            {"scenarios": [], "sample": [{"maps": ["*"], "count": 10**6}] * 9},
+            r"runs; at most 1,000,000 .*scenarios: [0-9]*,000,000, variants: 1",
+        ),
     ],
 )
 def test_what_cannot_be_found_is_refused(tmp_path: Path, parts: dict[str, Any], words: str) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from odscen.base.errors import OpenDriveError
-from odscen.base.ids import JunctionId, RoadId
+from odscen.base.ids import JunctionId, LaneKey, RoadId
 from odscen.convert.building.network import build_network
 from odscen.convert.model.conversion_report import ElementOutcome, parser_entries
 from odscen.lanegraph.build_graphs import build_map_graph
@@ -14,6 +14,7 @@ from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import crosswalks
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import OpenDrive
+from odscen.opendrive.topology import lane_successors
 from tests.opendrive.snippets import LANES, LINE, document, lane, road, section
 
 LINK = '<{} elementType="road" elementId="{}" contactPoint="{}"/>'
@@ -322,3 +323,40 @@ def test_traffic_rules_are_read_in_any_case() -> None:
 def test_a_plain_file_has_no_notes() -> None:
     assert parse(document(*chain(100.0, 100.0))).notes == ()
     assert LINE in document(road())
+
+
+@pytest.mark.parametrize("stated", ["both", "behind", "before"])
+def test_a_lane_link_that_one_side_states_is_kept_and_reported(stated: str) -> None:
+    first, last = chain(100.0, 100.0)
+    if stated == "behind":
+        first = first.replace('<successor id="-1"/>', "").replace('<successor id="1"/>', "")
+    if stated == "before":
+        last = last.replace('<predecessor id="-1"/>', "").replace('<predecessor id="1"/>', "")
+    odr = parse(document(first, last))
+    table = RoadTable.of(odr)
+    graph = build_map_graph(odr, name="m", sha256="0", table=table)
+    network = build_network(odr, table, graph.walks)
+    assert network.report.figures["connections"] == 2.0
+    told = [
+        entry.element for entry in network.report.entries if "alone states the link" in entry.reason
+    ]
+    assert (
+        told
+        == {
+            "both": [],
+            "behind": ["road 1 > laneSection 0 > lane -1"],
+            "before": ["road 2 > laneSection 0 > lane 1"],
+        }[stated]
+    )
+
+
+def test_a_lane_that_names_another_follower_is_taken_at_its_word() -> None:
+    wide = section(lane(-1, inside='<link><predecessor id="-1"/></link>'), lane(-2), s=50)
+    split = wide.replace(
+        'id="-2" type="driving" >', 'id="-2" type="driving" ><link><predecessor id="-1"/></link>'
+    )
+    odr = parse(
+        document(road(lanes=section(lane(-1, inside='<link><successor id="-1"/></link>')) + split))
+    )
+    keys = lane_successors(odr)
+    assert [one.lane for one in keys[LaneKey(RoadId("1"), 0, -1)]] == [-1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -11,8 +12,14 @@ from starlette.testclient import TestClient
 from odscen.app.demand import demands
 from odscen.app.maps import load_map
 from odscen.maps.store import Workspace
+from odscen.scenario import edits
+from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.demand.count_stations import place_points
 from odscen.scenario.document.json_form import loads
+from odscen.scenario.document.problems import Problem
+from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.edits import demand_edits
+from odscen.scenario.placing.region import Region
 from tests.web.conftest import CROSSING, finished, job, wait_for
 
 
@@ -68,6 +75,11 @@ def test_tables_are_read_in_and_taken_back(client: TestClient, state: dict[str, 
             ["line 2, column 'place'", "line 3, column 'place'", "line 4: the slice"],
         ),
         ("zones", "zone,segment\nin,r1\nout,r7\n", ["line 3, column 'segment'"]),
+        (
+            "inputs",
+            "segment,0,900\nr1,1,2\nr9,1,2\nr8,1,2\n",
+            ["line 3: the map has no segment 'r9'", "line 4: the map has no segment 'r8'"],
+        ),
         ("profile", "share\n0\n0\n", ["at least one share must be above 0"]),
         ("od", "from,to,trips\nr1,r2,-3\n", ["line 2: trips must be a number from 0 on"]),
         ("od", "from,to,trips\nr1,r2,3\n".encode("utf-16"), ["not a text file in UTF-8"]),
@@ -84,6 +96,33 @@ def test_a_wrong_table_is_refused_by_line_and_column_and_changes_nothing(
     for words in told:
         assert words in said
     assert client.get("/api/scenarios/mine").json() == state
+
+
+@pytest.mark.parametrize(
+    ("kind", "head", "row"),
+    [
+        ("inputs", "segment,0,900", "r1,1,2"),
+        ("zones", "zone,segment", "z{n},r1"),
+        ("od", "from,to,trips,begin,end", "r1,r2,1,{n},1000"),
+    ],
+)
+def test_a_table_of_many_rows_is_checked_once(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, kind: str, head: str, row: str
+) -> None:
+    checks: list[int] = []
+
+    def counted(scenario: Scenario, region: Region) -> Iterator[Problem]:
+        checks.append(len(scenario.demand.inputs))
+        return demand_problems(scenario, region)
+
+    monkeypatch.setattr(demand_edits, "demand_problems", counted)
+    loaded = load_map(workspace.map(CROSSING))
+    empty = edits.new_scenario(loaded.sumo.graph, name="t", roi=("j10001", "r1", "r2", "r3", "r4"))
+    rows = [row.format(n=n) for n in range(200)]
+    made = demands.import_text(loaded, empty, "\n".join([head, *rows]), kind=kind)
+    parts = {"inputs": made.demand.inputs, "zones": made.demand.zones, "od": made.demand.matrices}
+    assert len(parts[kind]) == 200
+    assert len(checks) == 1
 
 
 @pytest.mark.slow

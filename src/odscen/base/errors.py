@@ -27,8 +27,13 @@ import difflib
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from odscen.base.shown import shown
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+
+_LONGEST_NAME, _MOST_NAMES = 200, 5000
+"""Beyond these no close names are looked for: each of those known is held against the name."""
 
 
 class ReportedRow(Protocol):
@@ -112,7 +117,8 @@ class NotFoundError(InputError):
     def __init__(self, what: str, name: str, known: Sequence[str]) -> None:
         self.what = what
         self.name = name
-        close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+        near = known if len(name) <= _LONGEST_NAME and len(known) <= _MOST_NAMES else ()
+        close = difflib.get_close_matches(name, near, n=3, cutoff=0.5)
         if close:
             hint = f"; did you mean {', '.join(close)}?"
         elif known:
@@ -120,7 +126,7 @@ class NotFoundError(InputError):
             hint = f"; known are {listed}{', ...' if len(known) > 8 else ''}"
         else:
             hint = f"; there is no {what} yet"
-        super().__init__(f"no {what} named {name!r}{hint}")
+        super().__init__(f"no {what} named {shown(name)}{hint}")
 
 
 class NoMapError(InputError):

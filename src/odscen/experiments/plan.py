@@ -317,13 +317,21 @@ def grid_of(plan: StudyPlan, sources: Mapping[str, ScenarioSource]) -> StudyGrid
         If there are too many.
     """
     sweep = plan.sweep()
-    grid = StudyGrid(plan, sources, () if sweep is None else sweep.cases())
-    if grid.count > MOST_RUNS:
+    cases = () if sweep is None else sweep.cases()
+    _refuse_too_many(plan, scenarios=len(sources), cases=max(len(cases), 1))
+    return StudyGrid(plan, sources, cases)
+
+
+def _refuse_too_many(plan: StudyPlan, *, scenarios: int, cases: int) -> None:
+    """Raise :class:`InputError` if a study has more runs than may be, and say of what."""
+    variants, seeds = len(plan.variant_names), len(plan.seeds)
+    number = scenarios * variants * cases * seeds
+    if number > MOST_RUNS:
         raise InputError(
-            f"the study has {grid.count:,} runs; at most {MOST_RUNS:,} are possible: "
-            "divide it, for example by maps"
+            f"the study has {number:,} runs; at most {MOST_RUNS:,} are possible: "
+            f"divide it, for example by maps (scenarios: {scenarios:,}, variants: {variants:,}, "
+            f"cases: {cases:,}, seeds: {seeds:,})"
         )
-    return grid
 
 
 def found_sources(
@@ -389,6 +397,9 @@ def refuse_unknown_parameters(
 
 
 def _sampled_sources(plan: StudyPlan, workspace: Workspace) -> Iterator[ScenarioSource]:
+    # Counted before any is made: each sample may be a million on each of many maps.
+    number = sum(sample.count * len(_match_maps(sample, workspace)) for sample in plan.sample)
+    _refuse_too_many(plan, scenarios=number, cases=1)
     for scenarios in plan.sample:
         settings = _sampling_settings(scenarios)
         config = settings.sampling.model_dump(mode="json")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from odscen.opendrive.sign_catalogue import sign_meaning
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -249,11 +251,9 @@ def _long_side(polygon: FloatArray) -> FloatArray:
     return side
 
 
-# Types of the "OpenDRIVE" catalogue for lights, of the German StVO (the standard's and CARLA's
-# choice) and of the US MUTCD for signs, of Sweden for speed limits.
-_KINDS: Final[dict[str, SignalKind]] = {
-    "1000001": "traffic_light",
-    "1000002": "pedestrian_light",
+# Codes that files write whatever country they name: of the StVO (the choice of the standard and of
+# CARLA), and of Sweden for speed limits.
+_ANYWHERE: Final[dict[str, SignalKind]] = {
     "206": "stop",
     "r1-1": "stop",
     "205": "yield",
@@ -262,6 +262,13 @@ _KINDS: Final[dict[str, SignalKind]] = {
     "274.1": "speed_limit",
     "r2-1": "speed_limit",
     "c31": "speed_limit",
+}
+_KIND_OF_MEANING: Final[dict[str, SignalKind]] = {
+    "traffic_light": "traffic_light",
+    "pedestrian_light": "pedestrian_light",
+    "stop": "stop",
+    "yield": "yield",
+    "speed_limit": "speed_limit",
 }
 _NAMES: Final[tuple[tuple[str, SignalKind], ...]] = (
     (r"pedestrian.*(light|signal)|(light|signal).*pedestrian", "pedestrian_light"),
@@ -285,12 +292,16 @@ _WORDS: Final[tuple[tuple[str, SignalKind], ...]] = (
 def signal_kind(signal: Signal) -> SignalKind:
     """What a signal means for traffic: by its type, or by its name where there is no type.
 
-    A type is a number of a catalogue, or a word: ``traffic_light``, ``give_way``, ``stop``.
+    A type is a number of the catalogue of its country
+    (:mod:`odscen.opendrive.sign_catalogue`), or a word: ``traffic_light``, ``give_way``, ``stop``.
     """
+    meaning = sign_meaning(signal)
+    if meaning is not None:
+        return _KIND_OF_MEANING.get(meaning, "other")
     code = signal.type.lower()
     if code.startswith("1.000."):  # as the tables of 1.4 print them
         code = code.replace(".", "")
-    kind = _KINDS.get(code) or _KINDS.get(f"{code}{signal.subtype.lower()}")
+    kind = _ANYWHERE.get(code) or _ANYWHERE.get(f"{code}{signal.subtype.lower()}")
     if kind is not None:
         return kind
     if signal.dynamic and code.startswith("10000"):

@@ -50,6 +50,8 @@ def lane_successors(odr: OpenDrive) -> dict[LaneKey, tuple[LaneKey, ...]]:
     for road in odr.roads.values():
         for here, there in _within_and_beyond(road, odr):
             found[here].add(there)
+    for here, there in one_sided_links(odr):
+        found[here].add(there)
     for junction in odr.junctions.values():
         for connection in junction.connections:
             for here, there in _through_connection(junction, connection, odr):
@@ -78,6 +80,33 @@ def _within_and_beyond(road: Road, odr: OpenDrive) -> Iterator[tuple[LaneKey, La
             for lane_id in ids:
                 if _lane_enters(target, target_section, lane_id, contact):
                     yield here, LaneKey(target.id, target_section, lane_id)
+
+
+def one_sided_links(odr: OpenDrive) -> Iterator[tuple[LaneKey, LaneKey]]:
+    """Relations, outside junctions' tables, that only the lane behind states.
+
+    The lane before it names no lane there at all: one that names others is taken at its word.
+    """
+    for road in odr.roads.values():
+        for number, section in enumerate(road.sections):
+            for lane in section.lanes.values():
+                if not lane.id:
+                    continue
+                forward = is_forward(road, lane)
+                ids = lane.predecessors if forward else lane.successors
+                place = _following_place(road, number, odr, forward=not forward) if ids else None
+                if place is None:
+                    continue
+                source, source_section, contact = place
+                for lane_id in ids:
+                    before = _lane_of_section(source, source_section, lane_id)
+                    if before is None or is_forward(source, before) == (contact == "start"):
+                        continue
+                    own = before.successors if contact == "end" else before.predecessors
+                    back = _following_place(source, source_section, odr, forward=contact == "end")
+                    if not own and back is not None and back[0] is road and back[1] == number:
+                        here = LaneKey(source.id, source_section, lane_id)
+                        yield here, LaneKey(road.id, number, lane.id)
 
 
 def _following_place(

@@ -4,7 +4,9 @@ import gzip
 
 import pytest
 
+from odscen.base.errors import OpenDriveError
 from odscen.maps.importers.file_kinds import file_kind, root_element
+from odscen.maps.importers.opendrive import OpenDriveImporter
 
 
 @pytest.mark.parametrize(
@@ -23,7 +25,7 @@ from odscen.maps.importers.file_kinds import file_kind, root_element
             "odscen maps importers",
         ),
         (b"<!-- generated on ... -->\n<net/>", "a.net.xml", "a SUMO network", "--sumo-net-file"),
-        (b'<commonRoad commonRoadVersion="2020a"/>', "a.xml", "a CommonRoad scenario", "convert"),
+        (b'<commonRoad commonRoadVersion="2020a"/>', "a.xml", "a CommonRoad scenario", "export"),
         (b"\xef\xbb\xbf<OpenSCENARIO/>", "a.xosc", "an OpenSCENARIO file", "odscen import"),
         (b"<kml:kml/>", "a.kml", "XML with the root element <kml>", "convert"),
         (b'{"type": "FeatureCollection"}', "a.json", "GeoJSON", "convert"),
@@ -56,3 +58,27 @@ def test_the_root_element_is_found_behind_what_may_come_before_it(content: bytes
 def test_what_is_no_xml_has_no_root_element() -> None:
     assert root_element(b"1 < 2") is None
     assert root_element(b"") is None
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b'<?xml version="1.0"?><osm version="0.6"/>', "OpenStreetMap, not OpenDRIVE: netconvert"),
+        (b"<net/>", "a SUMO network, not OpenDRIVE: netconvert makes OpenDRIVE of it"),
+        (b"<commonRoad/>", "a CommonRoad scenario, not OpenDRIVE: export its map as OpenDRIVE"),
+        (b"\x0a\x12binary\x00\x01", "binary data, not OpenDRIVE: convert it"),
+    ],
+)
+def test_a_file_of_another_format_named_xodr_is_refused_with_what_to_do(
+    content: bytes, message: str
+) -> None:
+    with pytest.raises(OpenDriveError) as caught:
+        OpenDriveImporter().to_opendrive(content, {})
+    assert str(caught.value).startswith(f"this is {message}")
+
+
+@pytest.mark.parametrize(
+    "content", [b"<OpenDRIVE>", b"<x><OpenDRIVE/></x>", b"nothing", b"", b"<opendrive/>"]
+)
+def test_a_damaged_file_is_left_to_the_parser_which_names_the_place(content: bytes) -> None:
+    assert OpenDriveImporter().to_opendrive(content, {}).xodr == content

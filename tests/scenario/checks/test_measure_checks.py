@@ -89,3 +89,27 @@ def test_two_outages_of_one_light_at_the_same_time_are_refused() -> None:
     )
     found = [p.where for p in check(one, GRAPH, lights=(light,)) if p.code == "light_twice"]
     assert found == ["measures[1].junction", "measures[2].junction"]
+
+
+def test_outages_of_one_light_that_overlap_are_listed_in_pairs_and_very_many_are_counted() -> None:
+    def pairs(*times: tuple[float, float | None]) -> list[Problem]:
+        measures = [
+            {"id": f"m{n}", "kind": "signal_outage", "junction": "9", "begin": begin, "end": end}
+            for n, (begin, end) in enumerate(times)
+        ]
+        one = Scenario.model_validate(
+            {"name": "test", "map": MapReference(name="toy", sha256=SHA256), "roi": WHOLE}
+            | {"measures": measures, "simulation": {"duration": 1e6}}
+        )
+        found = check(one, GRAPH, lights=[Light(("9",), (10.0,))])
+        return [problem for problem in found if problem.code == "light_twice"]
+
+    assert [(one.where, one.message[:13]) for one in pairs((5, 9), (0, 5), (8, None), (0, 6))] == [
+        ("measures[2].junction", "'m2' and 'm0'"),
+        ("measures[3].junction", "'m3' and 'm0'"),
+        ("measures[3].junction", "'m3' and 'm1'"),
+    ]
+    assert pairs(*((float(n), n + 1.0) for n in range(3000))) == []
+    found = pairs(*((float(n), None) for n in range(3000)))
+    assert len(found) == 201
+    assert found[-1].message == f"and {3000 * 2999 // 2 - 200:,} more of this kind"

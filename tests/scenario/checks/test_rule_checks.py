@@ -97,6 +97,33 @@ def test_two_rules_that_may_want_one_actor_at_once_are_warned_of() -> None:
     assert found(rule(), rule(id="s", then=[{"brake": {"by": 4}}])) == []
 
 
+def test_of_very_many_rules_that_move_one_actor_some_pairs_are_listed_and_all_counted() -> None:
+    rules = [rule(id=f"r{n}", when={"time": {"after": float(n)}}) for n in range(1000)]
+    clashes = [one for one in problems(VAN, rules=rules) if one.code == "rules_at_once"]
+    assert len(clashes) == 201
+    assert [one.message[:22] for one in clashes[:2]] == [
+        "rules 'r0' and 'r1' bo",
+        "rules 'r0' and 'r2' bo",
+    ]
+    assert (clashes[-1].where, clashes[-1].message) == ("rules", "and 499,300 more of this kind")
+
+
+def test_rules_that_wait_or_move_otherwise_are_no_pairs_of_those_that_are_counted() -> None:
+    speeds = [rule(id=f"s{n}", then=[{"brake": {"by": 4}}]) for n in range(25)]
+    lanes = [rule(id=f"l{n}") for n in range(5)]
+    both = [rule(id="both", then=[{"brake": {"by": 4}}, {"lane": {"by": 1}}])]
+    waits = [rule(id="waits", when={"all": [{"rule": {"id": f"s{n}"}} for n in range(24)]},
+                  then=[{"brake": {"by": 4}}])]  # fmt: skip
+    clashes = [
+        one
+        for one in problems(VAN, rules=[*speeds, *lanes, *both, *waits])
+        if one.code == "rules_at_once"
+    ]
+    # 25 speeds, 5 lanes, one rule with each of those, and one that waits for all but one of them.
+    pairs = 25 * 24 // 2 + 5 * 4 // 2 + 25 + 5 + 2
+    assert clashes[-1].message == f"and {pairs - 200} more of this kind"
+
+
 def test_an_id_that_another_rule_has_is_refused() -> None:
     assert ("error", "duplicate_id", "rules[1].id") in found(rule(), rule())
 

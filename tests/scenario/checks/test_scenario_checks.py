@@ -3,10 +3,13 @@ from typing import Any, ClassVar
 
 import pytest
 
+from odscen.base.arrays import BoolArray
 from odscen.base.categories import Body, Category
+from odscen.base.errors import ScenarioError
 from odscen.lanegraph.graphs import MapGraph
-from odscen.scenario.checks.scenario_checks import check
-from odscen.scenario.document.problems import Problem
+from odscen.lanegraph.shortest_paths import Router
+from odscen.scenario.checks.scenario_checks import check, every_problem
+from odscen.scenario.document.problems import Problem, refuse_errors
 from odscen.scenario.document.scenario_document import (
     Actor,
     Environment,
@@ -273,3 +276,38 @@ def test_a_wrong_number_of_greens_is_answered_with_those_of_the_program() -> Non
     assert problem.severity == "warning", "scenarios of before the network changed still run"
     assert "2 stages, but green has 1 times; they are not used" in problem.message
     assert "give one for each (the map's are 30, 7)" in problem.message
+
+
+def test_of_very_many_problems_of_one_kind_the_first_thousand_are_listed_and_all_counted() -> None:
+    lost = [actor("9.9.9.9", id=f"a{n}") for n in range(1500)]
+    found = [one for one in problems(*lost) if one.code == "unknown_spawn"]
+    assert len(found) == 1001
+    assert (found[-1].severity, found[-1].where) == ("error", "actors")
+    assert found[-1].message == "and 500 more of this kind"
+    with pytest.raises(ScenarioError) as refused:
+        refuse_errors(every_problem(scenario(*lost), GRAPH))
+    # All of them, and one that they start on the same node.
+    assert refused.value.problem == "the scenario has 1501 errors"
+    assert refused.value.problems[-1] == "actors: and 500 more of this kind"
+
+
+def test_inputs_to_zones_look_for_entries_and_zones_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    searches: list[int] = []
+    search = Router.reachable
+
+    def counted(router: Router, node: int) -> BoolArray:
+        searches.append(node)
+        return search(router, node)
+
+    monkeypatch.setattr(Router, "reachable", counted)
+    number = 300
+    demand = {
+        "zones": [{"id": f"z{n}", "segments": ["r2"]} for n in range(number)],
+        "inputs": [
+            {"id": f"i{n}", "segment": "r1", "direction": "forward", "per_hour": 1.0}
+            | {"to": ((f"z{n}", 1.0),)}
+            for n in range(number)
+        ],
+    }
+    assert codes(demand=demand) == []
+    assert len(searches) == 1

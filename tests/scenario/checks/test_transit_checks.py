@@ -96,3 +96,14 @@ def test_a_line_shares_its_names_with_other_road_users() -> None:
         edits.set_line(
             taken, GRAPH, line="7", start="1.0.-1.3", stops=({"stop": "market"},), headway=60
         )
+
+
+def test_a_line_at_an_unknown_stop_is_told_some_of_those_that_there_are() -> None:
+    stops = tuple({"id": f"s{n:03}", "node": "1.0.-1.20"} for n in range(500))
+    lines = ({"id": "7", "start": "1.0.-1.3", "stops": ({"stop": "x"},), "headway": 60},)
+    one = Scenario.model_validate(
+        empty().model_dump() | {"transit": {"stops": stops, "lines": lines}}
+    )
+    (found,) = (problem for problem in check(one, GRAPH) if problem.code == "unknown_stop")
+    assert found.message.endswith("s028, s029 and 470 more")
+    assert len(found.message) < 400

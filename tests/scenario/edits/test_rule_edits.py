@@ -1,10 +1,13 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from odscen.base.errors import NotFoundError, ScenarioError
 from odscen.scenario import edits
-from odscen.scenario.document.rules_document import StoryRule
+from odscen.scenario.checks import rule_checks
+from odscen.scenario.document.rules_document import RulePart, StoryRule, rule_parts
 from odscen.scenario.document.scenario_document import Scenario
 from tests.graphs import fork
 
@@ -33,6 +36,24 @@ def test_a_rule_is_added_replaced_in_its_place_and_removed() -> None:
     assert three.rules == (rule(by=6), rule("other"))
     assert edits.remove_rule(three, rule="halt").rules == (rule("other"),)
     assert one.rules == (rule(),)
+
+
+def test_an_edit_of_a_rule_looks_at_no_other_rule_but_for_its_id(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked_at: list[str] = []
+
+    def counted(one: StoryRule, where: str) -> Iterator[RulePart]:
+        looked_at.append(where)
+        return rule_parts(one, where)
+
+    monkeypatch.setattr(rule_checks, "rule_parts", counted)
+    changed = scenario()
+    for n in range(50):
+        changed = edits.set_rule(changed, GRAPH, rule=rule(f"r{n}"))
+    assert looked_at == [f"rules[{n}]" for n in range(50)]
+    with pytest.raises(ScenarioError, match="id 'r3' is taken by"):
+        edits.set_rule(changed, GRAPH, rule=rule("r3"), instead_of="r7")
 
 
 def test_a_rule_about_what_is_not_there_is_refused() -> None:

@@ -120,3 +120,20 @@ def test_a_latin_hypercube_and_sobol_cover_each_parameter_evenly() -> None:
 def test_a_plan_that_is_none_is_refused_in_words(data: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words or "a grid needs the number of steps"):
         plan_from_data(data).cases()
+
+
+@pytest.mark.parametrize("steps", [30_000_000, 10**11])
+def test_a_grid_is_counted_before_it_is_built(monkeypatch: pytest.MonkeyPatch, steps: int) -> None:
+    def built(axis: Range) -> list[float]:
+        raise AssertionError(f"{axis.name} is built")
+
+    monkeypatch.setattr(Range, "shares", property(built))
+    axes = axis_from_text(f"gap=6..46:{steps}"), axis_from_text("speed=5,10")
+    words = f"has {2 * steps:,} cases; .*: gap has {steps:,} values and speed has 2 values"
+    with pytest.raises(InputError, match=words):
+        SweepPlan(axes)
+    vary = [{"parameter": "gap", "from": 6, "to": 46, "steps": steps}]
+    with pytest.raises(InputError, match=f": gap has {steps:,} values"):
+        plan_from_data({"vary": vary})
+    with pytest.raises(InputError, match=f"samples: the sweep has {steps:,} cases"):
+        plan_from_data({"vary": vary, "samples": steps})

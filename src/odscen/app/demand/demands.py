@@ -30,12 +30,13 @@ from odscen.scenario.demand.demand_tables import (
 )
 from odscen.scenario.demand.inflow import entries
 from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.edits.demand_edits import put_parts
 from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import TOWN_MIX, town_day
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from odscen.app.maps import LoadedMap
@@ -118,47 +119,55 @@ def import_text(
         If a value cannot be used; names line and column.
     """
     graph, clock = loaded.sumo.graph, scenario.demand.clock
-    if kind == "zones":
-        for zone, named in read_zones(text).items():
-            with _by_line(scenario, kind, zone, named.lines):
-                scenario = edits.set_zone(scenario, graph, zone=zone, segments=named.values)
-        return scenario
+    parts: dict[str, dict[str, Any]]
     if kind == "profile":
-        shares = read_profile(text)
         own = name or "profile"
-        with _by_line(scenario, kind, own, ()):
-            return edits.set_profile(scenario, graph, profile=own, shares=shares)
+        return edits.set_profile(scenario, graph, profile=own, shares=read_profile(text))
     if kind == "counts":
         counted, own = read_counts(text, clock=clock), name or "counts"
-        with _by_line(scenario, kind, own, counted.lines):
+        with _by_line(scenario, kind, {own: counted.lines}):
             return edits.set_counts(scenario, graph, counts=own, rows=counted.values, **fields)
+    if kind == "zones":
+        zones = read_zones(text)
+        with _by_line(scenario, kind, {zone: rows.lines for zone, rows in zones.items()}):
+            parts = {zone: {"segments": rows.values} for zone, rows in zones.items()}
+            return put_parts(scenario, graph, "zones", parts)
     if kind == "inputs":
-        for number, row in enumerate(read_inputs(text, clock=clock), start=1):
-            own = f"{name or 'input'}-{number}"
-            with _by_line(scenario, kind, own, (row.line,)):
-                scenario = edits.set_input(
-                    scenario,
-                    graph,
-                    inflow=own,
-                    segment=row.segment,
-                    direction=row.direction,
-                    begin=row.begin,
-                    end=row.begin + row.interval * len(row.volumes),
-                    interval=row.interval,
-                    volumes=row.volumes,
-                    **fields,
-                )
-        return scenario
+        inputs = {
+            f"{name or 'input'}-{number}": row
+            for number, row in enumerate(read_inputs(text, clock=clock), start=1)
+        }
+        parts = {
+            own: {
+                "segment": row.segment,
+                "direction": row.direction,
+                "begin": row.begin,
+                "end": row.begin + row.interval * len(row.volumes),
+                "interval": row.interval,
+                "volumes": row.volumes,
+                **fields,
+            }
+            for own, row in inputs.items()
+        }
+        with _by_line(scenario, kind, {own: (row.line,) for own, row in inputs.items()}):
+            return put_parts(scenario, graph, "inputs", parts)
     slices = read_matrix(text, clock=clock)
-    for number, (when, trips) in enumerate(slices.items(), start=1):
-        whole = when is None and len(slices) == 1
-        own = (name or "trips") + ("" if whole else f"-{number}")
-        window = {} if when is None else {"begin": when[0], "end": when[1]}
-        with _by_line(scenario, kind, own, trips.lines):
-            scenario = edits.set_matrix(
-                scenario, graph, matrix=own, trips=trips.values, profile=day, **window, **fields
-            )
-    return scenario
+    whole = set(slices) == {None}
+    named = {
+        (name or "trips") + ("" if whole else f"-{number}"): (when, trips)
+        for number, (when, trips) in enumerate(slices.items(), start=1)
+    }
+    parts = {
+        own: {
+            "trips": trips.values,
+            "profile": day,
+            **({} if when is None else {"begin": when[0], "end": when[1]}),
+            **fields,
+        }
+        for own, (when, trips) in named.items()
+    }
+    with _by_line(scenario, kind, {own: trips.lines for own, (_, trips) in named.items()}):
+        return put_parts(scenario, graph, "matrices", parts)
 
 
 def add_input(
@@ -357,14 +366,27 @@ _FIELDS = {
 
 
 @contextmanager
-def _by_line(scenario: Scenario, kind: str, name: str, lines: Sequence[int]) -> Iterator[None]:
-    """Say of problems of the part that is being read in which line and column they stand."""
-    parts = getattr(scenario.demand, _FIELDS[kind])
-    index = next((i for i, one in enumerate(parts) if one.id == name), len(parts))
-    row = r"(?:\.\w+\[(?P<row>\d+)\](?:\[(?P<cell>\d+)\])?)?"
-    own = re.compile(rf"demand\.{_FIELDS[kind]}\[{index}\]{row}[^:]*: ")
+def _by_line(scenario: Scenario, kind: str, rows: Mapping[str, Sequence[int]]) -> Iterator[None]:
+    """Say of problems of the parts that are being read in which line and column they stand.
 
-    def told(match: re.Match[str]) -> str:
+    ``rows`` are the lines of the rows of each part; an input has one.
+    """
+    parts = getattr(scenario.demand, _FIELDS[kind])
+    places = {part.id: index for index, part in reversed([*enumerate(parts)])}
+    new = count(len(parts))
+    line_of = {places[name] if name in places else next(new): lines for name, lines in rows.items()}
+    row = r"(?:\.\w+\[(?P<row>\d+)\](?:\[(?P<cell>\d+)\])?)?"
+    place = re.compile(rf"demand\.{_FIELDS[kind]}\[(?P<part>\d+)\]{row}[^:]*: ")
+
+    def with_line(problem: str) -> str:
+        match = place.match(problem)
+        if match is None or (lines := line_of.get(int(match["part"]))) is None:
+            return problem
+        return told(match, lines) + problem[match.end() :]
+
+    def told(match: re.Match[str], lines: Sequence[int]) -> str:
+        if kind == "inputs":
+            return f"line {lines[0]}: "
         if match["row"] is None or not lines:
             return ""
         column = COLUMNS[kind][int(match["cell"] or 0)]
@@ -375,9 +397,10 @@ def _by_line(scenario: Scenario, kind: str, name: str, lines: Sequence[int]) -> 
         yield
     except ScenarioError as error:
         problems = [f"{error.element}: {error.problem}"] if error.element else error.problems
-        if not any(own.match(problem) for problem in problems):
+        found = [with_line(problem) for problem in problems]
+        if found == list(problems):
             raise
-        found = [own.sub(told, problem, count=1) for problem in problems]
         if len(found) == 1:
-            raise ScenarioError(found[0]) from error
+            others = error.problems if error.element else ()
+            raise ScenarioError(found[0], problems=others) from error
         raise ScenarioError(f"{len(found)} problems", problems=found) from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,7 +16,8 @@ from odscen.convert.model.edge_plan import LEAST_WIDTH, NO_WIDTH
 from odscen.convert.model.net import CROSSING
 from odscen.opendrive.objects import is_crosswalk, signal_kind
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES, lane_use
-from odscen.opendrive.topology import dead_ends
+from odscen.opendrive.sign_catalogue import country_of, sign_meaning
+from odscen.opendrive.topology import dead_ends, one_sided_links
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -114,6 +116,7 @@ def findings(
         ),
         *nowhere,
         *one_way_ends(odr, table, found),
+        *_find_one_sided_links(odr),
         *_find_crosswalk_entries(odr, crosswalks),
         *_find_signal_entries(odr, table, net, control),
     ]
@@ -171,6 +174,14 @@ def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> It
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(key.road)}", reason)
+
+
+def _find_one_sided_links(odr: OpenDrive) -> Iterator[ReportEntry]:
+    """Say which connections of lanes only the lane behind states."""
+    for here, there in one_sided_links(odr):
+        road = shown_id(there.road)
+        reason = f"leads to lane {there.lane} of road {road}, which alone states the link"
+        yield ReportEntry(ElementOutcome.REPAIRED, _describe_place(*here), reason)
 
 
 def _why_uncovered(odr: OpenDrive, table: RoadTable, row: int) -> str:
@@ -280,6 +291,7 @@ def _find_signal_entries(
                     f"dynamic signal of type {signal.type or 'none'!r}, which is no known light"
                 )
                 yield ReportEntry(ElementOutcome.LOST, element, reason)
+    yield from _count_idle_signs(odr)
     yield from _bare_controllers(odr, net)
     if net.lights:
         reason = (
@@ -287,6 +299,39 @@ def _find_signal_entries(
             "timing; no two movements that meet have green together"
         )
         yield ReportEntry(ElementOutcome.GUESSED, "map", reason)
+
+
+_IDLE_SIGNS = {
+    "priority": "priority signs: right of way follows the signs to give way, or the larger road",
+    "end_of_priority": "signs for the end of priority: right of way follows the signs to give way",
+    "speed_limit": "speed limit signs: the limits of the roads and lanes hold",
+    "end_of_speed_limit": "signs for the end of a speed limit: those of the roads and lanes hold",
+    "no_entry": "no entry signs: the directions of the lanes hold",
+    "bus_lane": "bus lane signs: types and access of the lanes hold",
+    "crosswalk": "pedestrian crossing signs: the crosswalk objects hold",
+}
+"""What holds instead of signs that are understood, and have no effect of their own."""
+
+
+def _count_idle_signs(odr: OpenDrive) -> Iterator[ReportEntry]:
+    """Count the signs that have no effect in SUMO, by country and type."""
+    counts: Counter[tuple[str, str]] = Counter()
+    for road in odr.roads.values():
+        for signal in road.signals:
+            kind = signal_kind(signal)
+            if kind not in ("other", "speed_limit") or (signal.dynamic and kind == "other"):
+                continue
+            meaning = "speed_limit" if kind == "speed_limit" else sign_meaning(signal) or ""
+            country = country_of(signal)
+            code = " ".join(part for part in (country, signal.type, signal.subtype) if part)
+            counts[code.removesuffix(" -1") or "none", meaning] += 1
+    for (code, what), count in sorted(counts.items()):
+        element = f"signals of type {code}"
+        if what:
+            yield ReportEntry(ElementOutcome.GUESSED, element, f"{count} {_IDLE_SIGNS[what]}")
+        else:
+            reason = f"{count} signs that are not understood have no effect"
+            yield ReportEntry(ElementOutcome.LOST, element, reason)
 
 
 def _bare_controllers(odr: OpenDrive, net: Net) -> Iterator[ReportEntry]:

@@ -75,7 +75,10 @@ def _xml_kind(root: str, content: bytes) -> FileKind:
     if root == "net":
         return FileKind("a SUMO network", _BY_NETCONVERT.format("--sumo-net-file"))
     if root == "commonRoad":
-        return FileKind("a CommonRoad scenario", _NEEDS_IMPORTER)
+        return FileKind(
+            "a CommonRoad scenario",
+            "export its map as OpenDRIVE from CommonRoad Scenario Designer, and add that file",
+        )
     if root == "OpenSCENARIO":
         return FileKind("an OpenSCENARIO file", "a scenario is read with: odscen import FILE")
     return FileKind(f"XML with the root element <{root[:40]}>", _NEEDS_IMPORTER)

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from odscen.learning.offered_options import OptionValue
 
 
+_HEAD_BYTES = 4096
+"""Bytes of a file in which XML of any encoding has a tag."""
+
+
 class OpenDriveImporter(MapImporter):
     """OpenDRIVE 1.4 to 1.8: the file is the map.
 
@@ -36,9 +40,19 @@ class OpenDriveImporter(MapImporter):
         Raises
         ------
         OpenDriveError
-            If it is packed.
+            If it is packed, or of another format under the name of OpenDRIVE.
         """
+        kind = file_kind(content, "map.xodr")
         if is_packed(content):
-            kind = file_kind(content, "map.xodr")
             raise OpenDriveError(f"this is {kind.what}: {kind.advice}")
+        if not _may_be_opendrive(content) and kind.what != "text":
+            raise OpenDriveError(f"this is {kind.what}, not OpenDRIVE: {kind.advice}")
         return ImportedMap(content)
+
+
+def _may_be_opendrive(content: bytes) -> bool:
+    """Whether a file is OpenDRIVE, or a damaged one, which the parser refuses with the place."""
+    root = root_element(content)
+    if root is not None:
+        return root.lower() == "opendrive" or b"<OpenDRIVE" in content
+    return not content or b"<" in content[:_HEAD_BYTES]

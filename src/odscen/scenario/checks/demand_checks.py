@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.shown import some_of
 from odscen.scenario.demand.count_stations import contradictions, transitions
 from odscen.scenario.demand.day_profiles import BUILT_IN, known_profiles
 from odscen.scenario.demand.inflow import entries, entries_of, entry_lanes
-from odscen.scenario.demand.zones import PLACE_SEPARATOR, place_segments, segments_of
-from odscen.scenario.document.problems import Problem, error, warning
+from odscen.scenario.demand.zones import PLACE_SEPARATOR, place_segments, zone_segments
+from odscen.scenario.document.problems import Problem, error, limited, warning
 from odscen.scenario.placing.region import on_foot
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from odscen.base.categories import Category
     from odscen.lanegraph.parking_areas import MapParking
@@ -47,15 +47,24 @@ def transit_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
         if place is not None:
             places[stop.id] = place
     known = {stop.id for stop in scenario.transit.stops}
+    listed = _list_names(known)
+    nodes = {stop.id: stop.node for stop in scenario.transit.stops}
+    region.look_up(leg for line in scenario.transit.lines for leg in _line_legs(line, nodes))
     for index, line in enumerate(scenario.transit.lines):
         where = f"transit.lines[{index}]"
         yield from _line_problems(scenario, line, where)
         unknown = [(row, one.stop) for row, one in enumerate(line.stops) if one.stop not in known]
         for row, name in unknown:
-            message = f"line {line.id!r} serves stop {name!r}; there are {_list_names(known)}"
+            message = f"line {line.id!r} serves stop {name!r}; there are {listed}"
             yield error("unknown_stop", f"{where}.stops[{row}].stop", message)
         if not unknown:
             yield from _route_problems(line, places, region, where)
+
+
+def _line_legs(line: TransitLine, nodes: Mapping[str, str]) -> Iterator[tuple[str, str | None]]:
+    """Yield the pairs of nodes between which a line leads, by the nodes of its stops."""
+    served = (nodes[stop.stop] for stop in line.stops if stop.stop in nodes)
+    return pairwise((line.start, *served, *([line.goal] if line.goal else ())))
 
 
 def _line_problems(scenario: Scenario, line: TransitLine, where: str) -> Iterator[Problem]:
@@ -116,8 +125,12 @@ def _road_place(
     return place, []
 
 
-def _list_names(known: set[str]) -> str:
-    return ", ".join(sorted(known)) or "none"
+_LISTED = 30
+"""Names that a message lists at most."""
+
+
+def _list_names(known: Iterable[str]) -> str:
+    return some_of(sorted(known), most=_LISTED, between=", ") or "none"
 
 
 _PARKING = "demand.parking"
@@ -155,13 +168,50 @@ def parking_problems(
         yield error("parking_outside_roi", _PARKING, message, segments=sorted(names))
 
 
+class _Places(NamedTuple):
+    """What parts of the demand may name.
+
+    Attributes
+    ----------
+    known, inside
+        Segments of the map, and those of the region.
+    zones
+        Segments of each zone.
+    """
+
+    known: Collection[str]
+    inside: frozenset[str]
+    zones: Mapping[str, tuple[str, ...]]
+
+    @classmethod
+    def of(cls, demand: Demand, region: Region) -> _Places:
+        """Those of a demand in a region; once for all of its parts."""
+        return cls(
+            frozenset(map(str, region.graph.segments.ids)),
+            frozenset(map(str, region.segments)),
+            zone_segments(demand),
+        )
+
+    def segments_of(self, name: str) -> tuple[str, ...]:
+        """Segments of a zone; any other name is that of a segment."""
+        return self.zones.get(name, (name,))
+
+    def has(self, name: str) -> bool:
+        """Whether there is a zone or a segment of that name."""
+        return name in self.zones or name in self.known
+
+    def reaches_inside(self, name: str) -> bool:
+        """Whether any of its segments is in the region."""
+        return not self.inside.isdisjoint(self.segments_of(name))
+
+
 def route_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
     """Yield what is wrong with the routes of the demand."""
-    demand = scenario.demand
+    demand, places = scenario.demand, _Places.of(scenario.demand, region)
     for index, one in enumerate(demand.routes.shares):
         where = f"demand.routes.shares[{index}]"
-        yield from _end_problems(demand, one, region, where)
-        yield from _via_problems(one, region, where)
+        yield from _end_problems(one, places, where)
+        yield from _via_problems(one, places, where)
     generated = any(count.use == "generate" for count in demand.counts)
     if demand.routes.by == "travel_time" and generated:
         message = (
@@ -171,34 +221,27 @@ def route_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
         yield warning("counts_by_travel_time", "demand.routes.by", message)
 
 
-def _end_problems(
-    demand: Demand, shared_routes: SharedRoutes, region: Region, where: str
-) -> Iterator[Problem]:
-    known = {str(name) for name in region.graph.segments.ids}
-    inside = {str(name) for name in region.segments}
-    zones = {zone.id for zone in demand.zones}
+def _end_problems(shared_routes: SharedRoutes, places: _Places, where: str) -> Iterator[Problem]:
     for field, name in (
         ("origin", shared_routes.origin),
         ("destination", shared_routes.destination),
     ):
-        if name not in zones and name not in known:
+        if not places.has(name):
             message = f"{name!r} is neither a zone nor a segment of the map"
             yield error("unknown_zone", f"{where}.{field}", message)
-        elif not inside.intersection(segments_of(demand, name)):
+        elif not places.reaches_inside(name):
             message = f"{name!r} is outside the region of interest"
             yield error("zone_outside_roi", f"{where}.{field}", message)
 
 
-def _via_problems(shared_routes: SharedRoutes, region: Region, where: str) -> Iterator[Problem]:
-    known = {str(name) for name in region.graph.segments.ids}
-    inside = {str(name) for name in region.segments}
+def _via_problems(shared_routes: SharedRoutes, places: _Places, where: str) -> Iterator[Problem]:
     for row, (via, _) in enumerate(shared_routes.routes):
         here = f"{where}.routes[{row}]"
         for name in via:
-            if name not in known:
+            if name not in places.known:
                 message = f"the route leads over {name!r}, which the map does not have"
                 yield error("unknown_segment", here, message, segments=[name])
-            elif name not in inside:
+            elif name not in places.inside:
                 message = f"the route leads over {name!r}, outside the region of interest"
                 yield error("zone_outside_roi", here, message, segments=[name])
 
@@ -237,15 +280,23 @@ def input_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
     """Yield everything wrong with the vehicle inputs of a scenario."""
     if not scenario.demand.inputs:
         return
-    every = entries(region)
+    every, places = entries(region), _Places.of(scenario.demand, region)
+    reached: dict[tuple[int, ...], frozenset[str]] = {}
     for index, part in enumerate(scenario.demand.inputs):
         where = f"demand.inputs[{index}]"
         yield from window_problems(scenario, part, where)
         yield from foot_problems(part.mix, part.id, where, "inputs")
         yield from _length_problems(scenario, part, where)
-        found = [*_entry_problems(part, every, where, region)]
+        found = [*_entry_problems(part, every, where, places)]
         yield from found
-        yield from _goal_problems(scenario, part, region, where, found=not found)
+        if found or not part.to:
+            inside = None
+        else:
+            lanes = _nodes_of_lanes(part, every)
+            if lanes not in reached:
+                reached[lanes] = _reached_segments(lanes, region)
+            inside = reached[lanes]
+        yield from _goal_problems(part, places, where, reached=inside)
 
 
 def _length_problems(scenario: Scenario, part: VehicleInput, where: str) -> Iterator[Problem]:
@@ -260,11 +311,11 @@ def _length_problems(scenario: Scenario, part: VehicleInput, where: str) -> Iter
 
 
 def _entry_problems(
-    part: VehicleInput, every: Sequence[Entry], where: str, region: Region
+    part: VehicleInput, every: Sequence[Entry], where: str, places: _Places
 ) -> Iterator[Problem]:
     mine = entries_of(part, every)
     here = f"{where}.segment"
-    if part.segment not in {str(name) for name in region.graph.segments.ids}:
+    if part.segment not in places.known:
         message = (
             f"the map has no segment {part.segment!r}; vehicles can enter on {_list_entries(every)}"
         )
@@ -288,35 +339,37 @@ def _entry_problems(
 
 
 def _goal_problems(
-    scenario: Scenario, part: VehicleInput, region: Region, where: str, *, found: bool
+    part: VehicleInput, places: _Places, where: str, *, reached: frozenset[str] | None
 ) -> Iterator[Problem]:
-    zones = {zone.id for zone in scenario.demand.zones}
-    ids = [str(name) for name in region.graph.segments.ids]
-    inside = {str(name) for name in region.segments}
-    reached = _reached_segments(part, region) if found else None
     for row, (name, _) in enumerate(part.to):
-        here, segments = f"{where}.to[{row}]", segments_of(scenario.demand, name)
-        if name not in zones and name not in ids:
+        here, segments = f"{where}.to[{row}]", places.segments_of(name)
+        if not places.has(name):
             message = f"{name!r} is neither a zone nor a segment of the map"
             yield error("unknown_zone", here, message)
-        elif not inside.intersection(segments):
+        elif not places.reaches_inside(name):
             message = f"{name!r} is outside the region of interest"
             yield error("zone_outside_roi", here, message, segments=segments)
-        elif reached is not None and not reached.intersection(segments):
+        elif reached is not None and reached.isdisjoint(segments):
             message = f"no way leads from {part.segment!r} to {name!r} inside the region"
             yield error("no_path", here, message, segments=(part.segment, *segments))
 
 
-def _reached_segments(part: VehicleInput, region: Region) -> set[str]:
-    """Segments that can be reached from any lane of an input."""
+def _nodes_of_lanes(part: VehicleInput, every: Sequence[Entry]) -> tuple[int, ...]:
+    """First nodes of the lanes of an input."""
+    return tuple(
+        lane.node for entry in entries_of(part, every) for lane in entry_lanes(part, entry)
+    )
+
+
+def _reached_segments(starts: Iterable[int], region: Region) -> frozenset[str]:
+    """Segments that can be reached from any of some nodes."""
     lanes, ids = region.graph.lanes, region.graph.segments.ids
     rows = {
         int(row)
-        for entry in entries_of(part, entries(region))
-        for entry_lane in entry_lanes(part, entry)
-        for row in set(lanes.segment[region.router.reachable(entry_lane.node)].tolist())
+        for start in starts
+        for row in set(lanes.segment[region.router.reachable(start)].tolist())
     }
-    return {str(ids[row]) for row in rows}
+    return frozenset(str(ids[row]) for row in rows)
 
 
 def _list_entries(every: Sequence[Entry]) -> str:
@@ -327,43 +380,39 @@ def _list_entries(every: Sequence[Entry]) -> str:
 
 def demand_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
     """Yield everything wrong with the demand of a scenario."""
-    demand = scenario.demand
-    yield from _name_problems(demand, region)
-    yield from _zone_problems(demand, region)
+    demand, places = scenario.demand, _Places.of(scenario.demand, region)
+    yield from _name_problems(demand, places)
+    yield from _zone_problems(demand, places)
     yield from _profile_problems(scenario)
     yield from input_problems(scenario, region)
     yield from route_problems(scenario, region)
     for index, matrix in enumerate(demand.matrices):
         where = f"demand.matrices[{index}]"
         yield from window_problems(scenario, matrix, where)
-        yield from _limit_problems(matrix_problems(demand, matrix, region, where), where)
+        yield from limited(matrix_problems(matrix, places, where), most=MOST, where=where)
     for index, counts in enumerate(demand.counts):
         where = f"demand.counts[{index}]"
-        yield from _limit_problems(counts_problems(counts, region, where), where)
+        yield from limited(counts_problems(counts, region, where), most=MOST, where=where)
     for index, background in enumerate(demand.background):
         where = f"demand.background[{index}]"
         yield from window_problems(scenario, background, where)
         yield from foot_problems(background.mix, background.id, where, "background traffic")
 
 
-def matrix_problems(
-    demand: Demand, matrix: Matrix, region: Region, where: str
-) -> Iterator[Problem]:
+def matrix_problems(matrix: Matrix, places: _Places, where: str) -> Iterator[Problem]:
     """Yield what is wrong with the rows of a matrix."""
-    zones = {zone.id for zone in demand.zones}
-    known = {str(name) for name in region.graph.segments.ids}
-    inside = {str(name) for name in region.segments}
     for index, (origin, destination, _) in enumerate(matrix.trips):
         for end, name in enumerate(dict.fromkeys((origin, destination))):
             here = f"{where}.trips[{index}][{end}]"
-            if name not in zones and name not in known:
+            if not places.has(name):
                 message = f"{name!r} is neither a zone nor a segment of the map"
                 yield error("unknown_zone", here, message)
-            elif not inside.intersection(segments_of(demand, name)):
+            elif not places.reaches_inside(name):
                 message = (
                     f"{name!r} is outside the region of interest; add its segment or drop the row"
                 )
-                yield error("zone_outside_roi", here, message, segments=segments_of(demand, name))
+                segments = places.segments_of(name)
+                yield error("zone_outside_roi", here, message, segments=segments)
     pairs: dict[tuple[str, str], list[int]] = defaultdict(list)
     for index, (origin, destination, _) in enumerate(matrix.trips):
         pairs[origin, destination].append(index)
@@ -390,8 +439,7 @@ def counts_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
             yield warning("counts_contradict", where, message, segments=segments)
 
 
-def _name_problems(demand: Demand, region: Region) -> Iterator[Problem]:
-    segments = {str(name) for name in region.graph.segments.ids}
+def _name_problems(demand: Demand, places: _Places) -> Iterator[Problem]:
     for kind in ("zones", "profiles"):
         seen: set[str] = set()
         for index, one in enumerate(getattr(demand, kind)):
@@ -400,7 +448,7 @@ def _name_problems(demand: Demand, region: Region) -> Iterator[Problem]:
                 message = f"two {kind} are called {one.id!r}; give one of them another name"
                 yield error("duplicate_id", where, message)
             seen.add(one.id)
-            if kind == "zones" and one.id in segments:
+            if kind == "zones" and one.id in places.known:
                 message = f"zone {one.id!r} has the name of a segment; give it another"
                 yield error("zone_named_as_segment", where, message)
             if kind == "profiles" and one.id in BUILT_IN:
@@ -408,11 +456,10 @@ def _name_problems(demand: Demand, region: Region) -> Iterator[Problem]:
                 yield error("duplicate_id", where, message)
 
 
-def _zone_problems(demand: Demand, region: Region) -> Iterator[Problem]:
-    known = {str(name) for name in region.graph.segments.ids}
+def _zone_problems(demand: Demand, places: _Places) -> Iterator[Problem]:
     for index, zone in enumerate(demand.zones):
         for row, name in enumerate(zone.segments):
-            if name not in known:
+            if name not in places.known:
                 where = f"demand.zones[{index}].segments[{row}]"
                 message = f"zone {zone.id!r} has segment {name!r}, which the map does not have"
                 yield error("unknown_segment", where, message, segments=[name])
@@ -420,11 +467,12 @@ def _zone_problems(demand: Demand, region: Region) -> Iterator[Problem]:
 
 def _profile_problems(scenario: Scenario) -> Iterator[Problem]:
     known = known_profiles(scenario.demand)
+    listed = some_of(list(known), most=_LISTED, between=", ")
     users = [(f"flows[{index}]", flow) for index, flow in enumerate(scenario.flows)]
     for where, one in (*users, *scenario.demand.parts):
         profile = getattr(one, "profile", None)
         if profile is not None and profile not in known:
-            message = f"{one.id!r} has day profile {profile!r}; there are {', '.join(known)}"
+            message = f"{one.id!r} has day profile {profile!r}; there are {listed}"
             yield error("unknown_profile", f"{where}.profile", message)
 
 
@@ -478,17 +526,3 @@ def _slice_problems(counts: Counts, where: str) -> Iterator[Problem]:
             )
             here = f"{where}.rows[{given[1]}]"
             yield error("counted_twice", here, message, segments=place_segments(place))
-
-
-def _limit_problems(problems: Iterable[Problem], where: str) -> Iterator[Problem]:
-    """Yield the first problems of each kind, and how many more there are."""
-    seen: Counter[tuple[str, str]] = Counter()
-    for problem in problems:
-        key = problem.severity, problem.code
-        seen[key] += 1
-        if seen[key] <= MOST:
-            yield problem
-    for (severity, code), number in seen.items():
-        if number > MOST:
-            make = error if severity == "error" else warning
-            yield make(code, where, f"{number - MOST} more of the same kind")

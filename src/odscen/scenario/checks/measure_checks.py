@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import math
+from bisect import bisect_right, insort
+from collections import Counter, defaultdict
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.base.shown import some_of
 from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.demand.zones import PLACE_SEPARATOR, place_segments
@@ -18,8 +21,8 @@ from odscen.scenario.document.measures_document import (
     closed_places,
     named_places,
 )
-from odscen.scenario.document.problems import error, warning
-from odscen.scenario.signals.light import find_light
+from odscen.scenario.document.problems import MOST_PAIRS, error, more_of_kind, warning
+from odscen.scenario.signals.light import lights_by_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -154,14 +157,15 @@ def measure_problems(
         return
     places = PlaceNames(region.graph)
     yield from _find_repeated_ids(scenario)
+    outages = None if lights is None else _outage_problems(scenario, lights)
     for index, measure in enumerate(scenario.measures):
         where = f"measures[{index}]"
         yield from _time_problems(scenario, measure, where)
         yield from _place_problems(measure, places, where)
         if isinstance(measure, LaneIncident):
             yield from _incident_problems(measure, places, region, where)
-        if isinstance(measure, SignalOutage) and lights is not None:
-            yield from _outage_problems(scenario, measure, lights, where)
+        if outages is not None:
+            yield from outages.get(index, ())
     yield from _cut_off(scenario, region, places)
 
 
@@ -217,34 +221,81 @@ def _incident_problems(
         yield error("place_in_junction", f"{where}.lane", message)
 
 
-def _outage_problems(
-    scenario: Scenario, measure: SignalOutage, lights: Sequence[Light], where: str
-) -> Iterator[Problem]:
-    here = f"{where}.junction"
-    light = find_light(lights, measure.junction)
-    if light is None:
-        names = ", ".join(sorted(light.names[0] for light in lights)[:10]) or "none"
-        message = f"there is no traffic light in junction {measure.junction!r}; there are {names}"
-        yield error("unknown_light", here, message)
-        return
-    for timing in scenario.signals.junctions:
-        if timing.junction in light.names and timing.plans:
+def _outage_problems(scenario: Scenario, lights: Sequence[Light]) -> dict[int, list[Problem]]:
+    """Find what is wrong with outages of lights, by their places among the measures.
+
+    Of outages of one light that overlap in time the first pairs are listed; the last of them has
+    how many more there are.
+    """
+    light_of = lights_by_name(lights)
+    planned = {
+        id(light_of[timing.junction])
+        for timing in scenario.signals.junctions
+        if timing.plans and timing.junction in light_of
+    }
+    names = ", ".join(sorted(light.names[0] for light in lights)[:10]) or "none"
+    found: dict[int, list[Problem]] = defaultdict(list)
+    same: dict[int, list[int]] = defaultdict(list)
+    for index, measure in enumerate(scenario.measures):
+        if not isinstance(measure, SignalOutage):
+            continue
+        here = f"measures[{index}].junction"
+        light = light_of.get(measure.junction)
+        if light is None:
+            message = (
+                f"there is no traffic light in junction {measure.junction!r}; there are {names}"
+            )
+            found[index].append(error("unknown_light", here, message))
+            continue
+        if id(light) in planned:
             message = f"the light of {measure.junction!r} has plans of the day; take them out first"
-            yield error("outage_with_plans", here, message)
-    same = [
-        measure
-        for measure in scenario.measures
-        if isinstance(measure, SignalOutage) and measure.junction in light.names
-    ]
-    for other in same[: same.index(measure)]:
-        if _times_overlap(measure, other):
-            message = f"{measure.id!r} and {other.id!r} switch one light at the same time"
-            yield error("light_twice", here, message)
+            found[index].append(error("outage_with_plans", here, message))
+        same[id(light)].append(index)
+    pairs: list[tuple[int, int]] = []
+    number = 0
+    for outages in same.values():
+        overlapping = _overlapping_pairs(scenario.measures, outages)
+        number += overlapping.number
+        pairs += overlapping.listed[: MOST_PAIRS - len(pairs)]
+    for index, other in sorted(pairs):
+        message = (
+            f"{scenario.measures[index].id!r} and {scenario.measures[other].id!r} switch one light "
+            "at the same time"
+        )
+        found[index].append(error("light_twice", f"measures[{index}].junction", message))
+    if number > len(pairs):
+        last = max(pairs)[0]
+        found[last].append(more_of_kind(found[last][-1], number - len(pairs)))
+    return found
 
 
-def _times_overlap(one: Measure, other: Measure) -> bool:
-    ends = (float("inf") if each.end is None else each.end for each in (one, other))
-    return max(one.begin, other.begin) < min(ends)
+class _Pairs(NamedTuple):
+    """How many pairs of measures are in force at the same time, and the first of them.
+
+    Each by its places among the measures, the later one first.
+    """
+
+    number: int
+    listed: list[tuple[int, int]]
+
+
+def _overlapping_pairs(measures: Sequence[Measure], these: Iterable[int]) -> _Pairs:
+    """Go through the begins of measures; each overlaps all that have not ended by then."""
+    active: list[tuple[float, int]] = []
+    number, listed = 0, list[tuple[int, int]]()
+    for begin, end, index in sorted((*_times(measures[index]), index) for index in these):
+        del active[: bisect_right(active, (begin, len(measures)))]
+        number += len(active)
+        listed += [
+            (max(index, other), min(index, other))
+            for _, other in active[: MOST_PAIRS - len(listed)]
+        ]
+        insort(active, (end, index))
+    return _Pairs(number, listed)
+
+
+def _times(measure: Measure) -> tuple[float, float]:
+    return measure.begin, math.inf if measure.end is None else measure.end
 
 
 def _cut_off(scenario: Scenario, region: Region, places: PlaceNames) -> Iterator[Problem]:
@@ -255,7 +306,7 @@ def _cut_off(scenario: Scenario, region: Region, places: PlaceNames) -> Iterator
         stranded |= {route.actor: route.closing for route in _without_way(region, mask, routes)}
     for index, closing in sorted(stranded.items()):
         actor = scenario.actors[index]
-        names = ", ".join(repr(measure.id) for measure in closing)
+        names = some_of([repr(measure.id) for measure in closing], between=", ")
         message = (
             f"{actor.id!r} departs at {actor.depart:g} s, when {names} has closed every route "
             "to its goal; it will be stranded"
@@ -279,12 +330,23 @@ def _routes_when_closed(
     found: dict[bytes, tuple[BoolArray, list[_Route]]] = {}
     closed_by: dict[tuple[int, ...], BoolArray] = {}
     open_to: dict[tuple[tuple[int, ...], int | None], tuple[bytes, BoolArray]] = {}
+    closures = [
+        (row, measure, banned_by(measure), *_times(measure))
+        for row, measure in enumerate(scenario.measures)
+        if closed_places(measure)
+    ]
+    # Between two of these instants the same measures are in force.
+    instants = sorted({instant for *_, begin, end in closures for instant in (begin, end)})
+    in_force: dict[tuple[int, Category], tuple[int, ...]] = {}
     for index, actor in enumerate(scenario.actors):
-        rows = tuple(
-            row
-            for row, one in enumerate(scenario.measures)
-            if _stops_category(one, actor.category, actor.depart)
-        )
+        key = bisect_right(instants, actor.depart), actor.category
+        if key not in in_force:
+            in_force[key] = tuple(
+                row
+                for row, _, banned, begin, end in closures
+                if begin <= actor.depart < end and actor.category in banned
+            )
+        rows = in_force[key]
         spawn = region.place(actor.spawn)
         goal = None if actor.goal is None else region.place(actor.goal)
         if not rows or spawn is None or goal is None or spawn.walk or goal.walk:
@@ -323,12 +385,6 @@ def _without_way(region: Region, mask: BoolArray, routes: Sequence[_Route]) -> I
         broken = {index for (_, index), way in zip(pairs, leads, strict=True) if not way}
     whole = {open_route.actor for open_route in open_routes} - broken
     yield from (route for route in routes if route.actor not in whole)
-
-
-def _stops_category(measure: Measure, category: Category, time: float) -> bool:
-    if not closed_places(measure) or not measure.begin <= time:
-        return False
-    return (measure.end is None or time < measure.end) and category in banned_by(measure)
 
 
 def _closed_nodes(measures: Iterable[Measure], places: PlaceNames, size: int) -> BoolArray:

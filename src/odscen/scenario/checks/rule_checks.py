@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import defaultdict
-from itertools import combinations
+from heapq import merge
+from itertools import islice
+from math import comb
 from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
 from odscen.base.errors import OdscenError
-from odscen.scenario.document.problems import Problem, error, warning
+from odscen.scenario.document.problems import (
+    MOST_PAIRS,
+    Problem,
+    error,
+    more_of_kind,
+    warning,
+)
 from odscen.scenario.document.rules_document import actors_of, places_of, rule_parts
 from odscen.scenario.signals.light import find_light, find_movements, known_names
 from odscen.scenario.story.action_kinds import ACTIONS
@@ -34,23 +43,39 @@ _LISTED = 8
 
 
 def rule_problems(
-    scenario: Scenario, region: Region, lights: Sequence[Light] | None = None
+    scenario: Scenario,
+    region: Region,
+    lights: Sequence[Light] | None = None,
+    *,
+    only: int | None = None,
 ) -> Iterator[Problem]:
-    """Yield everything wrong with the rules of a scenario (R74)."""
+    """Yield everything wrong with the rules of a scenario (R74).
+
+    Parameters
+    ----------
+    lights
+        Traffic lights of the map for the rules on signals; without them those are left out.
+    only
+        Place of the rule that is looked at, besides the ids of all: an edit of one rule then takes
+        the same time however many others there are. All of them if not given.
+    """
     known = {actor.id: actor.category for actor in scenario.actors}
     flows = {flow.id for flow in scenario.flows}
-    ids = [rule.id for rule in scenario.rules]
+    ids: dict[str, int] = {}
+    for index, rule in enumerate(scenario.rules):
+        ids.setdefault(rule.id, index)
     for index, rule in enumerate(scenario.rules):
         where = f"rules[{index}]"
-        if rule.id in ids[:index]:
-            first = ids.index(rule.id)
+        if (first := ids[rule.id]) < index:
             message = f"id {rule.id!r} is taken by rules[{first}].id; give one of them another"
             yield error("duplicate_id", f"{where}.id", message)
-        yield from _check_actor_name(rule.actor, f"{where}.actor", known, flows)
-        for part in rule_parts(rule, where):
-            yield from _check_part(part, rule, known, flows, ids, region)
-            yield from _check_signal(part, lights)
-    yield from _at_once(scenario)
+        if only is None or index == only:
+            yield from _check_actor_name(rule.actor, f"{where}.actor", known, flows)
+            for part in rule_parts(rule, where):
+                yield from _check_part(part, rule, known, flows, ids, region)
+                yield from _check_signal(part, lights)
+    if only is None:
+        yield from _at_once(scenario)
 
 
 def _check_part(
@@ -58,7 +83,7 @@ def _check_part(
     rule: StoryRule,
     known: Mapping[str, Category],
     flows: set[str],
-    ids: Sequence[str],
+    ids: Mapping[str, int],
     region: Region,
 ) -> Iterator[Problem]:
     where, kind, part = found
@@ -71,7 +96,7 @@ def _check_part(
     if kind == "own":
         yield from _check_package_kind(found)
     if kind == "rule" and (other := getattr(part, "id", None)) not in ids:
-        message = f"there is no rule {other!r}; there are {_list_names(ids)}"
+        message = f"there is no rule {other!r}; there are {_list_names(list(ids))}"
         yield error("unknown_rule", f"{where}.id", message)
     category, action = known.get(rule.actor), ACTIONS.get(kind)
     if ".then[" in where and action is not None and category is not None:
@@ -141,31 +166,94 @@ def _check_signal(found: RulePart, lights: Sequence[Light] | None) -> Iterator[P
 
 
 def _at_once(scenario: Scenario) -> Iterator[Problem]:
-    """Yield pairs of rules that may take over the same actor at once: the later one then has it."""
+    """Yield pairs of rules that may take over the same actor at once: the later one then has it.
+
+    The first of them, and how many more there are: as many pairs as there are of rules, counted
+    without a look at each.
+    """
     of_actor: dict[str, list[tuple[int, StoryRule]]] = defaultdict(list)
+    first: dict[str, int] = {}
     for index, rule in enumerate(scenario.rules):
         of_actor[rule.actor].append((index, rule))
+        first.setdefault(rule.id, index)
+    listed: list[Problem] = []
+    number = 0
     for rules in of_actor.values():
-        for (_, one), (index, other) in combinations(rules, 2):
-            if _waits_for_rule(other, one) or _waits_for_rule(one, other):
-                continue
-            first, second = _kinds_taken(one), _kinds_taken(other)
-            if any(first & these and second & these for these in (_SPEED, _PLACE)):
-                message = (
-                    f"rules {one.id!r} and {other.id!r} both move {one.actor!r}; if they do so at "
-                    "once, the one that fires later acts instead. Let one wait for the other with "
-                    "the condition 'rule' if that is not meant"
-                )
-                yield warning("rules_at_once", f"rules[{index}]", message)
+        clashes = _Clashes(rules, first)
+        number += clashes.number()
+        for one, other in islice(clashes.pairs(), MOST_PAIRS - len(listed)):
+            ids = (scenario.rules[one].id, scenario.rules[other].id)
+            message = (
+                f"rules {ids[0]!r} and {ids[1]!r} both move {scenario.rules[one].actor!r}; if they "
+                "do so at once, the one that fires later acts instead. Let one wait for the other "
+                "with the condition 'rule' if that is not meant"
+            )
+            listed.append(warning("rules_at_once", f"rules[{other}]", message))
+    yield from listed
+    if number > len(listed):
+        yield more_of_kind(listed[0], number - len(listed))
 
 
-def _kinds_taken(rule: StoryRule) -> set[str]:
-    return {part.kind for item in rule.then for part in item.parts}
+class _Clashes:
+    """Pairs of the rules of one actor of which neither waits for the other, though both move it.
+
+    Parameters
+    ----------
+    rules
+        With their places in the document.
+    first
+        Place of the first rule with an id: for that one waits who names it.
+    """
+
+    def __init__(self, rules: Sequence[tuple[int, StoryRule]], first: Mapping[str, int]) -> None:
+        self._takes = {
+            index: frozenset(
+                kinds
+                for kinds in (_SPEED, _PLACE)
+                if any(action.kind in kinds for item in rule.then for action in item.parts)
+            )
+            for index, rule in rules
+        }
+        self._waiting = {
+            (min(index, other), max(index, other))
+            for index, rule in rules
+            for _, kind, part in rule_parts(rule, "")
+            if kind == "rule"
+            and (other := first.get(getattr(part, "id", ""), index)) != index
+            and other in self._takes
+            and self._takes[index] & self._takes[other]
+        }
+
+    def number(self) -> int:
+        """How many pairs there are."""
+        speed, place, both = (
+            sum(these <= takes for takes in self._takes.values())
+            for these in ({_SPEED}, {_PLACE}, {_SPEED, _PLACE})
+        )
+        # Who takes both clashes with another of those once, not twice.
+        pairs = comb(speed, 2) + comb(place, 2) - comb(both, 2)
+        return pairs - len(self._waiting)
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        """Yield the places of both rules, in their order; what clashes with nothing is passed over.
+
+        Each step looks at rules that clash only, but for those that wait.
+        """
+        of_kind = {
+            kinds: [index for index, takes in self._takes.items() if kinds in takes]
+            for kinds in (_SPEED, _PLACE)
+        }
+        for index, takes in self._takes.items():
+            later = [_above(index, of_kind[kinds]) for kinds in takes]
+            last = index
+            for other in merge(*later):
+                if other != last and (index, other) not in self._waiting:
+                    yield index, other
+                last = other
 
 
-def _waits_for_rule(rule: StoryRule, other: StoryRule) -> bool:
-    parts = (part for _, kind, part in rule_parts(rule, "") if kind == "rule")
-    return any(getattr(part, "id", None) == other.id for part in parts)
+def _above(least: int, ordered: Sequence[int]) -> Iterator[int]:
+    return (ordered[at] for at in range(bisect_right(ordered, least), len(ordered)))
 
 
 def _list_names(names: Sequence[str]) -> str:

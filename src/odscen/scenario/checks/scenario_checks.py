@@ -18,7 +18,7 @@ from odscen.scenario.checks.demand_checks import demand_problems, parking_proble
 from odscen.scenario.checks.measure_checks import measure_problems
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.checks.signal_checks import signal_problems
-from odscen.scenario.document.problems import Problem, error, warning
+from odscen.scenario.document.problems import MOST_OF_KIND, Problem, error, limited, warning
 from odscen.scenario.placing.bodies import Box, Crowd, box_at
 from odscen.scenario.placing.region import Region, place_of
 
@@ -52,10 +52,10 @@ def study_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
                     yield error("wrong_graph", at, message, nodes=[node])
 
 
+_LISTED = 30
+"""Names that a message lists at most."""
 SAME_TIME = 1.0
 """Actors that depart within this many seconds of each other are on the road together."""
-MOST = 1000
-"""Overlaps that are reported; nobody reads more, and there may be billions."""
 
 
 class _Start(NamedTuple):
@@ -94,12 +94,14 @@ def start_overlaps(
 ) -> Iterator[Problem]:
     """Find bodies that share ground while both have just departed, the first thousand of them.
 
+    There may be billions.
+
     Takes time in proportion to the actors and to what is found, however many start at one place.
     """
     found = 0
     for index, others in _find_overlapping(scenario, region, assets):
         actor = scenario.actors[index]
-        for other in (scenario.actors[number] for number in others[: MOST - found]):
+        for other in (scenario.actors[one] for one in others[: MOST_OF_KIND - found]):
             yield error(
                 "bodies_overlap",
                 f"actors[{index}].spawn",
@@ -108,7 +110,7 @@ def start_overlaps(
                 nodes=[actor.spawn, other.spawn],
             )
         found += len(others)
-        if found >= MOST:
+        if found >= MOST_OF_KIND:
             return
 
 
@@ -155,6 +157,9 @@ def check(
 ) -> tuple[Problem, ...]:
     """Find everything that is wrong with a scenario on its map.
 
+    Of very many problems of one kind the first thousand are listed, see
+    :func:`~odscen.scenario.document.problems.limited`; :func:`every_problem` yields all.
+
     Parameters
     ----------
     graph
@@ -173,30 +178,50 @@ def check(
     -------
     Problems in the order of the document, map and region first, errors and warnings mixed.
     """
-    found = list(map_problems(scenario, graph))
-    if found:
-        return (*found, *_document_problems(scenario))
+    return tuple(
+        limited(every_problem(scenario, graph, assets, lights, parking=parking, region=region))
+    )
+
+
+def every_problem(
+    scenario: Scenario,
+    graph: MapGraph,
+    assets: AssetLookup | None = None,
+    lights: Sequence[Light] | None = None,
+    *,
+    parking: MapParking | None = None,
+    region: Region | None = None,
+) -> Iterator[Problem]:
+    """Yield what :func:`check` finds, however much it is; parameters as there.
+
+    Of kinds of which there is one for each two parts of a scenario, such as rules that move an
+    actor at once, there are only the first, and one problem that stands for the others.
+    """
+    on_other_map = list(map_problems(scenario, graph))
+    if on_other_map:
+        yield from on_other_map
+        yield from _document_problems(scenario)
+        return
     region = Region.of(graph, scenario.roi) if region is None else region
-    found += roi_problems(scenario, graph)
-    found += _document_problems(scenario)
-    found += _environment_problems(scenario, assets)
+    yield from roi_problems(scenario, graph)
+    yield from _document_problems(scenario)
+    yield from _environment_problems(scenario, assets)
     region.look_up(leg for actor in scenario.actors for leg in legs(actor))
     for index in range(len(scenario.actors)):
-        found += actor_problems(scenario, region, index, assets)
+        yield from actor_problems(scenario, region, index, assets)
     for index in range(len(scenario.flows)):
-        found += flow_problems(scenario, region, index)
-    found += demand_problems(scenario, region)
-    found += parking_problems(scenario, region, parking)
-    found += transit_problems(scenario, region)
+        yield from flow_problems(scenario, region, index)
+    yield from demand_problems(scenario, region)
+    yield from parking_problems(scenario, region, parking)
+    yield from transit_problems(scenario, region)
     if lights is not None:
         clock, until = scenario.demand.clock, scenario.simulation.duration
-        found += signal_problems(scenario.signals, lights, clock=clock, until=until)
-    found += measure_problems(scenario, region, lights)
-    found += study_problems(scenario, graph)
-    found += rule_problems(scenario, region, lights)
-    found += shared_nodes(scenario)
-    found += start_overlaps(scenario, region, assets)
-    return tuple(found)
+        yield from signal_problems(scenario.signals, lights, clock=clock, until=until)
+    yield from measure_problems(scenario, region, lights)
+    yield from study_problems(scenario, graph)
+    yield from rule_problems(scenario, region, lights)
+    yield from shared_nodes(scenario)
+    yield from start_overlaps(scenario, region, assets)
 
 
 def roi_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
@@ -259,12 +284,14 @@ def _document_problems(scenario: Scenario) -> Iterator[Problem]:
     yield from duplicate_ids(scenario)
     egos = [actor.id for actor in scenario.actors if actor.ego]
     if len(egos) > 1:
-        message = f"{', '.join(map(repr, egos))} are all the ego; keep one"
+        names = some_of([*map(repr, egos)], between=", ")
+        message = f"{names} are all the ego; keep one"
         yield error("several_egos", "actors", message)
     styles = scenario.drivers.styles
+    listed = some_of(list(styles), most=_LISTED, between=", ")
     for index, actor in enumerate(scenario.actors):
         if actor.style not in styles:
-            message = f"{actor.id!r} drives as {actor.style!r}; there are {', '.join(styles)}"
+            message = f"{actor.id!r} drives as {actor.style!r}; there are {listed}"
             yield error("unknown_style", f"actors[{index}].style", message)
     headway, step = scenario.drivers.headway, scenario.simulation.step_length
     if headway is not None and headway < step:
@@ -291,7 +318,8 @@ def _environment_problems(scenario: Scenario, assets: AssetLookup | None) -> Ite
         return
     for name in environment.parameters:
         if name not in parameters:
-            message = f"weather has no parameter {name!r}; there are {', '.join(parameters)}"
+            listed = some_of(list(parameters), most=_LISTED, between=", ")
+            message = f"weather has no parameter {name!r}; there are {listed}"
             yield error("unknown_parameter", f"environment.parameters.{name}", message)
 
 

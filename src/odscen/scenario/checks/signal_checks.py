@@ -6,8 +6,9 @@ from collections import Counter
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from odscen.base.shown import shown, some_of
 from odscen.scenario.document.problems import error, warning
-from odscen.scenario.signals.light import find_light, find_movements, known_names
+from odscen.scenario.signals.light import find_movements, known_names, lights_by_name
 from odscen.scenario.signals.program_design import (
     DesignedProgram,
     active_plans,
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 
 _SAME = 1e-6
+_NAMED = 60
+"""Groups, stages or movements that a message names; a light has fewer."""
 
 
 def program_problems(
@@ -97,7 +100,7 @@ def _find_unknown(
 ) -> Iterator[Problem]:
     for name in names:
         if name not in known:
-            listed = ", ".join(map(repr, sorted(known)))
+            listed = some_of([repr(other) for other in sorted(known)], most=_NAMED, between=", ")
             yield error(
                 f"unknown_{kind}", where, f"there is no {kind} {name!r}; there are {listed}"
             )
@@ -110,7 +113,7 @@ def _movement_problems(timing: JunctionTiming, light: Light, where: str) -> Iter
             place = f"{where}.groups[{index}].movements[{number}]"
             found = find_movements(name, light.movements)
             if not found:
-                listed = ", ".join(known_names(light.movements))
+                listed = some_of(known_names(light.movements), most=_NAMED, between=", ")
                 message = f"no movement of this light is called {name!r}; there are {listed}"
                 yield error("unknown_movement", place, message)
             for n in found:
@@ -163,9 +166,14 @@ def _find_conflict(program: DesignedProgram, stage: PlannedStage, meeting: Meeti
 
 
 def _intergreen_problems(program: DesignedProgram, where: str) -> Iterator[Problem]:
+    # Plans that have the same stages, of whatever length, are looked at once.
+    orders = {
+        frozenset(stage._replace(id="", green=0, least=0, most=0) for stage in plan.stages)
+        for plan in program.plans()
+    }
     follows = {
         (group, other)
-        for stages in (plan.stages for plan in program.plans())
+        for stages in orders
         for stage in stages
         for following in stages
         for group in stage.groups - following.groups
@@ -308,12 +316,12 @@ def signal_problems(
         Seconds that it lasts, for the plans that it does not come to.
     """
     timed: dict[tuple[str, ...], str] = {}
+    light_of = lights_by_name(lights)
     for index, timing in enumerate(signals.junctions):
         where = f"signals.junctions[{index}]"
-        light = find_light(lights, timing.junction)
+        light = light_of.get(timing.junction)
         if light is None:
-            known = _describe_known_lights(lights)
-            message = f"there is no traffic light in junction {timing.junction!r}; {known}"
+            message = no_light_in(timing.junction, lights)
             yield error("unknown_light", f"{where}.junction", message)
             continue
         if light.names in timed:
@@ -388,6 +396,13 @@ def _coordination_problems(signals: Signals) -> Iterator[Problem]:
                     f"{timing.coordination!r} has {seconds:g} s; give both one"
                 )
                 yield error("cycles_of_coordination", f"{where}.cycle", message)
+
+
+def no_light_in(junction: str, lights: Sequence[Light]) -> str:
+    """Say that a junction has no light, and some that have one."""
+    return (
+        f"there is no traffic light in junction {shown(junction)}; {_describe_known_lights(lights)}"
+    )
 
 
 def _describe_known_lights(lights: Sequence[Light]) -> str:

@@ -179,12 +179,16 @@ def _compare_flows(
     onwards: Mapping[str, set[str]],
     before: Mapping[str, set[str]],
 ) -> Iterator[_Found]:
-    turns = [place for place in counted if len(place) == 3]
+    leaving: dict[tuple[str, ...], list[tuple[str, ...]]] = defaultdict(list)
+    coming: dict[tuple[str, ...], list[tuple[str, ...]]] = defaultdict(list)
+    for place in counted:
+        if len(place) == 3:
+            leaving[place[:2]].append(place)
+            coming[place[1:]].append(place)
     for flow, number in counted.items():
         if len(flow) != 2:
             continue
-        out = [turn for turn in turns if turn[:2] == flow]
-        into = [turn for turn in turns if turn[1:] == flow]
+        out, into = leaving.get(flow, []), coming.get(flow, [])
         every_out = onwards.get(flow[1], set()) <= {turn[2] for turn in out} | {flow[0]}
         every_in = before.get(flow[0], set()) <= {turn[0] for turn in into} | {flow[1]}
         for some, every, word in ((out, every_out, "continue"), (into, every_in, "come")):

@@ -62,7 +62,12 @@ def entries(region: Region) -> tuple[Entry, ...]:
 
     A lane leads into the region where its node has no predecessor inside, and the lanes beside it
     have none there either: one that begins where the road widens is no entry. Junctions have none.
+    They are found once for all that ask for those of a region.
     """
+    return region.remembered("entries", lambda: _find_entries(region))
+
+
+def _find_entries(region: Region) -> tuple[Entry, ...]:
     graph = region.graph
     lanes, ids = graph.lanes, graph.segments.ids
     found: dict[tuple[int, bool], list[EntryLane]] = defaultdict(list)
@@ -76,7 +81,7 @@ def entries(region: Region) -> tuple[Entry, ...]:
         Entry(
             str(ids[segment]),
             "forward" if forward else "backward",
-            tuple(sorted(found[segment, forward], key=lambda lane: -abs(lane.lane))),
+            tuple(sorted(found[segment, forward], key=lambda one: -abs(one.lane))),
         )
         for segment, forward in sorted(found, key=lambda key: (key[0], not key[1]))
     )

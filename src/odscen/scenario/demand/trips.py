@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.scenario.demand.day_profiles import curve
-from odscen.scenario.demand.zones import segments_of
+from odscen.scenario.demand.zones import zone_segments
 from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.sampling_config import PlacingRules
 from odscen.scenario.placing.bodies import Crowd, box_at
@@ -292,8 +292,11 @@ class Trips:
 
 def matrix_trips(scenario: Scenario, ground: TripEnds, matrix: Matrix) -> Iterable[Trips]:
     """Yield the trips of each row of a matrix."""
-    zones = [zone.id for zone in scenario.demand.zones]
-    names = [*zones, *map(str, ground.region.graph.segments.ids)]
+    zones = zone_segments(scenario.demand)
+    names = [
+        *(zone.id for zone in scenario.demand.zones),
+        *map(str, ground.region.graph.segments.ids),
+    ]
     order = {name: row for row, name in reversed(tuple(enumerate(names)))}
     mix = ",".join(sorted(matrix.mix))
     (part,) = stream(scenario.seed, "parts", mix).random(1).tolist()
@@ -310,10 +313,7 @@ def matrix_trips(scenario: Scenario, ground: TripEnds, matrix: Matrix) -> Iterab
             EvenShares((start, goal, part), row),
             name=f"{matrix.id}.{origin}-{destination}",
             number=number,
-            between=(
-                segments_of(scenario.demand, origin),
-                segments_of(scenario.demand, destination),
-            ),
+            between=(zones.get(origin, (origin,)), zones.get(destination, (destination,))),
         )
 
 

@@ -29,6 +29,14 @@ def segments_of(demand: Demand, name: str) -> tuple[str, ...]:
     return next((zone.segments for zone in demand.zones if zone.id == name), (name,))
 
 
+def zone_segments(demand: Demand) -> dict[str, tuple[str, ...]]:
+    """Return the segments of all zones by their ids; of two with one id those of the first.
+
+    For many names: :func:`segments_of` goes through all zones for each.
+    """
+    return {zone.id: zone.segments for zone in reversed(demand.zones)}
+
+
 def place_segments(place: str) -> tuple[str, ...]:
     """Return the segments that a count station names, in the order in which they are passed."""
     return tuple(place.split(PLACE_SEPARATOR))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -10,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from odscen.base.errors import ScenarioError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from pydantic_core import ErrorDetails
 
@@ -111,8 +112,53 @@ def warning(
     return Problem("warning", code, where, message, tuple(nodes), tuple(segments))
 
 
+MOST_OF_KIND = 1000
+"""Problems of one kind that are listed; nobody reads more."""
+MOST_PAIRS = 200
+"""Of a kind of which there is one for each two parts of a scenario."""
+
+
+def more_of_kind(like: Problem, number: int) -> Problem:
+    """Stand in for ``number`` more problems of the severity and code of one that is listed.
+
+    Its place is the list that all of them are in, ``rules`` of ``rules[7].id``.
+    """
+    return Problem(
+        like.severity, like.code, like.where.partition("[")[0], f"and {number:,} more of this kind"
+    )
+
+
+def limited(
+    problems: Iterable[Problem], *, most: int = MOST_OF_KIND, where: str | None = None
+) -> Iterator[Problem]:
+    """Yield the first problems of each kind, and behind all of them how many more there are.
+
+    Parameters
+    ----------
+    most
+        Problems of a kind, which is a severity and a code.
+    where
+        Place of what stands for the others, if not :func:`more_of_kind` finds it.
+    """
+    seen: Counter[tuple[Severity, str]] = Counter()
+    first: dict[tuple[Severity, str], Problem] = {}
+    for problem in problems:
+        kind = problem.severity, problem.code
+        seen[kind] += 1
+        first.setdefault(kind, problem)
+        if seen[kind] <= most:
+            yield problem
+    for kind, number in seen.items():
+        if number > most:
+            more = more_of_kind(first[kind], number - most)
+            yield more if where is None else replace(more, where=where)
+
+
 def refuse_errors(problems: Iterable[Problem], *, file: str | None = None) -> None:
-    """Raise :class:`ScenarioError` with all errors among ``problems``; warnings pass."""
+    """Raise :class:`ScenarioError` with the errors among ``problems``; warnings pass.
+
+    Of each kind as many are listed as :func:`limited` does.
+    """
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors:
         return
@@ -120,6 +166,6 @@ def refuse_errors(problems: Iterable[Problem], *, file: str | None = None) -> No
         raise ScenarioError(errors[0].message, element=errors[0].where, file=file)
     raise ScenarioError(
         f"the scenario has {len(errors)} errors",
-        problems=[f"{p.where}: {p.message}" for p in errors],
+        problems=[f"{problem.where}: {problem.message}" for problem in limited(errors)],
         file=file,
     )

@@ -6,7 +6,7 @@ that have green together), intergreens between groups, plans of the day.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -14,6 +14,10 @@ from odscen.scenario.document.document_parts import Identifier, Label, Part
 
 SignalSeconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
 Control = Literal["fixed", "actuated"]
+MOST_STAGES: Final = 100
+"""Stages of a program, and groups; each stage is held against each."""
+MOST_PLANS: Final = 100
+"""Plans of a day of one light; each has all stages."""
 ClockTime = Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d(:[0-5]\d)?$")]
 """Time of day, ``06:30`` or ``06:30:15``."""
 
@@ -30,7 +34,7 @@ class ProgramGroup(Part):
     """
 
     id: Identifier
-    movements: Annotated[tuple[Label, ...], Field(min_length=1)]
+    movements: Annotated[tuple[Label, ...], Field(min_length=1, max_length=1000)]
     yellow: SignalSeconds | None = None
     all_red: SignalSeconds | None = None
     min_green: SignalSeconds | None = None
@@ -71,7 +75,7 @@ class SignalDetector(Part):
     at: Label
     before: Annotated[float, Field(ge=0, le=1000)] = 30.0
     length: Annotated[float, Field(gt=0, le=100)] = 2.0
-    stages: Annotated[tuple[Identifier, ...], Field(min_length=1)]
+    stages: Annotated[tuple[Identifier, ...], Field(min_length=1, max_length=MOST_STAGES)]
     gap: Annotated[float, Field(gt=0, le=60)] = 3.0
 
 
@@ -83,10 +87,10 @@ class DayPlan(Part):
     """
 
     id: Identifier
-    times: tuple[ClockTime, ...] = ()
+    times: Annotated[tuple[ClockTime, ...], Field(max_length=1440)] = ()
     cycle: SignalSeconds | None = None
     offset: SignalSeconds = 0.0
-    stages: tuple[Identifier, ...] = ()
+    stages: Annotated[tuple[Identifier, ...], Field(max_length=MOST_STAGES)] = ()
     green: dict[Identifier, SignalSeconds] = Field(default_factory=dict)
     min_green: dict[Identifier, SignalSeconds] = Field(default_factory=dict)
     max_green: dict[Identifier, SignalSeconds] = Field(default_factory=dict)
@@ -111,11 +115,14 @@ class JunctionTiming(Part):
     green: tuple[SignalSeconds, ...] = ()
     cycle: SignalSeconds | None = None
     coordination: Identifier | None = None
-    groups: tuple[ProgramGroup, ...] = ()
-    stages: tuple[ProgramStage, ...] = ()
-    intergreens: tuple[tuple[Identifier, Identifier, SignalSeconds], ...] = ()
-    detectors: tuple[SignalDetector, ...] = ()
-    plans: tuple[DayPlan, ...] = ()
+    groups: Annotated[tuple[ProgramGroup, ...], Field(max_length=MOST_STAGES)] = ()
+    stages: Annotated[tuple[ProgramStage, ...], Field(max_length=MOST_STAGES)] = ()
+    intergreens: Annotated[
+        tuple[tuple[Identifier, Identifier, SignalSeconds], ...],
+        Field(max_length=MOST_STAGES * MOST_STAGES),
+    ] = ()
+    detectors: Annotated[tuple[SignalDetector, ...], Field(max_length=1000)] = ()
+    plans: Annotated[tuple[DayPlan, ...], Field(max_length=MOST_PLANS)] = ()
     bus_priority: bool | None = None
 
     @model_validator(mode="after")

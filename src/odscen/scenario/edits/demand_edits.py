@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from contextlib import contextmanager
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
-from odscen.base.errors import NotFoundError
+from odscen.base.errors import NotFoundError, ScenarioError
 from odscen.scenario.checks.actor_checks import Subject
 from odscen.scenario.checks.demand_checks import demand_problems, transit_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids
@@ -37,12 +39,12 @@ from odscen.scenario.edits.edit_registry import (
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from odscen.lanegraph.graphs import MapGraph
 
 
-_Part = TypeVar("_Part", bound=Zone | Profile | VehicleInput | Matrix | Counts | Background)
+_Part = TypeVar("_Part", bound=Profile | Counts | Background)
 
 
 @edit("Change the time of day at the start")
@@ -95,10 +97,7 @@ def set_zone(
     scenario: Scenario, graph: MapGraph, *, zone: Identifier, segments: Sequence[str]
 ) -> Scenario:
     """Give segments a name that matrices can use; a zone of that name is replaced."""
-    part = validated(Zone, {"id": zone, "segments": tuple(segments)})
-    return _check_demand(
-        _change_demand(scenario, zones=_put_part(scenario.demand.zones, part)), graph
-    )
+    return put_parts(scenario, graph, "zones", {zone: {"segments": tuple(segments)}})
 
 
 @edit("Day profile {profile}")
@@ -134,11 +133,7 @@ def set_input(
     ScenarioError
         If no lane leads into the region there, or to where the vehicles go, or the name is taken.
     """
-    old = scenario.demand.inputs
-    if {"per_hour", "volumes"} & fields.keys():
-        fields = {"per_hour": None, "volumes": (), **fields}
-    part = _change_or_make_part(VehicleInput, old, inflow, fields)
-    return _check_demand(_change_demand(scenario, inputs=_put_part(old, part)), graph)
+    return put_parts(scenario, graph, "inputs", {inflow: fields})
 
 
 @edit("Trips {matrix}")
@@ -158,9 +153,7 @@ def set_matrix(
     ScenarioError
         If an origin or destination is unknown or outside the region, or the name is taken.
     """
-    old = scenario.demand.matrices
-    part = _change_or_make_part(Matrix, old, matrix, fields)
-    return _check_demand(_change_demand(scenario, matrices=_put_part(old, part)), graph)
+    return put_parts(scenario, graph, "matrices", {matrix: fields})
 
 
 @edit("Counts {counts}")
@@ -235,6 +228,61 @@ def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario
         part,
         [one.id for kind in kinds for one in getattr(scenario.demand, kind)],
     )
+
+
+_MODELS: Mapping[str, type[Zone | VehicleInput | Matrix]] = MappingProxyType(
+    {"zones": Zone, "inputs": VehicleInput, "matrices": Matrix}
+)
+
+
+def put_parts(
+    scenario: Scenario,
+    graph: MapGraph,
+    kind: Literal["zones", "inputs", "matrices"],
+    parts: Mapping[str, Mapping[str, Any]],
+) -> Scenario:
+    """Put many parts into the demand, all or none; each as the edit of its kind does.
+
+    The whole demand is checked once, and not once for each of them.
+
+    Parameters
+    ----------
+    parts
+        Fields of each, by its id; those not given stay as they are where the demand has it already.
+
+    Raises
+    ------
+    ScenarioError
+        With the places of what is wrong, as ``demand.inputs[4].segment``.
+    """
+    model = _MODELS[kind]
+    known = getattr(scenario.demand, kind)
+    index_of_part = {part.id: index for index, part in reversed([*enumerate(known)])}
+    changed = list(known)
+    for name, fields in parts.items():
+        index = index_of_part.get(name, len(changed))
+        old = changed[index] if index < len(changed) else None
+        kept = {} if old is None else {field: getattr(old, field) for field in model.model_fields}
+        if kind == "inputs" and {"per_hour", "volumes"} & fields.keys():
+            kept |= {"per_hour": None, "volumes": ()}
+        with _at(f"demand.{kind}[{index}]", when=len(parts) > 1):
+            part = validated(model, {**kept, **fields, "id": name})
+        if old is None:
+            changed.append(part)
+        else:
+            changed[index] = part
+    return _check_demand(_change_demand(scenario, **{kind: tuple(changed)}), graph)
+
+
+@contextmanager
+def _at(where: str, *, when: bool) -> Iterator[None]:
+    """Add its place to what is wrong with one of several parts."""
+    try:
+        yield
+    except ScenarioError as failed:
+        if when:
+            failed.element = where
+        raise
 
 
 def _change_or_make_part(

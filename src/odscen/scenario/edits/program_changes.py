@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
-from odscen.scenario.checks.signal_checks import LEAST_GREEN, signal_problems
-from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.checks.signal_checks import LEAST_GREEN, no_light_in, signal_problems
+from odscen.scenario.document.problems import refuse_errors, validated
 from odscen.scenario.document.signals_document import JunctionTiming
 from odscen.scenario.edits.edit_registry import changed_part, with_fields
 from odscen.scenario.signals.light import find_light
@@ -26,12 +26,21 @@ if TYPE_CHECKING:
 
 def timing_of_light(
     scenario: Scenario, lights: Sequence[Light], junction: str
-) -> tuple[Light | None, JunctionTiming]:
-    """The light in a junction, and what the scenario says of it."""
+) -> tuple[Light, JunctionTiming]:
+    """The light in a junction, and what the scenario says of it.
+
+    Raises
+    ------
+    ScenarioError
+        If no light is in the junction.
+    """
     light = find_light(lights, junction)
-    names = () if light is None else light.names
-    known = (junction for junction in scenario.signals.junctions if junction.junction in names)
-    return light, next(known, JunctionTiming(junction=junction))
+    timings = scenario.signals.junctions
+    if light is None:
+        element = f"signals.junctions[{len(timings)}].junction"
+        raise ScenarioError(no_light_in(junction, lights), element=element)
+    known = next((timing for timing in timings if timing.junction in light.names), None)
+    return light, known or validated(JunctionTiming, {"junction": junction})
 
 
 def own_program(
@@ -43,9 +52,11 @@ def own_program(
     ------
     InputError
         If it has none.
+    ScenarioError
+        If no light is in the junction.
     """
     light, timing = timing_of_light(scenario, lights, junction)
-    if light is None or not timing.stages:
+    if not timing.stages:
         raise InputError(
             f"the light of junction {junction!r} has no program of this scenario; take over that "
             "of the map first"

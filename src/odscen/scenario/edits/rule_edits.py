@@ -62,12 +62,7 @@ def set_rule(
             for story_rule in rules
         )
     scenario = with_fields(scenario, rules=rules)
-    problems = rule_problems(scenario, Region.of(graph, scenario.roi), lights)
-    refuse_errors(
-        problem
-        for problem in problems
-        if problem.where.startswith(f"rules[{index}]") or problem.code == "duplicate_id"
-    )
+    refuse_errors(rule_problems(scenario, Region.of(graph, scenario.roi), lights, only=index))
     return scenario
 
 

@@ -108,8 +108,6 @@ def set_green(
         If no light is in the junction, or a green is too short or out of the stage's bounds.
     """
     light, old = timing_of_light(scenario, lights, junction)
-    if light is None:
-        return with_timing(scenario, lights, old)
     new = with_green(old, light, stage=stage, green=green, plan=plan, keep_cycle=keep_cycle)
     return with_timing(scenario, lights, new, strict=True)
 

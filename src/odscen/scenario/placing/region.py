@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -24,11 +24,14 @@ from odscen.lanegraph.query import (
 from odscen.lanegraph.shortest_paths import Router, WalkRouter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from odscen.base.arrays import BoolArray, Int32Array
     from odscen.base.categories import Body
     from odscen.lanegraph.graphs import LaneGraph, MapGraph, PedestrianGraph
+
+
+_Found = TypeVar("_Found")
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +85,7 @@ class _PathsInside:
         self.leads: dict[tuple[NodePlace, NodePlace], bool] = {}
         self.candidates: dict[tuple[NodePlace, NodePlace], bool] = {}
         self.places: dict[str, NodePlace | None] = {}
+        self.remembered: dict[str, object] = {}
         self._over: tuple[BoolArray, Router] | None = None
 
     @cached_property
@@ -138,6 +142,13 @@ class Region:
         """Paths on the pedestrian graph inside the region."""
         return self._ways.walk_router
 
+    def remembered(self, name: str, find: Callable[[], _Found]) -> _Found:
+        """What other modules find of a region, by a name of theirs; found at the first call."""
+        known = self._ways.remembered
+        if name not in known:
+            known[name] = find()
+        return cast("_Found", known[name])
+
     def router_over(self, mask: BoolArray) -> Router:
         """Paths inside the region over the nodes of a mask, shape ``(N,)``; the last is kept."""
         return self._ways.over(mask)
@@ -184,9 +195,13 @@ class Region:
         """Whether a path inside the region leads from ``spawn`` on to ``goal``."""
         if spawn.walk != goal.walk or spawn == goal or not self.holds(goal):
             return False
-        known = self._ways.leads.get((spawn, goal))
+        leads = self._ways.leads
+        known = leads.get((spawn, goal))
         if known is None:
+            if len(leads) > _MOST:
+                leads.clear()
             known = bool(self.router_of(spawn).reachable(spawn.node)[goal.node])
+            leads[spawn, goal] = known
         return known
 
     def path_over(self, nodes: Sequence[int], *, walk: bool) -> Int32Array:

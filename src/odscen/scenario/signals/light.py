@@ -129,6 +129,11 @@ def find_light(lights: Sequence[Light], junction: str) -> Light | None:
     return next((light for light in lights if junction in light.names), None)
 
 
+def lights_by_name(lights: Sequence[Light]) -> dict[str, Light]:
+    """Lights by all that a scenario may call them, as :func:`find_light` finds them."""
+    return {name: light for light in reversed(lights) for name in light.names}
+
+
 TURNS = ("left", "straight", "right", "turnaround")
 
 

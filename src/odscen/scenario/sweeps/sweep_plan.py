@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
+from collections import Counter
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final, Protocol
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 
 from odscen.base.errors import InputError, MissingDependencyError, ScenarioError
+from odscen.base.shown import some_of
 from odscen.scenario.document.json_form import with_values
 
 if TYPE_CHECKING:
@@ -49,14 +51,19 @@ class Range:
         return (self.name,)
 
     @property
-    def shares(self) -> Sequence[float]:
-        """Shares of the range of the values on a grid; :class:`InputError` without steps."""
+    def count(self) -> int:
+        """How many values there are on a grid; :class:`InputError` without steps."""
         if self.steps is None:
             raise InputError(
                 f"{self.name}: a grid needs the number of steps: {self.name}={self.low:g}.."
                 f"{self.high:g}:10; or give a number of samples"
             )
-        return [step / (self.steps - 1) for step in range(self.steps)]
+        return self.steps
+
+    @property
+    def shares(self) -> Sequence[float]:
+        """Shares of the range of the values on a grid; :class:`InputError` without steps."""
+        return [step / (self.count - 1) for step in range(self.count)]
 
     def at(self, share: float) -> tuple[float, ...]:
         """Value at a share of the range, from 0 to 1."""
@@ -69,6 +76,11 @@ class Table:
 
     names: tuple[str, ...]
     rows: tuple[tuple[float, ...], ...]
+
+    @property
+    def count(self) -> int:
+        """How many rows there are."""
+        return len(self.rows)
 
     @property
     def shares(self) -> Sequence[float]:
@@ -103,8 +115,8 @@ class SweepPlan:
 
     def __post_init__(self) -> None:
         names = self.names
-        for name in names:
-            if names.count(name) > 1:
+        for name, number in Counter(names).items():
+            if number > 1:
                 raise InputError(f"parameter {name!r} is varied twice")
         if not names:
             raise InputError(
@@ -114,6 +126,28 @@ class SweepPlan:
         if counted != (self.samples is not None):
             needs = "needs a" if counted else "takes no"
             raise InputError(f"method {self.method} {needs} number of samples")
+        self._refuse_too_many()
+
+    def _refuse_too_many(self) -> None:
+        """Raise if there are more cases than may be: before any of them is made."""
+        if self.samples is not None:
+            if self.samples > MOST_CASES:
+                raise InputError(
+                    f"samples: the sweep has {self.samples:,} cases; at most {MOST_CASES:,} are "
+                    "possible"
+                )
+            return
+        counts = [
+            (",".join(axis.names), axis.count)
+            for axis in self.axes
+            if isinstance(axis, Table) or axis.steps is not None
+        ]
+        number = math.prod(count for _, count in counts)
+        if number > MOST_CASES:
+            listed = some_of([f"{name} has {count:,} values" for name, count in counts])
+            raise InputError(
+                f"the sweep has {number:,} cases; at most {MOST_CASES:,} are possible: {listed}"
+            )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -126,17 +160,15 @@ class SweepPlan:
         Raises
         ------
         InputError
-            If there are too many, a grid lacks the steps of a range, or the method proposes cases
-            by what became of others.
+            If a grid lacks the steps of a range, or the method proposes cases by what became of
+            others.
         """
         kind = proposal_kind(self.method)
         if kind.learns:
             raise InputError(
                 f"method {self.method} learns from cases that have been run: only a search has it"
             )
-        count = self.samples or math.prod(len(axis.shares) for axis in self.axes)
-        if count > MOST_CASES:
-            raise InputError(f"the sweep has {count:,} cases; at most {MOST_CASES:,} are possible")
+        count = self.samples or math.prod(axis.count for axis in self.axes)
         return tuple(map(self.values_at, kind.start(self).ask(count).tolist()))
 
     def values_at(self, place: Sequence[float]) -> dict[str, float]:

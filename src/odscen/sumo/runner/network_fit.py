@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.scenario.document.problems import warning
-from odscen.scenario.document.scenario_document import Demand
+from odscen.scenario.document.scenario_document import Demand, Transit
 from odscen.scenario.placing.region import place_of
 from odscen.sumo.realize.realization import realize
 
@@ -54,10 +54,10 @@ def _distance_aside(sumo_map: SumoMap, place: NodePlace) -> float:
 def route_fit(scenario: Scenario, sumo_map: SumoMap) -> Iterator[Problem]:
     """Yield actors that have no route on the network; the scenario must be without errors.
 
-    Members of flows and of the demand are left out: there are many, and a run names those that it
-    cannot insert.
+    Members of flows, of the demand and of lines are left out: there are many, and a run names those
+    that it cannot insert.
     """
-    own = scenario.model_copy(update={"flows": (), "demand": Demand()})
+    own = scenario.model_copy(update={"flows": (), "demand": Demand(), "transit": Transit()})
     planned = realize(own, sumo_map).plan.actors
     reasons = {actor.id: actor.problem for actor in planned if actor.problem}
     for index, actor in enumerate(scenario.actors):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import ScenarioError
-from odscen.scenario.checks.scenario_checks import check
+from odscen.scenario.checks.scenario_checks import every_problem
 from odscen.scenario.document.rules_document import appearing_actors
 from odscen.sumo.realize.road_users.departures import road_users
 from odscen.sumo.realize.road_users.free_flow import FreeFlow, environment_effect
@@ -143,7 +143,7 @@ def _keep_plannable(
     """Scenario without the actors and flows that cannot be planned, and their ids."""
     wrong = {
         (found[1], int(found[2]))
-        for problem in check(scenario, sumo_map.graph, region=region)
+        for problem in every_problem(scenario, sumo_map.graph, region=region)
         if problem.severity == "error" and (found := _PLACED.match(problem.where))
     }
     kept: dict[str, tuple[object, ...]] = {}

@@ -1,0 +1,96 @@
+"""Small scenarios that much is wrong with: short answers, and a server that answers meanwhile."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import threading
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from odscen.app.scenarios import SUFFIX
+from odscen.maps.store import Workspace
+from odscen.web.routes import scenario_routes
+from tests.web.conftest import serving
+
+
+def rules_of_one_actor(workspace: Workspace, name: str, number: int) -> bytes:
+    """A scenario with so many rules that all move its first vehicle, and none of which waits."""
+    path = workspace.scenarios / f"{name}{SUFFIX}"
+    document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    rules = [
+        {
+            "id": f"r{n}",
+            "actor": document["actors"][0]["id"],
+            "when": {"time": {"after": float(n)}},
+            "then": [{"speed": {"to": 5.0, "over": 2.0}}],
+        }
+        for n in range(number)
+    ]
+    return json.dumps(document | {"rules": rules}).encode()
+
+
+def test_an_upload_of_many_rules_of_one_actor_is_answered_in_proportion(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    content = rules_of_one_actor(workspace, sampled, 1000)
+    answer = client.post("/api/scenarios/upload", files={"file": ("many.json", content)})
+    assert answer.status_code == 201
+    found = [one for one in answer.json()["problems"] if one["code"] == "rules_at_once"]
+    assert len(found) == 201
+    assert found[-1]["message"] == "and 499,300 more of this kind"
+    document = json.dumps(answer.json()["document"])
+    assert len(answer.content) < len(document) + 200_000
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("GET", "/api/scenarios/{name}", None),
+        ("GET", "/api/scenarios/{name}/problems", None),
+        ("POST", "/api/scenarios/{name}/edits", {"edits": [{"kind": "set_seed", "seed": 6}]}),
+    ],
+)
+def test_health_is_answered_while_a_scenario_is_checked(
+    workspace: Workspace,
+    sampled: str,
+    monkeypatch: pytest.MonkeyPatch,
+    method: str,
+    path: str,
+    body: dict[str, Any] | None,
+) -> None:
+    checking, healthy = threading.Event(), threading.Event()
+    check = scenario_routes.check
+
+    def waiting_check(*arguments: Any, **options: Any) -> Any:
+        checking.set()
+        assert healthy.wait(60), "health was not answered while the scenario was checked"
+        return check(*arguments, **options)
+
+    with serving(workspace, hosts=None) as address:
+
+        def ask(method: str, path: str, body: dict[str, Any] | None = None) -> tuple[int, Any]:
+            connection = http.client.HTTPConnection(address, timeout=60)
+            sent = None if body is None else json.dumps(body)
+            kind = {"Content-Type": "application/json"}
+            connection.request(method, path, sent, kind)
+            answer = connection.getresponse()
+            status, content = answer.status, answer.read()
+            connection.close()
+            return status, json.loads(content)
+
+        own = path.format(name=sampled)
+        status, state = ask("GET", f"/api/scenarios/{sampled}")
+        assert status == 200
+        monkeypatch.setattr(scenario_routes, "check", waiting_check)
+        statuses: list[int] = []
+        given = None if body is None else body | {"version": state["version"]}
+        asking = threading.Thread(target=lambda: statuses.append(ask(method, own, given)[0]))
+        asking.start()
+        assert checking.wait(60)
+        assert ask("GET", "/api/health")[0] == 200
+        healthy.set()
+        asking.join()
+    assert statuses == [200]
