@@ -420,7 +420,7 @@ def matrix_problems(matrix: Matrix, places: _Places, where: str) -> Iterator[Pro
     for index, (origin, destination, _) in enumerate(matrix.trips):
         pairs[origin, destination].append(index)
     for (origin, destination), rows in pairs.items():
-        if origin == destination and origin in known - zones:
+        if origin == destination and origin in places.known and origin not in places.zones:
             message = (
                 f"trips from segment {origin!r} to itself may end before they leave it; "
                 f"give another destination"
