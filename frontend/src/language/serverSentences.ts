@@ -547,6 +547,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "it is placed beyond the junction whose controller names it: taken for the approach before" }),
   msg({ message: "it is stopped, and is to stop at the first point" }),
   msg({ message: "it is stopped; the path has to say how fast it is followed" }),
+  msg({ message: "it is {low} m wide here, and the SUMO lane {width} m all along" }),
   msg({ message: "it is {max} m wide at most" }),
   msg({ message: "it leads there from where the actor begins" }),
   msg({ message: "it names no lane; the link is left out" }),
