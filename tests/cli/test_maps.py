@@ -9,7 +9,7 @@ import pytest
 
 from odscen.base.checksums import sums_of, write_sums
 from tests.cli.conftest import SHIPPED, odscen
-from tests.opendrive.snippets import document, road
+from tests.opendrive.snippets import document, lane, road, section
 
 STATISTICS = {
     "bounds",
@@ -285,3 +285,20 @@ def test_a_map_beyond_its_memory_ends_with_code_3_and_what_to_do(tmp_path):
     assert "long.xodr: building the map needs more than 0.25 GB of memory" in done.err
     assert "--build-memory 0.50" in done.err
     assert odscen("maps", "list", "--json", "--workspace", tmp_path).json["maps"] == []
+
+
+def test_the_first_line_of_a_map_says_what_is_lost_for_traffic(tmp_path):
+    sign = '<signal id="{}" s="90" t="-4" dynamic="no" country="DE" type="999" subtype="-1"/>'
+    access = '<access sOffset="0" rule="deny" restriction="throughTraffic"/>'
+    text = document(
+        road(
+            lanes=section(lane(-1, inside=access)),
+            inside=f"<signals>{sign.format(1)}{sign.format(2)}</signals>",
+        ),
+        road("2", length=0.0),
+    )
+    file = tmp_path / "stranger.xodr"
+    file.write_text(text)
+    done = odscen("maps", "add", file, "--workspace", tmp_path / "w")
+    assert done.code == 0
+    assert "; lost for traffic: 1 access rules, 1 roads, 2 signs not understood" in done.err

@@ -201,10 +201,14 @@ def test_recordings_of_real_runs_are_in_the_shards(tmp_path: Path) -> None:
     file = tmp_path / "plan.json"
     sample = {"maps": ["signal_crossing"], "count": 1, "fill": 0.3}
     study = {"sample": [sample], "seeds": 2, "run": {"until": 10.0}}
-    data = {"name": "d", "licence": "CC0-1.0", "formats": ["pyg", "waymo"], "study": study}
+    data = {"name": "d", "licence": "CC0-1.0", "study": study}
+    data["formats"] = ["pyg", "waymo", "scenarionet"]
     file.write_text(json.dumps(data), encoding="utf-8")
     facts = made(tmp_path / "out", read_dataset_plan(file), LocalExecutor(place(), 2))
     assert facts.left_out == {}
+    indexes = tmp_path / "out/train/scenarionet/shard-00000/dataset_summary.pkl"
+    index = pickle.loads(indexes.read_bytes())
+    assert [len(one["ts"]) for one in index.values()] == [96, 96]
     shard = tmp_path / "out/train/pyg/shard-00000"
     with np.load(shard / "signal_crossing-0000-as-designed-seed-2.npz") as arrays:
         assert json.loads(str(arrays["about"]))["seed"] == 2

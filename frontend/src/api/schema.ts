@@ -2953,10 +2953,17 @@ export interface components {
             /** @default [] */
             segments: string[];
         };
-        /** @description How demand is spread over a day: relative shares of equal slices, from midnight on. */
+        /**
+         * @description How demand is spread over a day: relative shares of equal slices, from midnight on.
+         *
+         *     With ``begin`` and ``end``, seconds after midnight in whole minutes, the slices are of the time
+         *     between them, and nothing comes before and after it.
+         */
         Profile: {
             id: string;
             shares: number[];
+            begin: number | null;
+            end: number | null;
         };
         /**
          * @description A signal group: movements that always show the same.

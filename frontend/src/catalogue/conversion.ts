@@ -49,7 +49,10 @@ const PLAIN = localized((): [RegExp, string][] => [
     /traffic lights have the network's programs/,
     t`The map does not say when its lights turn green: the programs of the network are used`,
   ],
-  [/its width varies from/, t`Lanes whose width changes have one width in the simulation`],
+  [
+    /its width varies from|m wide here, and the SUMO lane/,
+    t`Lanes whose width changes have one width in the simulation`,
+  ],
   [
     /traffic lights? have programs of odscen's own/,
     t`The map does not say when its lights turn green: they got a timing of their own, in which no two conflicting connections have green at the same time`,

@@ -15,8 +15,23 @@ export const profileWord = (id: string): string => WORD()[id] ?? id;
 /** All day profiles that a scenario can use: the built-in ones and its own. */
 export const profilesOf = (demand: Demand, builtIn: Profiles): Profiles => ({
   ...builtIn,
-  ...Object.fromEntries(demand.profiles.map(({ id, shares }) => [id, shares])),
+  ...Object.fromEntries(demand.profiles.map((profile) => [profile.id, sharesOfDay(profile)])),
 });
+
+const DAY_MINUTES = 1440;
+const gcd = (a: number, b: number): number => (b === 0 ? a : gcd(b, a % b));
+
+/** Shares of equal slices of the whole day; a profile between two times has nothing beside them. */
+export function sharesOfDay({ shares, begin, end }: Demand["profiles"][number]): readonly number[] {
+  if (begin == null || end == null) return shares;
+  const first = Math.round(begin / 60);
+  const slice = Math.round((end - begin) / 60 / shares.length);
+  const step = gcd(gcd(first, slice), DAY_MINUTES);
+  return Array.from(
+    { length: DAY_MINUTES / step },
+    (_, n) => shares[Math.floor((n * step - first) / slice)] ?? 0,
+  );
+}
 
 /** How traffic varies over the day, with a picture of it. */
 export function ProfileChoice({

@@ -21,7 +21,7 @@ from odscen.base.errors import DamagedError, DamagedFile
 from odscen.base.to_disk import write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping
     from pathlib import Path
 
 SUMS_FILE = "SHA256SUMS"
@@ -169,6 +169,42 @@ def refuse_damaged(folder: Path, sums: Mapping[str, str]) -> None:
         With each that is not as it was written.
     """
     wrong = damaged_files(folder, sums)
+    if wrong:
+        raise DamagedError(str(folder), wrong)
+
+
+def seal_files(folder: Path, names: Iterable[str]) -> None:
+    """Write down the checksums of files of a folder that have been written, beside those known."""
+    sums = read_sums(folder) or {}
+    write_sums(folder, {**sums, **{name: file_digest(folder / name) for name in names}})
+
+
+def unseal_files(folder: Path, names: Collection[str]) -> None:
+    """Forget the checksums of files that are about to be written anew: a kill may come between."""
+    sums = read_sums(folder) or {}
+    if not sums.keys().isdisjoint(names):
+        write_sums(folder, {name: one for name, one in sums.items() if name not in names})
+
+
+def check_files(
+    folder: Path, *, only: Collection[str] | None = None, may_miss: Collection[str] = ()
+) -> None:
+    """Compare files of a folder with their checksums, all of them or some.
+
+    One that has none was written by a process that was killed before it could write that down.
+    Those in ``may_miss`` may have been deleted, as they are made anew.
+
+    Raises
+    ------
+    DamagedError
+        With each that is not as it was written.
+    """
+    sums = read_sums(folder)
+    if sums is None:
+        say_unchecked(folder)
+        return
+    asked = {name: known for name, known in sums.items() if only is None or name in only}
+    wrong = damaged_files(folder, asked, may_miss=may_miss)
     if wrong:
         raise DamagedError(str(folder), wrong)
 

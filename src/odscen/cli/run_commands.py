@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from odscen.base.durations import clock, parse_duration
+from odscen.base.errors import InputError
 from odscen.base.shown import visible
 from odscen.cli.console import (
     BehaviourCommandOption,
@@ -320,16 +321,30 @@ def resume(
     behaviour: BehaviourOption = None,
     behaviour_set: BehaviourSettingOption = None,
     behaviour_cmd: BehaviourCommandOption = None,
+    behaviour_socket: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PATH",
+            help="The socket of the program that drives, of a run that was begun in Python.",
+        ),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Resume an interrupted long run; it ends as if it had not been interrupted.
 
-    A run that is driven by a program, a module or a file resumes when that is named again: what
-    a folder says is never executed by itself. Exit codes as of ``run``.
+    A run that is driven by a program, a socket, a module or a file resumes when that is named
+    again: what a folder says is never executed by itself. Exit codes as of ``run``.
     """
     from odscen.app.running import resumed_runs
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.maps.store import Workspace
+
+    driven = behaviour_door(behaviour, behaviour_set, behaviour_cmd, 60.0)
+    if behaviour_socket is not None:
+        if driven is not None:
+            raise InputError("give --behaviour, --behaviour-cmd or --behaviour-socket, one of them")
+        driven = BehaviourDoor(socket=behaviour_socket)
 
     with progress("resuming") as step:
         result = resumed_runs.resume(
@@ -337,7 +352,7 @@ def resume(
             run,
             time_limit=time_limit,
             reporter=_BarReporter(step).of_run(run.name),
-            behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, 60.0),
+            behaviour=driven,
         )
     show_results([result], as_json=as_json, several=False)
     raise typer.Exit(result.exit_code)

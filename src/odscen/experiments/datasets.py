@@ -9,6 +9,7 @@ complete.
 from __future__ import annotations
 
 import fnmatch
+import io
 import json
 import pickle
 import shutil
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 from pydantic import Field, model_validator
 
 from odscen.base.atomic_folders import new_folder
-from odscen.base.checksums import file_digest
+from odscen.base.checksums import SUMS_FILE, check_files, digest, file_digest, write_sums
 from odscen.base.errors import ConflictError, InputError, in_file
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
@@ -80,12 +81,51 @@ def write_shards(
     written = []
     for number, first in enumerate(range(0, len(runs), size)):
         part = runs[first : first + size]
-        files = {run: sorted(path for path in (staged / run).iterdir()) for run in part}
+        files = {run: _staged_files(staged / run) for run in part}
         folder = out / f"shard-{number:05d}"
         with new_folder(folder) as making:
             _WRITERS.get(form, _copy_files)(making, files)
         written.append(folder)
     return written
+
+
+def _staged_files(folder: Path) -> list[Path]:
+    """Files that a run was exported to, as they were written."""
+    check_files(folder)
+    return sorted(path for path in folder.iterdir() if path.name != SUMS_FILE)
+
+
+def _plain_array(shape: tuple[int, ...], kind: str, content: bytearray) -> Any:
+    """Array of numbers or texts as :func:`odscen.formats.scenarionet_format.pickled` has them."""
+    import numpy as np
+
+    if np.dtype(kind).hasobject:
+        raise pickle.UnpicklingError("it holds an array of objects")
+    return np.ndarray(shape, kind, content)
+
+
+_PLAIN: Final[dict[tuple[str, str], Callable[..., Any]]] = {
+    ("numpy", "ndarray"): _plain_array,
+    ("builtins", "bytearray"): bytearray,
+}
+
+
+class _PlainUnpickler(pickle.Unpickler):
+    """Reads texts, numbers, lists and arrays of them; all else would be code, and is refused."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) in _PLAIN:
+            return _PLAIN[module, name]
+        raise pickle.UnpicklingError(f"it holds {module}.{name}, which is no plain value")
+
+
+def _plain_values(path: Path) -> dict[str, object]:
+    """Index of a run in ScenarioNet's form."""
+    try:
+        found = _PlainUnpickler(io.BytesIO(path.read_bytes())).load()
+        return dict(found)
+    except Exception as error:  # whatever a file that is none leads to
+        raise InputError(f"not an index of scenarios: {error}", file=str(path)) from error
 
 
 def _copy_files(folder: Path, files: Mapping[str, Sequence[Path]]) -> None:
@@ -101,7 +141,7 @@ def _merge_scenarionet(folder: Path, files: Mapping[str, Sequence[Path]]) -> Non
         for paths in files.values():
             for path in paths:
                 if path.name == index:
-                    whole |= pickle.loads(path.read_bytes())  # noqa: S301 - our own, of this study
+                    whole |= _plain_values(path)
         (folder / index).write_bytes(pickled(whole))
     rest = {
         run: [path for path in paths if path.name not in _INDEXES] for run, paths in files.items()
@@ -392,6 +432,8 @@ def make_dataset(
         If another dataset is in the folder, or another process works there.
     """
     with disk_errors(f"dataset {out}"), locked(out, what=f"dataset {out.name!r}"):
+        if (out / SUMS_FILE).is_file():
+            check_files(out)
         # Before anything is written: a plan that is refused leaves the folder to another one.
         sources = found_sources(plan.study, workspace, beside=beside)
         plan.refuse_without_split(dict.fromkeys(source.map_name for source in sources.values()))
@@ -415,7 +457,9 @@ def _begin_dataset(out: Path, plan: DatasetPlan) -> None:
         if file.read_text(encoding="utf-8") != text:
             raise ConflictError(f"{out} holds a dataset of another plan; name another folder")
         return
+    out.mkdir(parents=True, exist_ok=True)
     write_text(file, text)
+    write_sums(out, {PLAN_FILE: digest(text.encode())})
 
 
 def folder_name(run: str) -> str:
@@ -425,8 +469,10 @@ def folder_name(run: str) -> str:
 
 def _stage_exports(out: Path, outcome: Outcome) -> None:
     for form, files in (outcome.exports or {}).items():
+        folder = out / STAGED_FOLDER / form / folder_name(outcome.name)
         for name, content in files.items():
-            write_file(out / STAGED_FOLDER / form / folder_name(outcome.name) / name, content)
+            write_file(folder / name, content)
+        write_sums(folder, {name: digest(content) for name, content in files.items()})
 
 
 def _choose_runs(plan: DatasetPlan, table: pl.DataFrame) -> tuple[pl.DataFrame, dict[str, int]]:
@@ -489,6 +535,9 @@ def _finish_dataset(
     said: dict[str, Any] = facts.to_dict()
     write_text(out / FACTS_FILE, json.dumps(said, indent=1, ensure_ascii=False) + "\n")
     write_text(out / CARD_FILE, card_text(facts))
+    sums = {name: sha256 for name, (_, sha256) in facts.files.items()}
+    sums |= {name: file_digest(out / name) for name in (PLAN_FILE, FACTS_FILE, CARD_FILE)}
+    write_sums(out, sums)
     shutil.rmtree(staged, ignore_errors=True)
     return facts
 

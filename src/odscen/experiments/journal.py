@@ -2,6 +2,8 @@
 
 A journal is added to as runs end, and moved to parts.
 
+Each row carries the beginning of its own SHA-256, so that a byte that has changed shows.
+
 A row is there whole or not at all: the last line of a journal whose process was killed may be torn,
 and is left out. A run that stands in a part and in the journal, as its process was killed between
 the two, counts once.
@@ -10,12 +12,14 @@ the two, counts once.
 from __future__ import annotations
 
 import os
+import re
 import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import orjson
 
+from odscen.base.checksums import SUMS_FILE, digest
 from odscen.base.errors import InputError
 from odscen.base.text_files import write_file
 from odscen.base.to_disk import to_disk
@@ -33,6 +37,9 @@ PART_ROWS: Final = 20_000
 _EVERY: Final = 1.0
 """Wall seconds after which rows are brought to the disk at the latest."""
 
+_SUM: Final = re.compile(rb',"sum":"([0-9a-f]{16})"\}')
+_WHOLE: Final = re.compile(rb',"sum":"[0-9a-f]{16}".')
+
 Rows = dict[str, dict[str, Any]]
 
 
@@ -45,19 +52,37 @@ def read_rows(folder: Path) -> Rows:
         If a file is not as it was written.
     """
     rows: Rows = {}
+    sealed = (folder / SUMS_FILE).is_file()  # earlier versions wrote rows without checksums
     for part in sorted((folder / PARTS_FOLDER).glob("part-*.jsonl")):
-        _take_rows(rows, part.read_bytes(), part)
+        _take_rows(rows, part.read_bytes(), part, sealed=sealed)
     journal = folder / JOURNAL_FILE
     with suppress(FileNotFoundError):
         content = journal.read_bytes()
-        _take_rows(rows, content[: content.rfind(b"\n") + 1], journal)
+        whole = content.rfind(b"\n") + 1
+        # One that was torn by a kill ends before its checksum does.
+        torn = content if sealed and _WHOLE.search(content, whole) else content[:whole]
+        _take_rows(rows, torn, journal, sealed=sealed)
     return rows
 
 
-def _take_rows(rows: Rows, content: bytes, file: Path) -> None:
-    for number, line in enumerate(content.splitlines(), start=1):
+def row_line(name: str, row: Mapping[str, Any]) -> bytes:
+    """Line of a row with its checksum as the last field."""
+    text = orjson.dumps({"run": name, **row})
+    return text[:-1] + b',"sum":"' + digest(text).encode()[:16] + b'"}\n'
+
+
+def _take_rows(rows: Rows, content: bytes, file: Path, *, sealed: bool) -> None:
+    lines = content.removesuffix(b"\n").split(b"\n") if content else []
+    for number, line in enumerate(lines, start=1):
         try:
+            if sealed:
+                own = _SUM.fullmatch(line, max(len(line) - 26, 0))
+                text = line[: len(line) - 26] + b"}"
+                if own is None or own[1] != digest(text).encode()[:16]:
+                    raise ValueError("it is not as it was written")
+                line = text  # noqa: PLW2901
             row = orjson.loads(line)
+            row.pop("sum", None)
             rows.setdefault(row.pop("run"), row)
         except (ValueError, KeyError, AttributeError, TypeError) as error:
             raise InputError(
@@ -132,7 +157,7 @@ class StudyJournal:
         if name in self.rows or self._file is None:
             return False
         self.rows[name] = dict(row)
-        self._file.write(orjson.dumps({"run": name, **row}) + b"\n")
+        self._file.write(row_line(name, row))
         self._file.flush()  # a killed process loses nothing; a power cut at most a second
         self._lines += 1
         if self._lines >= PART_ROWS:
@@ -148,8 +173,7 @@ class StudyJournal:
             return
         self.rows = {name: row for name, row in self.rows.items() if name not in gone}
         parts = sorted((self._folder / PARTS_FOLDER).glob("part-*.jsonl"))
-        lines = [orjson.dumps({"run": name, **row}) for name, row in self.rows.items()]
-        self._write_part(b"".join(line + b"\n" for line in lines))
+        self._write_part(b"".join(row_line(name, row) for name, row in self.rows.items()))
         for part in parts:  # after the new one, which has their rows
             part.unlink()
         self._empty_journal()

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from odscen.base.checksums import seal_files, unseal_files
 from odscen.base.errors import InputError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
@@ -22,6 +23,7 @@ from odscen.base.text_files import write_text
 from odscen.experiments.closeness import criticality
 from odscen.experiments.journal import KeptRuns
 from odscen.experiments.sweeps import (
+    ARCHIVE_FILE,
     CaseRuns,
     SweepSettings,
     begin_folder,
@@ -96,7 +98,7 @@ def pair_coverage(places: FloatArray, *, cells: int = CELLS) -> float:
 FORMAT: Final = "odscen-search"
 VERSION: Final = 1
 _SUMMARIES: Final = f"runs/case-*/{layout.SUMMARY_FILE}"
-SEARCH_FILE, ARCHIVE_FILE = "search.json", "criticals.json"
+SEARCH_FILE: Final = "search.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,7 +282,9 @@ class _Looking:
             "archive": [self.rows[k] for k in kept],
         }
         text = json.dumps(archive, indent=2, ensure_ascii=False) + "\n"
+        unseal_files(self._out, (ARCHIVE_FILE,))
         write_text(self._out / ARCHIVE_FILE, text)
+        seal_files(self._out, (ARCHIVE_FILE,))
         return found
 
 

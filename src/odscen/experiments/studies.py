@@ -20,6 +20,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.app.scenarios import SUFFIX
 from odscen.base.atomic_folders import clear_leftovers, new_folder
+from odscen.base.checksums import (
+    SUMS_FILE,
+    check_files,
+    digest,
+    read_checked,
+    seal,
+    seal_files,
+    unseal_files,
+    unsealed,
+    write_sums,
+)
 from odscen.base.errors import ConflictError, InputError, in_file
 from odscen.base.folder_locks import is_locked, locked
 from odscen.base.stored_files import documents, read_document
@@ -78,6 +89,7 @@ def write_study(folder: Path, grid: StudyGrid) -> None:
         if source.text is None:
             row |= {"seed": source.seed, "config": configs[json.dumps(source.config)]}
         else:
+            row["sha256"] = digest(source.text.encode())
             write_text(folder / _SCENARIOS / f"{source.name}{SUFFIX}", source.text)
         rows.append(row)
     said = {
@@ -88,7 +100,9 @@ def write_study(folder: Path, grid: StudyGrid) -> None:
         "configs": [json.loads(text) for text in _number_configs(grid)],
         "scenarios": rows,
     }
-    write_text(folder / STUDY_FILE, json.dumps(said, indent=1, ensure_ascii=False) + "\n")
+    if not (folder / STUDY_FILE).is_file():
+        write_sums(folder, {})  # of what follows; rows of its journal carry their own
+    write_text(folder / STUDY_FILE, seal(said, indent=1))
 
 
 def _number_configs(grid: StudyGrid) -> dict[str, int]:
@@ -105,7 +119,9 @@ def read_study(folder: Path) -> StudyGrid:
     Raises
     ------
     InputError
-        If there is no study, or it is not as it was written.
+        If there is no study, or it cannot be read.
+    DamagedError
+        If it is not as it was written.
     """
     data = _read_document(folder)
     with in_file(str(folder / STUDY_FILE)), documents("a study"):
@@ -120,14 +136,17 @@ def _read_document(folder: Path) -> dict[str, Any]:
     if not file.is_file():
         raise InputError(f"no study is here: it has no {STUDY_FILE}", file=str(folder))
     with in_file(str(file)):
-        return read_document(file.read_bytes(), form=FORMAT, version=VERSION, what="a study")
+        read_document(file.read_bytes(), form=FORMAT, version=VERSION, what="a study")
+    return unsealed(file)
 
 
 def _read_source(folder: Path, row: Mapping[str, Any], configs: list[Any]) -> ScenarioSource:
     name, about = str(row["name"]), (str(row["map"]), str(row["map_sha256"]))
     if "config" in row:
         return ScenarioSource(name, *about, seed=int(row["seed"]), config=configs[row["config"]])
-    text = (folder / _SCENARIOS / f"{name}{SUFFIX}").read_text(encoding="utf-8")
+    file = f"{_SCENARIOS}/{name}{SUFFIX}"
+    known = {file: str(row["sha256"])} if "sha256" in row else None
+    text = read_checked(folder, file, known).decode()
     return ScenarioSource(name, *about, text=text)
 
 
@@ -152,8 +171,11 @@ def write_table(folder: Path, grid: StudyGrid, rows: Rows) -> pl.DataFrame:
     """Write the table whole; equal rows give equal bytes, in whatever order they came."""
     table = study_table(grid, rows)
     part = folder / f".{TABLE_FILE}.part"
+    unseal_files(folder, (TABLE_FILE,))
     table.write_parquet(part)
     part.replace(folder / TABLE_FILE)
+    if (folder / SUMS_FILE).is_file():
+        seal_files(folder, (TABLE_FILE,))
     return table
 
 
@@ -408,6 +430,8 @@ def carry_out_study(
     with disk_errors(f"study {out}"), locked(out, what=f"study {out.name!r}"):
         grid = read_study(out)
         refuse_other_odscen(out)
+        if (out / SUMS_FILE).is_file():
+            check_files(out, may_miss=(TABLE_FILE,))
         clear_leftovers(out)
         with StudyJournal(out) as journal:
             if again:

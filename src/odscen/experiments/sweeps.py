@@ -19,10 +19,18 @@ from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
 from odscen.app.scenarios import SUFFIX, read_scenario, scenario_name
 from odscen.base.atomic_folders import scratch_folder
+from odscen.base.checksums import SUMS_FILE, check_files, seal_files, unseal_files
 from odscen.base.durations import clock
-from odscen.base.errors import ConflictError, InputError, NotFoundError, ScenarioError, in_file
+from odscen.base.errors import (
+    ConflictError,
+    DamagedError,
+    InputError,
+    NotFoundError,
+    ScenarioError,
+    in_file,
+)
 from odscen.base.folder_locks import locked
-from odscen.base.stored_files import read_document
+from odscen.base.stored_files import read_document, tables
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.experiments.journal import KeptRuns
@@ -115,10 +123,13 @@ def read_plan(out: Path) -> tuple[SweepPlan, dict[str, Any]]:
     ------
     InputError
         If there is no sweep.
+    DamagedError
+        If what it says is not as it was written.
     """
     file = out / SWEEP_FILE
     if not file.is_file():
         raise InputError("no sweep is here: it has no sweep.json", file=str(out))
+    check_files(out, only=(SWEEP_FILE, SCENARIO_FILE))
     with in_file(str(file)):
         data = read_document(file.read_bytes(), form=FORMAT, version=VERSION, what="a sweep")
         plan, settings = data.get("plan"), data.get("settings")
@@ -171,12 +182,17 @@ def begin_folder(
     for name, file in there.items():
         if file.read_text(encoding="utf-8") != files[name]:
             raise ConflictError(f"{out} holds another {what} ({name} differs); name another folder")
+    if there and (out / SUMS_FILE).is_file():
+        check_files(out, may_miss=(TABLE_FILE, PAGE_FILE, ARCHIVE_FILE))
     for name in files.keys() - there.keys():
         write_text(out / name, files[name])
+    seal_files(out, files)
 
 
 TABLE_FILE: Final = "cases.parquet"
 PAGE_FILE: Final = "sweep.html"
+ARCHIVE_FILE: Final = "criticals.json"
+"""Of a search."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -237,7 +253,7 @@ class CaseRuns:
             recording=WATCHES_CLOSENESS,
             behaviour=self._settings.behaviour,
         )
-        runs = []
+        runs, written = [], []
         for name, values in cases.items():
             try:
                 case = concrete(scenario, values, name=name)
@@ -250,7 +266,10 @@ class CaseRuns:
             file = out / "cases" / f"{name}{SUFFIX}"
             if not file.is_file():
                 write_text(file, dumps(case))
+                written.append(f"cases/{file.name}")
             runs.append(run)
+        if written:
+            seal_files(out, written)
         return runs
 
     def run(
@@ -328,6 +347,7 @@ def write_cases(
 ) -> pl.DataFrame:
     """Write the table and the page of cases; ``names`` are the parameters that are varied."""
     table = _as_table(rows)
+    unseal_files(out, (TABLE_FILE, PAGE_FILE))
     part = out / f".{TABLE_FILE}.part"
     table.write_parquet(part)
     part.replace(out / TABLE_FILE)
@@ -339,6 +359,7 @@ def write_cases(
         {row["case"]: _case_links(out, row["case"]) for row in rows},
     )
     write_text(out / PAGE_FILE, sweep_page(shown))
+    seal_files(out, (TABLE_FILE, PAGE_FILE))
     return table
 
 
@@ -354,7 +375,9 @@ def read_table(out: Path) -> Sweep:
 
     scenario, plan, said = read_sweep(out)
     if (out / TABLE_FILE).is_file():
-        table = pl.read_parquet(out / TABLE_FILE)
+        check_files(out, only=(TABLE_FILE,))
+        with tables(str(out / TABLE_FILE)):
+            table = pl.read_parquet(out / TABLE_FILE)
     else:
         runs = CaseRuns(scenario, out, settings_from_dict(said))
         table = _as_table(runs.rows(named_cases(plan)))
@@ -451,7 +474,7 @@ def sweep(
         checked = runs.check(workspace, cases)
         if not checked:
             if new:  # the folder is left to another sweep
-                for name in (SWEEP_FILE, SCENARIO_FILE):
+                for name in (SWEEP_FILE, SCENARIO_FILE, SUMS_FILE):
                     (out / name).unlink()
             raise InputError(
                 f"no case of the sweep can be run: {next(iter(runs.refused.values()))}"
@@ -480,7 +503,8 @@ def sweep(
             for run in checked:
                 file = out / "cases" / f"{run.name}{SUFFIX}"
                 options = {"version": settings.openscenario}
-                export(workspace, file, out / "cases", to="openscenario", options=options)
+                written = export(workspace, file, out / "cases", to="openscenario", options=options)
+                seal_files(out, [f"cases/{one.name}" for one in written])
         return write_table(out, scenario, plan, rows=runs.rows(cases), limits=runs.limits)
 
 
@@ -493,9 +517,17 @@ def refuse_unknown(names: Sequence[str], scenario: Scenario) -> None:
 
 
 def has_completed(folder: Path) -> bool:
-    """Whether a folder holds a run that has completed."""
+    """Whether a folder holds a run that has completed.
+
+    Raises
+    ------
+    DamagedError
+        If one is there, and a file of it is not as it was written.
+    """
     try:
         return Run.open(folder).status is RunStatus.COMPLETED
+    except DamagedError:
+        raise
     except InputError:
         return False
 
@@ -530,6 +562,7 @@ def opened_case(out: Path, case: str) -> Scenario:
     if not _CASE.fullmatch(case) or not file.is_file():
         raise NotFoundError(f"case of sweep {out.name!r}", case, [])
     whole, _, said = read_sweep(out)
+    check_files(out, only=(f"cases/{file.name}",))
     found = read_scenario(file)
     limits = [limit for text in said["safe"] if (limit := _of_ttc(text)) is not None]
     criteria = list(found.criteria)

@@ -20,3 +20,10 @@ def test_reliability_is_that_of_vehicles_that_arrived():
     assert found["planning_time_index"] == pytest.approx(1.95)
     assert found["buffer_index"] == pytest.approx(0.3)
     assert set(figure_values(RunData(trips=trips.clear()), FIGURES).values()) == {None}
+
+
+def test_the_index_of_few_vehicles_is_said_to_be_that_of_lights():
+    note = next(figure.note for figure in FIGURES if figure.name == "travel_time_index")
+    assert callable(note)
+    assert note({"throughput": 900.0}) == "mean travel time over free-flow time"
+    assert "red lights" in note({"throughput": 40.0})

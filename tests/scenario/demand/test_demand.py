@@ -2,12 +2,13 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
 from odscen.scenario import edits
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.demand.count_stations import Passing, contradictions, geh
-from odscen.scenario.demand.day_profiles import BUILT_IN, DAY, Curve
+from odscen.scenario.demand.day_profiles import BUILT_IN, DAY, Curve, curve
 from odscen.scenario.demand.demand_tables import (
     MOST_ROWS,
     read_counts,
@@ -16,7 +17,14 @@ from odscen.scenario.demand.demand_tables import (
     read_zones,
 )
 from odscen.scenario.document.json_form import dumps, loads
-from odscen.scenario.document.scenario_document import Background, Counts, Matrix, Scenario
+from odscen.scenario.document.scenario_document import (
+    Background,
+    Counts,
+    Demand,
+    Matrix,
+    Profile,
+    Scenario,
+)
 from tests.graphs import fork
 
 GRAPH = fork()
@@ -43,11 +51,11 @@ def counts(*rows: tuple[str, float, float, float]) -> Counts:
 def test_times_drawn_from_a_profile_have_the_share_that_it_gives_them(
     shares: list[float], clock: float, quantile: float
 ) -> None:
-    curve = Curve(tuple(shares), clock=clock)
-    assert curve.amount(DAY) == pytest.approx(DAY, rel=1e-6)
-    time = float(curve.draw(np.array([quantile]), begin=0.0, end=DAY)[0])
+    drawn = Curve(tuple(shares), clock=clock)
+    assert drawn.amount(DAY) == pytest.approx(DAY, rel=1e-6)
+    time = float(drawn.draw(np.array([quantile]), begin=0.0, end=DAY)[0])
     assert 0 <= time <= DAY
-    assert curve.amount(time) == pytest.approx(quantile * DAY, abs=1.0)
+    assert drawn.amount(time) == pytest.approx(quantile * DAY, abs=1.0)
 
 
 def test_a_weekday_is_busiest_in_the_afternoon_and_quiet_at_night() -> None:
@@ -232,3 +240,35 @@ def test_a_mix_of_a_matrix_may_hold_all_seven_categories() -> None:
     mix = dict.fromkeys(("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian"), 1)
     matrix = Matrix.model_validate({"id": "m", "trips": [("a", "b", 1)], "mix": mix})
     assert len(matrix.mix) == 7
+
+
+def test_a_profile_between_clock_times_has_its_slices_there_and_nothing_else() -> None:
+    early = Profile(id="early", shares=(1, 1, 2, 4, 4, 2, 1, 1), begin=7 * 3600, end=9 * 3600)
+    found = curve(Demand(profiles=(early,)), "early")
+    quarter = [found.amount(t + 900.0) - found.amount(t) for t in range(0, 86_400, 900)]
+    assert sum(quarter[:28]) == sum(quarter[36:]) == 0.0
+    assert quarter[28:36] == pytest.approx([86_400.0 * k / 16 for k in (1, 1, 2, 4, 4, 2, 1, 1)])
+
+
+@pytest.mark.parametrize(
+    "times", [{"begin": 7 * 3600}, {"begin": 3600, "end": 3600}, {"begin": 0, "end": 7210}]
+)
+def test_a_profile_of_a_part_of_the_day_needs_both_ends_and_whole_minutes(times) -> None:
+    with pytest.raises(ValidationError):
+        Profile(id="early", shares=(1, 2), **times)
+
+
+def test_few_shares_of_a_whole_day_and_trips_to_the_same_segment_are_warned_of() -> None:
+    few, many = Profile(id="peak", shares=(1,) * 8), Profile(id="noon", shares=(1,) * 24)
+    early = Profile(id="early", shares=(1,) * 8, begin=7 * 3600, end=9 * 3600)
+    matrix = Matrix(id="od", trips=(("r1", "r1", 5.0), ("r1", "r2", 5.0)))
+    one = scenario().model_copy(
+        update={"demand": Demand(profiles=(few, many, early), matrices=(matrix,))}
+    )
+    found = {
+        p.where: p for p in check(one, GRAPH) if p.code in ("profile_over_day", "trip_to_itself")
+    }
+    assert set(found) == {"demand.profiles[0].shares", "demand.matrices[0].trips[0]"}
+    assert {p.severity for p in found.values()} == {"warning"}
+    words = found["demand.profiles[0].shares"].message
+    assert words.startswith("the 8 shares of profile 'peak' are slices of 3 h each")

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from typer.testing import CliRunner
 
 from bench.kills import traffic
 from odscen.app.running.runs import check_file, prepare_run
@@ -22,6 +23,7 @@ from odscen.base.errors import (
     SimulationError,
     WorkspaceError,
 )
+from odscen.cli.commands import command_line
 from odscen.figures.judging.expectations import parse_expectation
 from odscen.figures.measures.summary import actors_from_json
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
@@ -486,6 +488,24 @@ def test_whatever_of_its_start_is_changed_deleted_or_added_an_interrupted_run_is
             resume(run)
         (run / "sumo" / name).unlink()
     assert resume(run).status == "completed"
+
+
+def test_a_run_that_a_socket_drives_is_named_again_by_its_socket(
+    long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=1)
+    door = json.dumps({"socket": str(tmp_path / "driver")})
+    (run / "sumo" / "behaviour.json").write_text(door, encoding="utf-8")
+    seal_start(run)
+    with pytest.raises(InputError, match=r"--behaviour-socket '.*driver'"):
+        resume(run)
+    with pytest.raises(InputError, match="not what drives this run"):
+        resume(run, behaviour=BehaviourDoor(socket=str(tmp_path / "other")))
+    again = CliRunner().invoke(
+        command_line(["resume"]), ["resume", str(run), "--behaviour-socket", f"{tmp_path}/other"]
+    )
+    assert "not what drives this run" in str(again.exception)
 
 
 @pytest.mark.parametrize("stored", ["command", "name"])

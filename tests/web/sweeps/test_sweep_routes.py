@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
@@ -12,6 +13,7 @@ from starlette.testclient import TestClient
 from odscen.app.running.runs import run
 from odscen.app.scenarios import SUFFIX
 from odscen.experiments.sweeps import SweepSettings, begin_sweep, estimate
+from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.runs.finished_run import Run
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
@@ -278,3 +280,20 @@ def test_names_of_sweeps_and_cases_that_are_none_are_not_found(client: TestClien
     for path in ("/none", "/none/cases", "/none/files/sweep.html"):
         assert client.get(f"/api/sweeps{path}").status_code == 404
     assert client.post("/api/sweeps/none/cases/case-001/scenario", json={}).status_code == 404
+
+
+def test_the_page_resumes_no_sweep_whose_folder_names_code(
+    client: TestClient, tmp_path: Path
+) -> None:
+    mark, name = tmp_path / "executed", f"{NAME}-901"
+    plan = SweepPlan((axis_from_text("gap=10,40"),))
+    for number, door in enumerate(
+        (BehaviourDoor(command=f"touch {mark}"), BehaviourDoor(socket=str(mark)))
+    ):
+        folder = workspace().sweeps / f"{name}{number}"
+        begin_sweep(folder, loads(cut_in()), plan, SweepSettings(behaviour=door))
+        refused = asked(client, f"/{folder.name}/resume", {"processes": 1}, status=422)
+        assert "what a folder says is not executed" in refused["error"]["message"]
+        assert not (folder / "runs").exists()
+        shutil.rmtree(folder)
+    assert not mark.exists()

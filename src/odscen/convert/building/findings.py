@@ -75,6 +75,9 @@ BOTH_WAYS = "bidirectional"
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
 
+SAME_WIDTH = 0.01
+"""Metres by which a width must differ to be told as one that varies."""
+
 WIDTH_PLACES = 9
 """Places along a lane at which its width is looked at."""
 
@@ -248,6 +251,8 @@ def _find_varying_widths(table: RoadTable, lanes: LaneTable) -> Iterator[ReportE
         low, high = float(true.min()), float(true.max())
         if high - width > VARYING or width - low > VARYING:
             reason = f"its width varies from {low:.2f} to {high:.2f} m, SUMO's is {width:.2f} m"
+            if high - low < SAME_WIDTH:
+                reason = f"it is {low:.2f} m wide here, and the SUMO lane {width:.2f} m all along"
             yield ReportEntry(ElementOutcome.GUESSED, _describe_place(*key), reason)
 
 

@@ -534,7 +534,8 @@ def _shares(lanes: pl.DataFrame, own: pl.DataFrame, measured: pl.DataFrame) -> p
         .select("lane", "begin")
     )
     # Who is seen every few seconds only may have passed a short lane unseen.
-    unseen = col("driven") / whole("distance")
+    # Who only stood there, or was put there by a rule, has driven no metres.
+    unseen = pl.when(whole("distance") > 0).then(col("driven") / whole("distance"))
     crossed = pl.when(unseen > 1.05).then((col("crossed") * unseen).round())
     first = pl.when(col("part") == 0).then("began").otherwise(0)
     return (

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 from odscen.figures.measures.figure import Basis, Better, Display, ReportSection, RunFigure
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
     import polars as pl
 
     from odscen.figures.measures.figure import RunData
@@ -52,6 +55,19 @@ def _buffer_index(run: RunData) -> float | None:
     return None if mean is None or late is None else late / mean - 1.0
 
 
+FEW_PER_HOUR = 100.0
+"""Vehicles that arrive in an hour, below which an index says little of traffic."""
+
+
+def _say_what_it_shows(values: Mapping[str, Any]) -> str:
+    """Of few vehicles, as at night, the index is that of lights and signs, and not of traffic."""
+    words = "mean travel time over free-flow time"
+    arrivals = values.get("throughput")
+    if arrivals is None or arrivals >= FEW_PER_HOUR:
+        return words
+    return f"{words}; with so few vehicles what red lights and signs cost them, not traffic"
+
+
 FIGURES = (
     RunFigure(
         name="travel_time_index",
@@ -63,7 +79,7 @@ FIGURES = (
         basis=Basis.TRIPS,
         display=_RATIO,
         section=ReportSection.KEY_FIGURES,
-        note="mean travel time over free-flow time",
+        note=_say_what_it_shows,
         compute=_mean_ratio,
     ),
     RunFigure(

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     )
     from odscen.scenario.placing.region import NodePlace, Region
 
+_HOURS = 24
+"""Of a day: a profile with fewer shares has longer slices, which may not be what was meant."""
+
 
 def transit_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
     """Yield everything wrong with stops and lines of a scenario."""
@@ -417,6 +420,12 @@ def matrix_problems(matrix: Matrix, places: _Places, where: str) -> Iterator[Pro
     for index, (origin, destination, _) in enumerate(matrix.trips):
         pairs[origin, destination].append(index)
     for (origin, destination), rows in pairs.items():
+        if origin == destination and origin in places.known and origin not in places.zones:
+            message = (
+                f"trips from segment {origin!r} to itself may end before they leave it; "
+                f"give another destination"
+            )
+            yield warning("trip_to_itself", f"{where}.trips[{rows[0]}]", message)
         if len(rows) > 1:
             message = (
                 f"trips from {origin!r} to {destination!r} are given {len(rows)} times; add up"
@@ -474,6 +483,14 @@ def _profile_problems(scenario: Scenario) -> Iterator[Problem]:
         if profile is not None and profile not in known:
             message = f"{one.id!r} has day profile {profile!r}; there are {listed}"
             yield error("unknown_profile", f"{where}.profile", message)
+    for index, own in enumerate(scenario.demand.profiles):
+        number = len(own.shares)
+        if own.begin is None and 1 < number < _HOURS:
+            message = (
+                f"the {number} shares of profile {own.id!r} are slices of {_HOURS / number:.3g} h "
+                f"each, from midnight on; give begin and end if they are of a part of the day"
+            )
+            yield warning("profile_over_day", f"demand.profiles[{index}].shares", message)
 
 
 def _place_problems(counts: Counts, region: Region, where: str) -> Iterator[Problem]:

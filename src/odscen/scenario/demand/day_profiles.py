@@ -101,4 +101,4 @@ def curve(demand: Demand, profile: str | None) -> Curve:
 
 def known_profiles(demand: Demand) -> dict[str, tuple[float, ...]]:
     """Shares of all profiles by name: the built-in ones and the scenario's own."""
-    return BUILT_IN | {profile.id: profile.shares for profile in demand.profiles}
+    return BUILT_IN | {profile.id: profile.of_day for profile in demand.profiles}

@@ -17,6 +17,7 @@ for its dwell time, and no shorter than to its scheduled departure.
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
@@ -393,16 +394,49 @@ class Zone(Part):
 
 
 class Profile(Part):
-    """How demand is spread over a day: relative shares of equal slices, from midnight on."""
+    """How demand is spread over a day: relative shares of equal slices, from midnight on.
+
+    With ``begin`` and ``end``, seconds after midnight in whole minutes, the slices are of the time
+    between them, and nothing comes before and after it.
+    """
 
     id: Identifier
     shares: Annotated[tuple[Number, ...], Field(min_length=1, max_length=1440)]
+    begin: Annotated[float, Field(ge=0, lt=86_400)] | None = None
+    end: Annotated[float, Field(gt=0, le=86_400)] | None = None
 
     @model_validator(mode="after")
     def _not_empty(self) -> Self:
         if sum(self.shares) <= 0:
             raise ValueError("at least one share must be above 0")
         return self
+
+    @model_validator(mode="after")
+    def _whole_minutes(self) -> Self:
+        if (self.begin is None) != (self.end is None):
+            raise ValueError("a profile of a part of the day needs begin and end")
+        if self.begin is None or self.end is None:
+            return self
+        if self.end <= self.begin:
+            raise ValueError("the profile ends before it begins")
+        piece = (self.end - self.begin) / len(self.shares)
+        if self.begin % 60.0 or self.end % 60.0 or piece % 60.0:
+            raise ValueError("begin, end and slices of a profile must be whole minutes")
+        return self
+
+    @property
+    def of_day(self) -> tuple[float, ...]:
+        """Shares of equal slices of the whole day."""
+        if self.begin is None or self.end is None:
+            return self.shares
+        first = round(self.begin / 60.0)
+        piece = round((self.end - self.begin) / 60.0 / len(self.shares))
+        step = math.gcd(first, piece, 1440)
+        day = [0.0] * (1440 // step)
+        for index, share in enumerate(self.shares):
+            begin = (first + index * piece) // step
+            day[begin : begin + piece // step] = [share] * (piece // step)
+        return tuple(day)
 
 
 class Window(Part):

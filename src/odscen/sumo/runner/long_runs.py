@@ -265,7 +265,9 @@ def _refuse_unnamed_code(folder: Path, named: BehaviourDoor | None) -> None:
             element=named.shown,
         )
     if named is None and not is_installed(stored):
-        option = "--behaviour-cmd" if stored.command is not None else "--behaviour"
+        option = "--behaviour-socket" if stored.socket is not None else "--behaviour"
+        if stored.command is not None:
+            option = "--behaviour-cmd"
         raise InputError(
             f"this run is driven by code that its folder names; name it again if you trust it: "
             f"odscen resume {folder} {option} {stored.name or stored.command or stored.socket!r}"

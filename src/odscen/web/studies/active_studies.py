@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from odscen.app.scenarios import SUFFIX
 from odscen.base.atomic_folders import discard
+from odscen.base.checksums import check_files
 from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.experiments.plan import StudyPlan
 from odscen.experiments.studies import (
@@ -172,6 +173,7 @@ class Studies:
             return write_study_page(folder, SHOWN_FIGURES, folder / PAGE_FILE)
         if path not in _DOWNLOADS or not (folder / path).is_file():
             raise NotFoundError(f"file of study {name!r}", path, list(_DOWNLOADS))
+        check_files(folder, only=(path,))
         return folder / path
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.atomic_folders import discard
+from odscen.base.checksums import check_files
 from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.experiments.sweeps import (
     PAGE_FILE,
@@ -31,6 +32,7 @@ from odscen.experiments.sweeps import (
 from odscen.maps.folder_names import check_name
 from odscen.runs import layout
 from odscen.scenario.sweeps.sweep_plan import plan_from_data
+from odscen.sumo.worker.behaviour.behaviour_doors import is_installed
 from odscen.web.studies.under_way import OneAtATime, UnderWay
 from odscen.web.sweeps.sweep_messages import PlannedSweep, SweepInfo
 
@@ -112,6 +114,8 @@ class Sweeps:
             If there is none of that name.
         ConflictError
             If nothing is missing, or a sweep is under way.
+        InputError
+            If it is driven by code that only its folder names.
         """
         folder = self._folder_of(name)
         scenario, plan, said = read_sweep(folder)
@@ -121,7 +125,14 @@ class Sweeps:
                 raise ConflictError(
                     f"sweep {name!r} has all of its cases; there is nothing to resume"
                 )
-            self._submit_sweep(name, scenario, plan, settings_from_dict(said), processes)
+            settings = settings_from_dict(said)
+            if settings.behaviour is not None and not is_installed(settings.behaviour):
+                raise InputError(
+                    f"sweep {name!r} is driven by code that its folder names, "
+                    f"{settings.behaviour.shown!r}; what a folder says is not executed: resume it "
+                    "with odscen sweep, which names it again"
+                )
+            self._submit_sweep(name, scenario, plan, settings, processes)
 
     def stop(self, name: str) -> None:
         """Stop a sweep; cases that are under way are given up, those that have ended are kept.
@@ -198,6 +209,8 @@ class Sweeps:
         found = self._folder_of(name) / path
         if not _FILES.fullmatch(path) or not found.is_file():
             raise NotFoundError(f"file of sweep {name!r}", path, [])
+        if not path.startswith("runs/"):  # a run has checksums of its own
+            check_files(found.parents[path.count("/")], only=(path,))
         return found
 
     def case(self, name: str, case: str) -> Scenario:
@@ -290,7 +303,5 @@ def _count_ended(folder: Path) -> int:
 
 def _count_verdicts(folder: Path) -> tuple[int, int]:
     """How many cases are safe, and how many are not."""
-    import polars as pl
-
-    safe = pl.read_parquet(folder / TABLE_FILE, columns=["safe"])["safe"].to_list()
+    safe = read_table(folder).table["safe"].to_list()
     return safe.count(True), safe.count(False)
