@@ -30,7 +30,7 @@ USED = {
     "actors.json": True,
     "events.json": False,
     "signals.json": False,
-    "trajectories.parquet": False,
+    "trajectories.parquet": True,
     "signal_states.parquet": False,
     "lane_places.json": True,
     "figures/segments.csv": True,
