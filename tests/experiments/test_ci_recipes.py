@@ -80,7 +80,7 @@ def test_the_script_runs_in_a_fresh_clone_and_leaves_what_is_promised(project):
     assert "All scenarios pass" in (out / "index.html").read_text()
     assert "3 passed" in (out / "summary.md").read_text()
     assert (out / "runs" / "a" / "seed-1" / "report.html").is_file()
-    assert [path.name for path in (project / "build" / "workspace" / "maps").iterdir()]
+    assert [path.name for path in (project / "build" / "workspace" / "suite-maps").iterdir()]
 
 
 @pytest.mark.slow

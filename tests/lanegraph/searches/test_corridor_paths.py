@@ -98,7 +98,7 @@ def test_on_a_map_paths_and_distances_are_those_in_the_tree_of_the_source(
     monkeypatch.setattr(path_finder, "_TREES", 0)
     found = [(router.distance(*pair), router.path(*pair).tolist()) for pair in pairs]
     assert found == expected
-    assert router._corridors is not None
+    assert router._corridor_paths is not None
     # Nearly all of it came from corridors.
     assert router._searched <= len(pairs) // 10
 

@@ -94,12 +94,15 @@ class SplitLanes:
 
         lanes = (
             places.lanes.group_by("lane", maintain_order=True)
-            .agg(pl.col("length").first(), "share")
+            .agg(pl.col("length").first(), "share", "segment")
             .filter(pl.col("share").list.len() > 1)
         )
         names, lengths = lanes["lane"], lanes["length"].to_numpy()
-        edges: dict[str, int] = {}
-        edge = [edges.setdefault(name.rpartition("_")[0], len(edges)) for name in names]
+        # Lanes that lie in the same several segments are those of one edge.
+        edges: dict[tuple[str, ...], int] = {}
+        edge = [
+            edges.setdefault(tuple(segments), len(edges)) for segments in lanes["segment"].to_list()
+        ]
         start = np.concatenate(([0.0], np.cumsum(lengths + 1.0)))[: len(lengths)]
         begins, first = [], [0]
         for at, length, shares in zip(start, lengths, lanes["share"].to_list(), strict=True):

@@ -88,15 +88,17 @@ def _ways_by_edges(
     import polars as pl
 
     after = dict(facts.follows.rows())
+    edge_of = dict(facts.limits.select("lane", "edge").rows())
+    inside = set(facts.links["via"])
     found: dict[tuple[str, str], tuple[str, str, str, str]] = {}
     first = places.ways.filter(pl.col("lane") == pl.col("via")).sort("via")
     for junction, movement, approach, via in first.select(
         "junction", "movement", "approach", "via"
     ).rows():
         lane = after.get(via, "")
-        while lane.startswith(":"):
+        while lane in inside:
             lane = after.get(lane, "")
-        found.setdefault((approach, lane.rpartition("_")[0]), (junction, movement, approach, via))
+        found.setdefault((approach, edge_of.get(lane, "")), (junction, movement, approach, via))
     return found
 
 
