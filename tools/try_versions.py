@@ -58,7 +58,7 @@ def _try(versions: str, wanted: str) -> bool:
         (python, "-m", "odscen", "demo", "--workspace", folder / "demo"),
         # Old versions warn of new Pythons; pytest writes nothing into the sources.
         (python, "-m", "pytest", "-q", "-o", "filterwarnings=default", "-p", "no:cacheprovider",
-         *TESTS),
+         "-m", "not slow", *TESTS),
     )  # fmt: skip
     good = all(
         subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode == 0

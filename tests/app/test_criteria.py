@@ -22,6 +22,7 @@ def asking(sampled: Path, folder: Path, *criteria: str) -> Path:
     return write_scenario(scenario, folder / "asking.scenario.json")
 
 
+@pytest.mark.slow
 def test_a_run_is_judged_by_the_criteria_of_its_scenario_and_fails_only_where_asked(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -50,6 +51,7 @@ def test_a_run_is_judged_by_the_criteria_of_its_scenario_and_fails_only_where_as
     assert again.exit_code == 1
 
 
+@pytest.mark.slow
 def test_a_run_without_criteria_says_nothing_of_them(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

@@ -71,6 +71,7 @@ class ComputingError(Exception):
     """Something would have been computed."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [0.0, 0.5, 1.0])
 def test_a_byte_that_has_changed_anywhere_is_named_by_resume_before_anything_is_computed(
     pair: RunPair, tmp_path: Path, place: float
@@ -99,6 +100,7 @@ def test_a_byte_that_has_changed_anywhere_is_named_by_resume_before_anything_is_
         shutil.rmtree(run)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [0.0, 0.5, 1.0])
 def test_a_byte_that_has_changed_anywhere_is_named_by_report_and_compare(
     pair: RunPair,
@@ -148,6 +150,7 @@ def test_reports_and_comparisons_of_an_interrupted_run_say_how_to_resume_it(pair
         compare(pair.interrupted, pair.finished)
 
 
+@pytest.mark.slow
 def test_a_run_without_checksums_resumes_and_says_so_once(
     pair: RunPair, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -200,6 +203,7 @@ def test_what_nothing_else_says_is_set_aside(pair: RunPair, tmp_path: Path) -> N
     assert (Path(step.place) / "actors.json").is_file()
 
 
+@pytest.mark.slow
 def test_the_status_of_an_interrupted_run_is_rebuilt_and_the_run_resumes(
     pair: RunPair, tmp_path: Path
 ) -> None:
@@ -213,6 +217,7 @@ def test_the_status_of_an_interrupted_run_is_rebuilt_and_the_run_resumes(
     assert resume(pair.workspace, run).status == "completed"
 
 
+@pytest.mark.slow
 def test_maps_are_built_anew_from_their_xodr_and_else_set_aside(tmp_path: Path) -> None:
     store = Workspace.open(tmp_path)
     source = Path(__file__).parents[2] / "maps" / "t_junction_signs.xodr"

@@ -160,6 +160,7 @@ def test_a_file_that_another_program_has_changed_is_a_step_of_its_own(
     assert again.undo() == empty
 
 
+@pytest.mark.slow
 def test_a_history_keeps_so_many_steps(tmp_path: Path) -> None:
     folder = HistoryFolder(tmp_path / "history")
     history = folder.begin("0", label="Open")

@@ -80,6 +80,7 @@ def program(tmp_path: Path) -> Callable[[str], Path]:
     return written
 
 
+@pytest.mark.slow
 def test_a_program_of_twenty_lines_fills_a_map_and_its_cars_start_as_fast_as_it_says(
     workspace: Workspace, tmp_path: Path, program: Callable[[str], Path]
 ) -> None:
@@ -103,6 +104,7 @@ def test_a_program_of_twenty_lines_fills_a_map_and_its_cars_start_as_fast_as_it_
     assert first == pytest.approx(asked, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_by_any_door(
     workspace: Workspace, tmp_path: Path, program: Callable[[str], Path]
 ) -> None:

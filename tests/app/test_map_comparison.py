@@ -50,6 +50,7 @@ def test_what_each_lost_is_measured_on_the_same_map(place: Workspace) -> None:
     assert data["capacity"] == []
 
 
+@pytest.mark.slow
 def test_a_map_that_netconvert_refuses_is_compared_with_its_reason(
     place: Workspace, tmp_path: Path
 ) -> None:
@@ -66,6 +67,7 @@ def test_a_map_that_netconvert_refuses_is_compared_with_its_reason(
     assert list(found.capacity[0].networks) == ["odscen"]
 
 
+@pytest.mark.slow
 def test_a_network_that_was_brought_in_is_compared_too(place: Workspace, tmp_path: Path) -> None:
     net = place.add_map(MAPS / "signal_crossing.xodr").path("net")
     file = tmp_path / "mine.net.xml"

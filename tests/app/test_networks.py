@@ -62,6 +62,7 @@ def a_left_turn(place: Place) -> dict[str, str]:
     return next(one for one in links if one.get("tl") and one.get("via") and one["dir"] == "l")
 
 
+@pytest.mark.slow
 def test_a_network_that_netconvert_has_only_read_and_written_is_the_same(place: Place) -> None:
     assert place.whats(place.changed()) == []
     assert check_scenario(place.workspace, SCENARIO) == ()
@@ -70,6 +71,7 @@ def test_a_network_that_netconvert_has_only_read_and_written_is_the_same(place: 
     assert place.workspace.map(NAME).converter == "file"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["signal_crossing", "left_hand_crossing", "roundabout"])
 def test_netconvert_keeps_lanes_connections_links_and_programs_of_our_networks(
     name: str, tmp_path: Path
@@ -99,6 +101,7 @@ def _connections(net):
     return {(x.source, x.target, x.light) for x in net.links if {x.source, x.target} <= normal}
 
 
+@pytest.mark.slow
 def test_a_forbidden_turn_is_reported_and_so_is_who_has_no_route_any_more(place: Place) -> None:
     turn = a_left_turn(place)
     ends = {key: turn[key] for key in ("from", "to", "fromLane", "toLane")}
@@ -114,6 +117,7 @@ def test_a_forbidden_turn_is_reported_and_so_is_who_has_no_route_any_more(place:
     assert counts["collided"] == 0
 
 
+@pytest.mark.slow
 def test_an_edited_program_is_reported_and_shown_and_run(place: Place) -> None:
     light = place.root.find("tlLogic")
     assert light is not None
@@ -133,6 +137,7 @@ def test_an_edited_program_is_reported_and_shown_and_run(place: Place) -> None:
     assert counts["arrived"] == counts["planned"]
 
 
+@pytest.mark.slow
 def test_a_scenario_with_times_for_stages_that_are_gone_is_refused(place: Place) -> None:
     light = place.root.find("tlLogic")
     assert light is not None
@@ -156,6 +161,7 @@ def test_a_scenario_with_times_for_stages_that_are_gone_is_refused(place: Place)
     assert "wrong_number_of_greens" in codes
 
 
+@pytest.mark.slow
 def test_an_added_lane_is_reported_and_driven_on(place: Place) -> None:
     edge = place.root.find(f"edge[@id='{a_left_turn(place)['from']}']")
     assert edge is not None
@@ -168,6 +174,7 @@ def test_an_added_lane_is_reported_and_driven_on(place: Place) -> None:
     assert counts["arrived"] == counts["planned"]
 
 
+@pytest.mark.slow
 def test_a_map_keeps_the_network_that_was_brought_in_until_a_converter_is_named(
     place: Place,
 ) -> None:

@@ -101,6 +101,7 @@ def test_a_scene_that_openscenario_can_say_comes_back_whole(template: str, tmp_p
     assert acting_differences(before, after) == ()
 
 
+@pytest.mark.slow
 def test_sampled_scenarios_come_back_but_for_what_the_export_lists(tmp_path: Path) -> None:
     for name in ("town_5x5", "roundabout", "t_junction_signs"):
         entry(name)

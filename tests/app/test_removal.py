@@ -77,6 +77,7 @@ def test_a_damaged_map_can_be_removed(own: Workspace, sampled: Path) -> None:
     assert name in own.map_names()
 
 
+@pytest.mark.slow
 def test_a_run_whose_map_is_removed_while_it_goes_on_ends_with_its_report(
     own: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

@@ -222,6 +222,7 @@ def _all(data: bytes, field: int) -> list[Any]:
     return [value for number, value in _fields(data) if number == field]
 
 
+@pytest.mark.slow
 def test_the_tfrecord_has_every_recorded_state_in_scenarios_of_91_instants(
     exports: Path, recorded: States
 ) -> None:

@@ -44,6 +44,7 @@ def test_a_map_that_is_named_is_the_only_one_that_is_read(
     assert path.read_bytes() == same.read_bytes()
 
 
+@pytest.mark.slow
 def test_maps_are_built_anew_only_if_their_statistics_decide_which_is_drawn(
     tmp_path: Path,
 ) -> None:

@@ -32,6 +32,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     return opened
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("map_name", ROOM)
 def test_templates_are_placed_where_there_is_room_and_else_say_why(
     workspace: Workspace, map_name: str
@@ -81,6 +82,7 @@ def test_numbers_that_make_no_scene_are_refused(
         template_scenario(workspace, template, "motorway_weave", values=values)
 
 
+@pytest.mark.slow
 def test_a_template_is_written_once_under_a_name(workspace: Workspace, tmp_path: Path) -> None:
     file = write_template(workspace, "mid-block", "town_5x5", out=tmp_path)
     assert file.name == "mid-block-town_5x5.scenario.json"

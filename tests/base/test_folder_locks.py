@@ -48,6 +48,7 @@ def test_a_lock_is_gone_when_it_is_given_back(tmp_path):
     assert not is_locked(tmp_path / "x")
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_about_to_be_free_is_waited_for(tmp_path):
     # A process that the holder has started outlives it for a moment, with the lock.
     code = (

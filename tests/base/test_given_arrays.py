@@ -118,6 +118,7 @@ def test_a_file_of_too_many_arrays_is_refused() -> None:
         arrays_from_npz(many)
 
 
+@pytest.mark.slow
 @given(st.data())
 def test_damage_anywhere_is_refused_or_changes_no_shape(data: st.DataObject) -> None:
     whole = npz_bytes({"a": np.arange(20), "b": np.array(["x", "yz"])})

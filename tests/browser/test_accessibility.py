@@ -213,6 +213,7 @@ def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str
         expect(user.page.get_by_role("dialog")).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_measures_and_public_transport(
     visit: Callable[..., Any], served: tool.Served, sampled: str
 ) -> None:
@@ -233,6 +234,7 @@ def test_measures_and_public_transport(
     inspector.look("editor-public-transport")
 
 
+@pytest.mark.slow
 def test_the_study(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)
@@ -350,6 +352,7 @@ def test_a_long_run(visit: Callable[..., Any], served: tool.Served, sampled: str
     inspector.look("run-interrupted")
 
 
+@pytest.mark.slow
 def test_the_tour(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url, tour=True)
     user.open_editor(sampled)
@@ -417,6 +420,7 @@ def written(one_map: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str
     return {"report": root / "a/seed-1/report.html", "comparison": comparison}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view", ["report", "comparison"])
 def test_the_pages_that_are_files(
     visit: Callable[..., Any], written: dict[str, Path], view: str
@@ -434,6 +438,7 @@ def test_the_pages_that_are_files(
     inspector.look(view)
 
 
+@pytest.mark.slow
 def test_a_failed_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)

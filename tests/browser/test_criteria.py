@@ -20,6 +20,7 @@ from tools.page import Served
 __all__ = ["crossing"]
 
 
+@pytest.mark.slow
 def test_criteria_are_added_removed_and_taken_back_with_the_mouse(
     user: OdscenPage, crossing: str
 ) -> None:
@@ -54,6 +55,7 @@ def test_a_criterion_is_added_with_the_keyboard_alone(user: OdscenPage, crossing
     assert user.document()["criteria"] == ["collided == 2"]
 
 
+@pytest.mark.slow
 def test_a_finished_run_says_which_criteria_it_met_and_with_what_value(
     user: OdscenPage, served: Served, sampled: str
 ) -> None:

@@ -41,6 +41,7 @@ def away(one: tuple[float, float], other: tuple[float, float]) -> float:
     return float(np.hypot(one[0] - other[0], one[1] - other[1]))
 
 
+@pytest.mark.slow
 def test_a_road_user_is_dragged_to_the_nearest_free_start_and_undo_brings_it_back(
     cars: OdscenPage,
 ) -> None:
@@ -55,6 +56,7 @@ def test_a_road_user_is_dragged_to_the_nearest_free_start_and_undo_brings_it_bac
     assert cars.document() == before
 
 
+@pytest.mark.slow
 def test_all_that_is_in_a_rectangle_is_selected_dragged_copied_and_removed(
     cars: OdscenPage,
 ) -> None:
@@ -78,6 +80,7 @@ def test_all_that_is_in_a_rectangle_is_selected_dragged_copied_and_removed(
     assert cars.document()["actors"] == []
 
 
+@pytest.mark.slow
 def test_a_goal_is_set_anywhere_and_its_flag_and_its_route_are_dragged_with_a_live_route(
     cars: OdscenPage,
 ) -> None:
@@ -131,6 +134,7 @@ def test_a_goal_that_cannot_be_reached_is_said_before_the_click_and_not_set(
     assert cars.document()["actors"][1]["goal"] is None
 
 
+@pytest.mark.slow
 def test_starts_and_goals_are_moved_by_keys_alone(cars: OdscenPage) -> None:
     keyboard = cars.page.keyboard
     first = where(cars, 1)
@@ -183,6 +187,7 @@ def test_a_move_is_shown_before_it_is_saved_and_goes_back_where_there_is_no_serv
     assert cars.document() != before
 
 
+@pytest.mark.slow
 def test_three_cars_a_pedestrian_and_an_ego_with_a_goal_run_within_eighteen_clicks(
     served: Served, open_page: Callable[..., OdscenPage]
 ) -> None:

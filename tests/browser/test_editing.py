@@ -47,6 +47,7 @@ def place(user: OdscenPage, kind: str, number: int = 0) -> str:
     return str(made)
 
 
+@pytest.mark.slow
 def test_a_region_grows_only_by_what_touches_it(editor: OdscenPage) -> None:
     graph = editor.graph
     arms = graph.neighbours(graph.junction())
@@ -72,6 +73,7 @@ def test_a_region_never_falls_apart(region: OdscenPage) -> None:
     assert region.document()["roi"] == before[:-1]
 
 
+@pytest.mark.slow
 def test_the_whole_map_is_one_click_and_one_step_of_undo(editor: OdscenPage) -> None:
     with editor.changing():
         editor.page.get_by_role("button", name="Take the whole map").click()
@@ -81,6 +83,7 @@ def test_the_whole_map_is_one_click_and_one_step_of_undo(editor: OdscenPage) -> 
     assert editor.document()["roi"] == []
 
 
+@pytest.mark.slow
 def test_a_rectangle_and_what_is_in_sight_become_the_region(editor: OdscenPage) -> None:
     graph = editor.graph
     junction = graph.junction()
@@ -96,6 +99,7 @@ def test_a_rectangle_and_what_is_in_sight_become_the_region(editor: OdscenPage) 
     assert len(editor.document()["roi"]) == len(graph.segments)
 
 
+@pytest.mark.slow
 def test_roads_and_road_users_are_found_by_name_without_a_mouse(region: OdscenPage) -> None:
     name = place(region, "Bus")
     road = region.graph.neighbours(region.graph.junction())[0]
@@ -117,6 +121,7 @@ def test_roads_and_road_users_are_found_by_name_without_a_mouse(region: OdscenPa
     expect(region.names.first).to_have_attribute("aria-pressed", "true")
 
 
+@pytest.mark.slow
 def test_neighbours_are_not_offered_before_they_are_known(editor: OdscenPage) -> None:
     held: list[Route] = []
 
@@ -134,6 +139,7 @@ def test_neighbours_are_not_offered_before_they_are_known(editor: OdscenPage) ->
     assert len(editor.document()["roi"]) == 5
 
 
+@pytest.mark.slow
 def test_a_problem_leads_to_its_place(region: OdscenPage) -> None:
     place(region, "Pedestrian", 2)
     expect(region.problems).to_have_count(0)
@@ -154,6 +160,7 @@ def test_a_problem_leads_to_its_place(region: OdscenPage) -> None:
     assert np.hypot(x - spawn[0], y - spawn[1]) < 5
 
 
+@pytest.mark.slow
 def test_every_kind_of_road_user_can_be_placed(region: OdscenPage) -> None:
     kinds = ("Car", "Van", "Truck", "Bus", "Motorcycle", "Bicycle", "Pedestrian")
     for number, kind in enumerate(kinds):
@@ -163,6 +170,7 @@ def test_every_kind_of_road_user_can_be_placed(region: OdscenPage) -> None:
     expect(region.names).to_have_count(len(kinds))
 
 
+@pytest.mark.slow
 def test_a_goal_is_chosen_on_the_map_and_made_random_again(region: OdscenPage) -> None:
     name = place(region, "Car", 3)
     actor = region.document()["actors"][0]
@@ -177,6 +185,7 @@ def test_a_goal_is_chosen_on_the_map_and_made_random_again(region: OdscenPage) -
     assert region.document()["actors"][0]["id"] == name
 
 
+@pytest.mark.slow
 def test_undo_and_redo_say_what_they_do_and_do_it(region: OdscenPage) -> None:
     with_region = region.document()
     place(region, "Car")
@@ -197,6 +206,7 @@ def test_undo_and_redo_say_what_they_do_and_do_it(region: OdscenPage) -> None:
     assert region.document() == with_car
 
 
+@pytest.mark.slow
 def test_nothing_is_lost_by_a_reload(region: OdscenPage) -> None:
     name = place(region, "Truck")
     before = region.document()
@@ -229,6 +239,7 @@ def test_a_second_tab_overwrites_nothing_and_says_so(
     assert [actor["category"] for actor in other.document()["actors"]] == ["car", "van"]
 
 
+@pytest.mark.slow
 def test_a_scenario_that_is_not_there_is_said_with_a_way_back(user: OdscenPage) -> None:
     user.page.goto("/#/edit/nowhere")
     expect(user.page.get_by_role("alert")).to_contain_text("nowhere")
@@ -236,6 +247,7 @@ def test_a_scenario_that_is_not_there_is_said_with_a_way_back(user: OdscenPage) 
     expect(user.maps).to_have_count(1)
 
 
+@pytest.mark.slow
 def test_a_flow_is_placed_and_undone(region: OdscenPage) -> None:
     region.step("Road users").click()
     region.flow("Vehicle flow").click()
@@ -249,6 +261,7 @@ def test_a_flow_is_placed_and_undone(region: OdscenPage) -> None:
     assert region.document()["flows"] == []
 
 
+@pytest.mark.slow
 def test_a_random_crowd_fills_the_region_in_one_step(region: OdscenPage) -> None:
     region.step("Road users").click()
     region.page.get_by_role("button", name="Fill the whole region").click()

@@ -25,6 +25,7 @@ def region(user: OdscenPage) -> OdscenPage:
     return user
 
 
+@pytest.mark.slow
 def test_the_map_does_not_move_under_the_pointer_while_road_users_are_placed(
     region: OdscenPage,
 ) -> None:
@@ -38,6 +39,7 @@ def test_the_map_does_not_move_under_the_pointer_while_road_users_are_placed(
     expect(region.names).to_have_count(3)
 
 
+@pytest.mark.slow
 def test_a_click_while_placing_never_sets_the_goal_of_the_one_before(region: OdscenPage) -> None:
     region.step("Road users").click()
     region.kind("Car").click()
@@ -51,6 +53,7 @@ def test_a_click_while_placing_never_sets_the_goal_of_the_one_before(region: Ods
     assert [actor["goal"] for actor in actors] == [None, None]
 
 
+@pytest.mark.slow
 def test_a_new_name_is_seen_in_the_head_the_list_and_the_runs(region: OdscenPage) -> None:
     region.choose_in_menu("Rename")
     dialog = region.page.get_by_role("dialog")
@@ -69,6 +72,7 @@ def test_a_new_name_is_seen_in_the_head_the_list_and_the_runs(region: OdscenPage
     )
 
 
+@pytest.mark.slow
 def test_what_is_typed_and_not_finished_outlives_a_reload_and_the_back_button(
     region: OdscenPage,
 ) -> None:
@@ -88,6 +92,7 @@ def test_what_is_typed_and_not_finished_outlives_a_reload_and_the_back_button(
         region.names.first.click()
 
 
+@pytest.mark.slow
 def test_a_map_that_cannot_be_read_is_said_in_sight_and_in_plain_words(user: OdscenPage) -> None:
     user.open_catalogue()
     with user.page.expect_file_chooser() as chooser:
@@ -137,6 +142,7 @@ def test_without_a_clock_no_time_of_day_is_shown_that_the_weather_contradicts(
     expect(region.page.get_by_text("such as 07:30")).to_be_visible()
 
 
+@pytest.mark.slow
 def test_the_comparison_of_two_runs_is_not_clipped_on_a_narrow_screen(
     served: Served, sampled: str, open_page: Callable[..., OdscenPage]
 ) -> None:

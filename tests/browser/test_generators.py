@@ -55,6 +55,7 @@ def fill(user: OdscenPage) -> list[dict[str, object]]:
     return actors
 
 
+@pytest.mark.slow
 def test_the_generator_that_ships_and_an_own_one_with_options_fill_the_region(
     filling: OdscenPage,
 ) -> None:

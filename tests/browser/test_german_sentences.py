@@ -73,6 +73,7 @@ def test_findings_and_a_refused_edit_are_in_german(
     assert english(german.refusal) == []
 
 
+@pytest.mark.slow
 def test_a_failed_upload_and_the_report_of_a_conversion_are_in_german(german: OdscenPage) -> None:
     page = german.page
     page.goto("/")
@@ -94,6 +95,7 @@ def test_a_failed_upload_and_the_report_of_a_conversion_are_in_german(german: Od
     assert english(report) == []
 
 
+@pytest.mark.slow
 def test_the_report_of_an_import_is_in_german(german: OdscenPage) -> None:
     page = german.page
     page.goto("/")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from playwright.sync_api import Locator, expect
 
 from tests.browser.conftest import CROSSING
@@ -13,6 +14,7 @@ def press(user: OdscenPage, wanted: Locator, key: str = "Enter") -> None:
     user.page.keyboard.press(key)
 
 
+@pytest.mark.slow
 def test_a_scenario_is_made_and_run_with_the_keyboard_alone(user: OdscenPage) -> None:
     keyboard = user.page.keyboard
     user.open_catalogue()
@@ -64,6 +66,7 @@ def test_a_scenario_is_made_and_run_with_the_keyboard_alone(user: OdscenPage) ->
     assert user.actions()["pointer"] == 0
 
 
+@pytest.mark.slow
 def test_shortcuts_are_listed_and_the_list_gives_the_focus_back(
     user: OdscenPage, sampled: str
 ) -> None:

@@ -41,6 +41,7 @@ def metres(text: str) -> float:
     return float(found[1])
 
 
+@pytest.mark.slow
 def test_a_length_and_an_area_are_measured_and_the_scenario_stays_as_it_is(
     user: OdscenPage, sampled: str
 ) -> None:
@@ -73,6 +74,7 @@ def test_a_length_and_an_area_are_measured_and_the_scenario_stays_as_it_is(
     assert len(user.document()["actors"]) == len(before["actors"]) + 1
 
 
+@pytest.mark.slow
 def test_a_length_is_measured_with_the_keyboard_alone(user: OdscenPage, sampled: str) -> None:
     user.open_editor(sampled)
     before = user.document()
@@ -87,6 +89,7 @@ def test_a_length_is_measured_with_the_keyboard_alone(user: OdscenPage, sampled:
     assert user.document() == before
 
 
+@pytest.mark.slow
 def test_layers_are_shown_and_hidden_and_remembered(user: OdscenPage, sampled: str) -> None:
     user.open_editor(sampled)
     page = user.page
@@ -107,6 +110,7 @@ def test_layers_are_shown_and_hidden_and_remembered(user: OdscenPage, sampled: s
     expect(page.get_by_role("checkbox", name="Names of roads")).not_to_be_checked()
 
 
+@pytest.mark.slow
 def test_nothing_hangs_at_the_pointer_while_measuring(user: OdscenPage, sampled: str) -> None:
     user.open_editor(sampled)
     user.step("Road users").click()
@@ -142,6 +146,7 @@ def test_escape_closes_a_list_before_it_ends_the_measuring(user: OdscenPage, sam
     assert metres(measured(user).inner_text()) == pytest.approx(10.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_what_is_measured_is_in_the_drawing_and_the_picture_of_the_map(
     user: OdscenPage, sampled: str, tmp_path: Path
 ) -> None:
@@ -164,6 +169,7 @@ def test_what_is_measured_is_in_the_drawing_and_the_picture_of_the_map(
     assert before.read_bytes() != picture.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_length_is_measured_by_touch(
     open_page: Callable[..., OdscenPage], served: Served, sampled: str
 ) -> None:
@@ -180,6 +186,7 @@ def test_a_length_is_measured_by_touch(
     assert user.document() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1360, 390])
 @pytest.mark.parametrize("language", ["en", "de"])
 def test_nothing_on_the_map_lies_on_something_else(

@@ -55,6 +55,7 @@ def outer_lane(user: OdscenPage, segment: str) -> str:
     return str(columns["lane_keys"][columns["lane"][rows[0]]])
 
 
+@pytest.mark.slow
 def test_a_road_is_closed_by_a_click_and_the_closure_changed_and_taken_back(
     user: OdscenPage, crossing: str
 ) -> None:
@@ -91,6 +92,7 @@ def test_a_road_is_closed_by_a_click_and_the_closure_changed_and_taken_back(
     expect(card(user, "Closure shut")).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_a_turn_a_lane_and_a_point_are_picked_on_the_map(user: OdscenPage, crossing: str) -> None:
     opened(user, crossing, "Measures")
     what = user.page.get_by_role("radiogroup", name="What it is about")
@@ -160,6 +162,7 @@ def test_a_light_is_put_out_of_order_with_the_keyboard_alone(
     assert user.actions()["pointer"] == 0
 
 
+@pytest.mark.slow
 def test_a_line_with_two_stops_is_drawn_on_the_map_and_changed(
     user: OdscenPage, crossing: str
 ) -> None:

@@ -30,6 +30,7 @@ def empty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tool.Served]:
         yield server
 
 
+@pytest.mark.slow
 def test_a_newcomer_runs_a_scenario_within_twenty_clicks_and_types_nothing(
     empty: tool.Served, open_page: Callable[..., OdscenPage]
 ) -> None:

@@ -12,6 +12,7 @@ from tests.browser.test_measures import card, crossing, on_lane, opened, outer_l
 __all__ = ["crossing"]
 
 
+@pytest.mark.slow
 def test_stations_are_placed_changed_removed_and_taken_back_with_the_mouse(
     user: OdscenPage, crossing: str
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import pytest
 from playwright.sync_api import expect
 
 from tests.browser.conftest import PATIENCE
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from tools import page as tool
 
 
+@pytest.mark.slow
 def test_a_newcomer_places_the_walker_by_mouse(
     served: tool.Served, open_page: Callable[..., OdscenPage]
 ) -> None:

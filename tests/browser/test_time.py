@@ -24,6 +24,7 @@ def departs(user: OdscenPage, row: int = 0) -> float:
     return float(user.document()["actors"][row]["depart"])
 
 
+@pytest.mark.slow
 def test_a_departure_is_dragged_and_moved_by_keys_and_undo_brings_it_back(
     timed: OdscenPage,
 ) -> None:
@@ -85,6 +86,7 @@ def test_the_plan_is_shown_at_a_moment_before_any_run_and_says_that_it_is_one(
     expect(page.get_by_text("each alone on the road")).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_the_bar_of_a_replay_jumps_to_the_instants_of_its_events(
     user: OdscenPage, sampled: str
 ) -> None:

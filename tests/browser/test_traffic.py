@@ -52,6 +52,7 @@ def background(user: OdscenPage) -> Locator:
     return user.page.get_by_role("region", name="Background traffic background", exact=True)
 
 
+@pytest.mark.slow
 def test_vehicles_from_outside_are_added_where_lanes_lead_in(
     user: OdscenPage, crossing: str
 ) -> None:
@@ -70,6 +71,7 @@ def test_vehicles_from_outside_are_added_where_lanes_lead_in(
     expect(card).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_background_traffic_is_added_changed_and_taken_back(
     user: OdscenPage, crossing: str
 ) -> None:
@@ -114,6 +116,7 @@ def test_background_traffic_is_added_changed_and_taken_back(
     assert user.document()["demand"]["background"][0]["end"] is None
 
 
+@pytest.mark.slow
 def test_a_table_with_a_mistake_names_line_and_column_and_corrected_it_is_imported(
     user: OdscenPage, crossing: str, tmp_path: Path
 ) -> None:
@@ -166,6 +169,7 @@ def test_a_flow_can_have_a_day_profile(user: OdscenPage, crossing: str, served: 
     assert user.document()["flows"][0]["profile"] == "weekday"
 
 
+@pytest.mark.slow
 def test_the_fit_to_counts_is_shown_with_its_places(
     user: OdscenPage, crossing: str, tmp_path: Path
 ) -> None:

@@ -259,6 +259,7 @@ def test_a_car_is_no_walker(connected: Connected) -> None:
     assert "not a Walker" in answer.error
 
 
+@pytest.mark.slow
 def test_boxes_may_lie_before_and_beside_the_origin_of_their_vehicles() -> None:
     xodr, offset = MAPS / "signal_crossing.xodr", (0.25, 0.125)
     with StandIn(xodr, box_offset=offset, refuse_grounded=False) as server:

@@ -25,6 +25,7 @@ def test_the_map_has_its_name_and_text(server: StandIn) -> None:
     assert road_map.to_opendrive() == (MAPS / "signal_crossing.xodr").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["signal_crossing", "rural_hills", "left_hand_crossing"])
 def test_spawn_points_float_above_lanes_and_look_along_them(name: str) -> None:
     with StandIn(MAPS / f"{name}.xodr") as server:
@@ -108,6 +109,7 @@ def test_weather_comes_back_with_all_its_parameters(connected: Connected) -> Non
     assert {name: getattr(weather, name) for name in parameters} == pytest.approx(parameters)
 
 
+@pytest.mark.slow
 def test_another_map_can_be_loaded_and_empties_the_world() -> None:
     maps = {"Hills": MAPS / "rural_hills.xodr"}
     with StandIn(
@@ -130,6 +132,7 @@ def test_another_map_can_be_loaded_and_empties_the_world() -> None:
             client.load_world("Nowhere")
 
 
+@pytest.mark.slow
 def test_a_map_that_somebody_else_loads_is_noticed() -> None:
     maps = {"Hills": MAPS / "rural_hills.xodr"}
     with StandIn(MAPS / "signal_crossing.xodr", other_maps=maps, refuse_grounded=False) as server:

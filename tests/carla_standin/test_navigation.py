@@ -62,6 +62,7 @@ with StandIn(Path(sys.argv[1]), navigation=True) as server:
 """
 
 
+@pytest.mark.slow
 def test_the_clients_own_walkers_walk_on_sidewalks_and_cross_on_crosswalks(tmp_path: Path) -> None:
     # The client keeps the mesh below its home.
     ended = subprocess.run(

@@ -32,11 +32,13 @@ def test_every_third_spawn_is_refused_with_a_message(connected: Connected) -> No
     connected.spawn(CAR, place(10))
 
 
+@pytest.mark.slow
 def test_a_server_of_another_version_says_so() -> None:
     with StandIn(MAPS / "signal_crossing.xodr", version="0.9.15") as server:
         assert connect(server).get_server_version() == "0.9.15"
 
 
+@pytest.mark.slow
 def test_a_frozen_server_answers_too_late(connected: Connected) -> None:
     connected.client.set_timeout(0.5)
     connected.server.set(freeze_at_tick=2, freeze_seconds=1.5)
@@ -102,6 +104,7 @@ def test_the_server_knows_its_actors_as_the_client_does(connected: Connected) ->
     assert mine[car.id]["transform"][0] == [0.0, 20.0, 0.0]
 
 
+@pytest.mark.slow
 def test_no_process_outlives_the_test_that_started_it() -> None:
     script = (
         "import os, sys; from pathlib import Path\n"
@@ -132,6 +135,7 @@ def is_alive(process: int) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_two_servers_live_side_by_side() -> None:
     with (
         StandIn(MAPS / "signal_crossing.xodr") as first,

@@ -41,6 +41,7 @@ def test_every_light_of_the_map_is_found_by_its_opendrive_id(connected: Connecte
         assert light.get_affected_lane_waypoints()
 
 
+@pytest.mark.slow
 def test_lights_stand_where_the_map_has_them_also_on_slopes() -> None:
     odr = parse((MAPS / "rural_hills.xodr").read_bytes())
     table = RoadTable.of(odr)

@@ -78,6 +78,7 @@ def test_the_clients_traffic_manager_drives_vehicles_without_physics() -> None:
     assert max(told["speed"][5 * 5 :]) == 0.0  # once the manager has taken their physics
 
 
+@pytest.mark.slow
 def test_the_clients_traffic_manager_drives_vehicles_with_physics_by_their_controls() -> None:
     told = driven_by_the_manager("physics")
     for car in range(5):

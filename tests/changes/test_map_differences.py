@@ -218,6 +218,7 @@ def test_a_small_edit_is_told_exactly_and_nothing_else(edit: Edit, said: list[st
     assert words(edit) == said
 
 
+@pytest.mark.slow
 def test_the_other_way_round_what_was_removed_is_added() -> None:
     root = etree.fromstring(TOWN)
     remove_a_crosswalk(root)
@@ -226,6 +227,7 @@ def test_the_other_way_round_what_was_removed_is_added() -> None:
     assert [(one.kind, one.what) for one in found] == [("added", "lane"), ("added", "crosswalk")]
 
 
+@pytest.mark.slow
 def test_a_place_is_that_of_the_map_that_has_it() -> None:
     (removed,) = differences(remove_a_crosswalk)
     assert removed.place is not None
@@ -293,6 +295,7 @@ def test_what_is_only_written_otherwise_is_no_difference(edit: Edit) -> None:
     assert words(edit) == []
 
 
+@pytest.mark.slow
 def test_a_road_with_another_id_is_known_by_where_it_lies() -> None:
     def renumber(root: etree._Element) -> None:
         road(root).set("id", "4711")

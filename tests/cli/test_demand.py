@@ -56,6 +56,7 @@ def test_tables_are_read_into_the_scenario_and_the_fit_is_printed(workspace, sce
     assert "2 of 2 counts within GEH 5" in shown.err
 
 
+@pytest.mark.slow
 def test_a_wrong_table_is_refused_with_file_and_line_and_changes_nothing(
     workspace, scenario, tmp_path
 ):
@@ -78,6 +79,7 @@ def test_a_wrong_table_is_refused_with_file_and_line_and_changes_nothing(
     assert Path(scenario).read_bytes() == before
 
 
+@pytest.mark.slow
 def test_background_traffic_is_added_and_a_scenario_without_counts_has_no_fit(workspace, scenario):
     done = odscen(
         *("demand", "add", scenario, "--per-km", "5", "--day", "weekend"),
@@ -124,6 +126,7 @@ def test_background_traffic_is_sized_by_runs(workspace, scenario):
     assert "'none'" in wrong.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trips", ["1e8", "9" * 30])
 def test_a_day_of_endless_trips_is_refused_at_once(workspace, tmp_path, trips):
     call = ("demand", "weekday", "--map", "signal_crossing", "--trips", trips)
@@ -133,6 +136,7 @@ def test_a_day_of_endless_trips_is_refused_at_once(workspace, tmp_path, trips):
     assert not (tmp_path / "day.json").exists()
 
 
+@pytest.mark.slow
 def test_vehicles_from_outside_are_added_where_they_can_enter(workspace, scenario, tmp_path):
     listed = odscen("demand", "entries", scenario, "--json", "--workspace", workspace)
     assert listed.code == 0, listed.err
@@ -164,6 +168,7 @@ def test_vehicles_from_outside_are_added_where_they_can_enter(workspace, scenari
     assert "no lane leads into the region of interest on 'j10001'" in wrong.err
 
 
+@pytest.mark.slow
 def test_a_feed_without_its_tables_is_refused_and_changes_nothing(workspace, scenario, tmp_path):
     before = Path(scenario).read_bytes()
     (tmp_path / "stops.txt").write_text("stop_id,stop_lat,stop_lon\n")
@@ -177,6 +182,7 @@ def test_a_feed_without_its_tables_is_refused_and_changes_nothing(workspace, sce
     assert Path(scenario).read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_matrix_is_corrected_by_counts_and_its_page_shows_them(workspace, scenario, tmp_path):
     one, other = roads(scenario)[:2]
     trips, counts = (tmp_path / f"{name}.csv" for name in ("trips", "counts"))
@@ -201,6 +207,7 @@ def test_a_matrix_is_corrected_by_counts_and_its_page_shows_them(workspace, scen
     assert fit.json["vehicles"] < 140
 
 
+@pytest.mark.slow
 def test_how_trips_choose_routes_is_set_and_kept(workspace, scenario):
     done = odscen(
         *("demand", "routes", scenario, "--by", "travel_time", "--informed", "0.3"),

@@ -101,6 +101,7 @@ def test_sigterm_ends_a_run_as_ctrl_c_does_and_it_resumes(
     assert_resumes(run, workspace, alone)
 
 
+@pytest.mark.slow
 def test_sigterm_leaves_nothing_of_a_run_in_one_piece(workspace, scenario, tmp_path):
     process = start("run", scenario, "--step-length", "0.01", "--out", tmp_path,
                     "--workspace", workspace)  # fmt: skip
@@ -111,6 +112,7 @@ def test_sigterm_leaves_nothing_of_a_run_in_one_piece(workspace, scenario, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_a_killed_run_in_one_piece_leaves_is_cleared_by_the_next(
     workspace, scenario, tmp_path
 ):
@@ -162,6 +164,7 @@ def test_a_full_disk_is_named_with_what_to_do_and_the_run_resumes(
         assert_resumes(run, workspace, alone)
 
 
+@pytest.mark.slow
 def test_a_folder_that_may_not_be_written_is_named_with_what_to_do(workspace, scenario, tmp_path):
     """Root writes anywhere, but not into a file system that is mounted read-only."""
     with small_disk(tmp_path / "disk", 1_000_000) as disk:
@@ -190,6 +193,7 @@ def test_a_run_on_a_read_only_disk_is_not_resumed_and_says_why_and_resumes_later
         assert_resumes(run, workspace, alone)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("handles", [8, 12, 20])
 def test_too_few_handles_are_named_with_what_to_do(workspace, scenario, tmp_path, handles):
     def limit():
@@ -204,6 +208,7 @@ def test_too_few_handles_are_named_with_what_to_do(workspace, scenario, tmp_path
         assert json.loads(out)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_before_its_first_step_is_refused(workspace, scenario, tmp_path):
     done = odscen("run", scenario, "--until", "1e-300", "--out", tmp_path, "--workspace", workspace)
     assert done.code == 2

@@ -13,6 +13,7 @@ from tests.app.test_scenario_imports import FILE, SPEED, given
 from tests.cli.conftest import odscen
 
 
+@pytest.mark.slow
 def test_a_distribution_gives_a_scenario_and_the_plan_that_sweeps_it(tmp_path: Path) -> None:
     file = varied(tmp_path, f"<Deterministic>{of('kph', between(20, 60, 20))}</Deterministic>")
     out, place = tmp_path / "all.scenario.json", ("--workspace", tmp_path / "workspace")

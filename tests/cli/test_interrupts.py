@@ -37,6 +37,7 @@ def test_a_wrong_call_is_one_json_object_too(arguments):
     assert done.json["error"]["message"]
 
 
+@pytest.mark.slow
 def test_the_same_map_can_be_added_several_times_at_once(tmp_path):
     def add(_number):
         return odscen("maps", "add", SHIPPED / "roundabout.xodr", "--json", "--workspace", tmp_path)
@@ -47,6 +48,7 @@ def test_the_same_map_can_be_added_several_times_at_once(tmp_path):
     assert [path.name for path in (tmp_path / "maps").iterdir()] == ["roundabout"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("in_the_foreground")
 @pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a POSIX terminal does")
 def test_an_interrupted_run_leaves_nothing(workspace, tmp_path):

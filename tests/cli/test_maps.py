@@ -61,6 +61,7 @@ def test_all_files_of_a_map_are_there(workspace):
         assert Path(path).stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_add_reports_refusals_by_element_and_adds_the_others(tmp_path):
     bad = tmp_path / "bad.xodr"
     text = (SHIPPED / "t_junction_signs.xodr").read_text(encoding="utf-8")
@@ -79,6 +80,7 @@ def test_add_reports_refusals_by_element_and_adds_the_others(tmp_path):
     assert left == {"roundabout"}, "nothing half-written is left"
 
 
+@pytest.mark.slow
 def test_a_map_of_an_earlier_odscen_is_listed_as_outdated_until_it_is_used(tmp_path):
     good = SHIPPED / "t_junction_signs.xodr"
     odscen("maps", "add", good, "--workspace", tmp_path)
@@ -97,6 +99,7 @@ def test_a_map_of_an_earlier_odscen_is_listed_as_outdated_until_it_is_used(tmp_p
     assert row["outdated"] is False
 
 
+@pytest.mark.slow
 def test_files_of_the_same_name_also_get_their_folders(tmp_path):
     text = (SHIPPED / "t_junction_signs.xodr").read_text(encoding="utf-8")
     files = []
@@ -124,6 +127,7 @@ def test_an_unknown_map_is_answered_with_close_names(workspace):
     assert "did you mean signal_crossing" in done.err
 
 
+@pytest.mark.slow
 def test_render_writes_svg_and_png_and_refuses_the_rest(workspace, tmp_path):
     w = ("--workspace", workspace)
     assert odscen("maps", "render", "signal_crossing", "-o", tmp_path / "a.svg", *w).code == 0
@@ -136,6 +140,7 @@ def test_render_writes_svg_and_png_and_refuses_the_rest(workspace, tmp_path):
     assert (tmp_path / "a.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+@pytest.mark.slow
 def test_another_spacing_builds_the_map_again(tmp_path):
     add = ("maps", "add", SHIPPED / "roundabout.xodr", "--json", "--workspace", tmp_path)
     two = odscen(*add).json["maps"][0]["graph"]["nodes"]
@@ -143,6 +148,7 @@ def test_another_spacing_builds_the_map_again(tmp_path):
     assert four == pytest.approx(two / 2, rel=0.1)
 
 
+@pytest.mark.slow
 def test_verify_gives_every_limit_and_fails_if_one_is_not_held(workspace, tmp_path):
     sheet = tmp_path / "found" / "sheet.svg"
     arguments = ("maps", "verify", "signal_crossing", "--workspace", workspace)
@@ -159,6 +165,7 @@ def test_verify_gives_every_limit_and_fails_if_one_is_not_held(workspace, tmp_pa
         assert verdict["name"] in table.out
 
 
+@pytest.mark.slow
 def test_verify_names_what_a_tampered_network_lost(workspace, tmp_path):
     shutil.copytree(workspace / "maps" / "t_junction_signs", tmp_path / "maps" / "t_junction_signs")
     net = tmp_path / "maps" / "t_junction_signs" / "net.net.xml"
@@ -175,6 +182,7 @@ def test_verify_names_what_a_tampered_network_lost(workspace, tmp_path):
     assert "Lane not covered" in sheet.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_verify_refuses_a_network_that_is_none(workspace, tmp_path):
     shutil.copytree(workspace / "maps" / "t_junction_signs", tmp_path / "maps" / "t_junction_signs")
     net = tmp_path / "maps" / "t_junction_signs" / "net.net.xml"
@@ -234,6 +242,7 @@ def test_help_needs_none_of_the_heavy_packages():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_doctor_says_what_is_there(workspace):
     done = odscen("doctor", "--json", "--workspace", workspace)
     assert done.code == 0
@@ -243,12 +252,14 @@ def test_doctor_says_what_is_there(workspace):
     assert checks["workspace"] == str(workspace)
 
 
+@pytest.mark.slow
 def test_assets_are_listed():
     done = odscen("assets", "list", "--json")
     assert len(done.json["blueprints"]) == 93
     assert {"ClearNoon", "FogNight"} <= {preset["name"] for preset in done.json["weather"]}
 
 
+@pytest.mark.slow
 def test_a_missing_command_explains_itself():
     done = odscen("mpas")
     assert done.code == 2
@@ -268,6 +279,7 @@ def test_a_limit_of_zero_is_refused(tmp_path, option):
     assert f"{option} must be above 0" in done.err
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
 def test_a_map_beyond_its_memory_ends_with_code_3_and_what_to_do(tmp_path):
     lines = "".join(

@@ -9,6 +9,7 @@ from tests.cli.conftest import SHIPPED, odscen
 CROSSING = SHIPPED / "signal_crossing.xodr"
 
 
+@pytest.mark.slow
 def test_a_map_is_added_by_the_converter_of_that_name_and_says_so(tmp_path: Path) -> None:
     done = odscen("maps", "add", CROSSING, "--converter", "netconvert", "--workspace", tmp_path)
     assert (done.code, done.out) == (0, "")
@@ -65,6 +66,7 @@ def test_compare_prints_both_converters_beside_each_other(workspace: Path) -> No
     assert "--levels takes numbers" in wrong.err
 
 
+@pytest.mark.slow
 def test_a_device_is_no_network(tmp_path: Path) -> None:
     odscen("maps", "add", CROSSING, "--workspace", tmp_path)
     call = ("maps", "network", "signal_crossing", "--workspace", tmp_path, "--from", "/dev/zero")

@@ -60,6 +60,7 @@ def test_shards_share_a_suite_out(suite, workspace):
     assert [one.code for one in done] == [0, 0]
 
 
+@pytest.mark.slow
 def test_options_that_make_no_sense_are_refused(suite, workspace):
     for options, words in (
         (("--shard", "3/2"), "'3/2' is no part of a suite"),
@@ -108,6 +109,7 @@ def python(*arguments):
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_brackets_of_an_extra_are_written_as_they_are(workspace, tmp_path):
     """As if nothing optional were installed: the names of the packages are looked up."""
     code = (

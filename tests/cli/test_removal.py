@@ -36,6 +36,7 @@ def test_a_removed_map_says_what_is_on_it_and_comes_back(own):
     assert odscen("trash", "list", "--json", *w).json == {"items": []}
 
 
+@pytest.mark.slow
 def test_scenarios_are_removed_by_name_and_deleted_for_good_from_the_wastebasket(own):
     w = ("--workspace", own)
     odscen("generate", "--map", MAP, *w)
@@ -54,6 +55,7 @@ def test_a_script_that_does_not_say_yes_is_refused_and_nothing_is_removed(own):
     assert (own / "maps" / MAP / "map.json").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("answer", "code"), [(b"n\n", 2), (b"y\n", 0)])
 def test_a_person_is_asked(own, answer, code):
     ours, theirs = pty.openpty()

@@ -29,6 +29,7 @@ def finished(workspace, scenario, tmp_path_factory):
     return done.json
 
 
+@pytest.mark.slow
 def test_a_sampled_scenario_has_nothing_to_remark(workspace, scenario):
     done = odscen("check", scenario, "--json", "--workspace", workspace)
     assert done.code == 0
@@ -54,6 +55,7 @@ def test_a_report_is_written_anew_along_the_way_asked_for(workspace, finished, t
     assert (done.code, "no run named 'nowhere'" in done.err) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_run_without_a_report_has_the_same_records_and_gets_one_later(
     workspace, scenario, finished, tmp_path
 ):
@@ -70,6 +72,7 @@ def test_a_run_without_a_report_has_the_same_records_and_gets_one_later(
     assert odscen("report", run, *options).code == 0, "its checksum is known"
 
 
+@pytest.mark.slow
 def test_several_runs_have_their_records_and_the_rest_when_they_are_opened(
     workspace, scenario, tmp_path
 ):
@@ -111,6 +114,7 @@ def test_a_run_gives_what_scripts_rely_on(finished):
     assert finished["figures"]["vehicle_km"] > 0.0
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_in_two_folders(workspace, scenario, finished, tmp_path):
     again = odscen(*GENERATE, "--out", tmp_path, "--workspace", workspace).json["scenarios"][0]
     assert _bytes(again["file"]) == _bytes(scenario)
@@ -124,6 +128,7 @@ def test_the_same_seed_gives_the_same_bytes_in_two_folders(workspace, scenario, 
         assert _bytes(one) == _bytes(other), name
 
 
+@pytest.mark.slow
 def test_another_seed_gives_another_scenario(workspace, scenario, tmp_path):
     arguments = [*GENERATE]
     arguments[arguments.index("5")] = "6"
@@ -143,6 +148,7 @@ def test_a_failed_expectation_is_exit_code_1(workspace, scenario, tmp_path):
     assert "did you mean arrived" in done.err
 
 
+@pytest.mark.slow
 def test_an_expectation_of_criticality_has_it_measured(workspace, scenario, tmp_path):
     w = ("--out", tmp_path, "--json", "--workspace", workspace)
     done = odscen("run", scenario, "--expect", "min_ttc >= 0.1 s", "--expect", "min_pet<0", *w)
@@ -167,6 +173,7 @@ def test_several_scenarios_give_one_table(workspace, tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_exported_files_run_with_plain_sumo_and_give_the_same_trajectories(
     workspace, scenario, finished, tmp_path
 ):
@@ -210,6 +217,7 @@ def test_bodies_stand_where_they_were_placed_by_the_recorded_trajectories(finish
     assert checked > 10
 
 
+@pytest.mark.slow
 def test_a_scenario_with_errors_is_not_run_and_all_of_them_are_shown(workspace, scenario, tmp_path):
     document = json.loads(_bytes(scenario))
     document["actors"][0]["spawn"] = "99.0.-1.0"
@@ -224,12 +232,14 @@ def test_a_scenario_with_errors_is_not_run_and_all_of_them_are_shown(workspace, 
     assert odscen("check", bad, "--workspace", workspace).code == 2
 
 
+@pytest.mark.slow
 def test_a_scenario_on_a_missing_map_says_so(scenario, tmp_path):
     done = odscen("check", scenario, "--workspace", tmp_path)
     assert done.code == 2
     assert "no map named 'signal_crossing'" in done.err
 
 
+@pytest.mark.slow
 def test_generating_without_maps_says_how_to_add_one(tmp_path):
     done = odscen("generate", "--workspace", tmp_path)
     assert done.code == 2
@@ -275,6 +285,7 @@ def test_a_scenario_runs_with_several_seeds_that_redraw_it(workspace, scenario, 
     assert compared.json["a"]["seeds"] == [1, 3, 4]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -32,6 +32,7 @@ def get(url):
         return answer.status, answer.read().decode()
 
 
+@pytest.mark.slow
 def test_serve_answers_on_this_machine_until_it_is_interrupted(tmp_path):
     with served("--workspace", str(tmp_path)) as process:
         address = re.search(r"http://\S+", process.stderr.readline())[0]
@@ -47,6 +48,7 @@ def bearing(url, token):
     return urllib.request.Request(url, headers={"Authorization": f"Bearer {token}"})
 
 
+@pytest.mark.slow
 def test_on_this_machine_too_the_token_is_needed_unless_it_is_declined(tmp_path):
     with served("--workspace", str(tmp_path)) as process:
         page = re.search(r"http://\S+/", process.stderr.readline())[0]
@@ -58,6 +60,7 @@ def test_on_this_machine_too_the_token_is_needed_unless_it_is_declined(tmp_path)
         assert get(address + "api/health")[0] == 200
 
 
+@pytest.mark.slow
 def test_a_token_of_ones_own_comes_from_the_environment_and_stays(tmp_path, monkeypatch):
     monkeypatch.setenv("ODSCEN_TOKEN", "a-token-of-my-own")
     with served("--workspace", str(tmp_path)) as process:
@@ -66,6 +69,7 @@ def test_a_token_of_ones_own_comes_from_the_environment_and_stays(tmp_path, monk
         assert get(bearing(page + "api/maps", token))[0] == 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -80,6 +84,7 @@ def test_what_would_be_no_protection_is_refused(tmp_path, options, words):
     assert words in done.err
 
 
+@pytest.mark.slow
 def test_the_browser_is_started_with_a_private_file_and_never_with_the_token(tmp_path):
     seen = tmp_path / "seen"
     browser = tmp_path / "browser"
@@ -113,6 +118,7 @@ pathlib.Path({str(seen)!r}).write_text("\\n".join([sys.argv[1], mode, file.read_
     assert not Path(called.removeprefix("file://")).exists()
 
 
+@pytest.mark.slow
 def test_any_other_address_needs_the_token_that_is_printed(tmp_path):
     with served("--host", "0.0.0.0", "--workspace", str(tmp_path)) as process:
         address = re.search(r"http://\S+", process.stderr.readline())[0]
@@ -123,6 +129,7 @@ def test_any_other_address_needs_the_token_that_is_printed(tmp_path):
         assert get(bearing(page + "api/health", token))[0] == 200
 
 
+@pytest.mark.slow
 def test_an_address_that_is_taken_is_told_with_a_way_out(tmp_path):
     with served("--workspace", str(tmp_path)) as process:
         port = re.search(r":(\d+)/", process.stderr.readline())[1]

@@ -62,6 +62,7 @@ def test_a_dry_run_lists_the_cases_and_runs_none(scenario: Path, tmp_path: Path)
     assert not (tmp_path / "busy-sweep").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "words"),
     [

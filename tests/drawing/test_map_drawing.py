@@ -22,6 +22,7 @@ def square(x, y, size=1.0):
     return [(x, y), (x + size, y), (x + size, y + size), (x, y + size)]
 
 
+@pytest.mark.slow
 @given(st.lists(RING, max_size=4), st.text(max_size=8))
 def test_a_drawing_survives_json_to_the_centimetre(rings, name):
     drawing = MapDrawing(

@@ -223,6 +223,7 @@ def test_bits_of_bicycle_lanes_inside_a_crossing_are_carriageway(pytestconfig):
     assert shapely.area(shapely.difference(middle, covered)) < 0.1
 
 
+@pytest.mark.slow
 def test_real_towns_are_drawn_small_and_the_same_every_time(shared_maps):
     text = (shared_maps / "carla-2019" / "Town05.xodr").read_bytes()
     first = draw(text).to_json()

@@ -165,6 +165,7 @@ def test_without_cairosvg_the_error_says_how_to_get_it(monkeypatch):
         svg_to_png("<svg/>")
 
 
+@pytest.mark.slow
 def test_real_towns_fit_into_a_small_file(shared_maps):
     text = (shared_maps / "carla-2020" / "Town04.xodr").read_bytes()
     odr = parse(text, file="Town04.xodr")

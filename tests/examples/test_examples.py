@@ -61,6 +61,7 @@ def test_the_own_figure_is_a_share_for_each_junction_the_worst_first(workspace: 
     assert 0.0 < shares[0] <= 1.0
 
 
+@pytest.mark.slow
 def test_the_lane_graph_reaches_further_with_lane_changes(workspace: Path) -> None:
     text = printed("lane_graph_networkx.py", workspace)
     without, having = (float(share) for share in re.findall(r"lane changes: ([\d.]+)%", text))
@@ -69,6 +70,7 @@ def test_the_lane_graph_reaches_further_with_lane_changes(workspace: Path) -> No
     assert len(re.findall(r"shortest paths between segments: [jr]\d+", text)) == 3
 
 
+@pytest.mark.slow
 def test_the_watched_run_is_stopped_when_half_have_arrived(workspace: Path) -> None:
     text = printed("watch_a_run.py", workspace)
     assert re.search(r"^ +0 s: \d+ under way, 0\.0 m/s on average$", text, re.MULTILINE)

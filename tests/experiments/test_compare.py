@@ -78,6 +78,7 @@ def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
     assert any(row.key.place == "j10001" for row in result.places)
 
 
+@pytest.mark.slow
 def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
     a, b = sides
     store = Workspace.open(a.parent / "workspace")
@@ -109,6 +110,7 @@ def test_a_page_of_runs_that_are_the_same_says_so(sides):
     assert 'id="differences"' not in page
 
 
+@pytest.mark.slow
 def test_a_run_in_slices_has_the_places_of_one_in_one_piece(sides, tmp_path):
     store = Workspace.open(tmp_path / "workspace")
     store.add_map(ROOT / "maps" / "signal_crossing.xodr")
@@ -130,6 +132,7 @@ def test_a_run_compared_with_itself_is_the_same(sides):
     assert {row.says for row in result.rows} == {"the same"}
 
 
+@pytest.mark.slow
 def test_the_command_prints_json_and_writes_a_page(sides, tmp_path):
     a, b = sides
     out = ("--json", "--html", tmp_path / "c.html")

@@ -68,6 +68,7 @@ def test_what_is_critical_is_what_is_not_safe(found: SearchResult) -> None:
     assert archive["coverage"] == pytest.approx(found.coverage) == 3 / 25
 
 
+@pytest.mark.slow
 def test_a_search_ends_with_the_same_files_after_an_interruption(
     behind: Scenario, found: SearchResult, tmp_path: Path
 ) -> None:

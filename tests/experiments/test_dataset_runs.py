@@ -95,6 +95,7 @@ def contents(out: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 def test_a_dataset_that_was_killed_twice_is_that_of_one_go(tmp_path: Path) -> None:
     asked = plan(formats=["pyg", "scenarionet", "waymo"], shard=2)
     killed, ran = tmp_path / "killed", []

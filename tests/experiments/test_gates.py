@@ -51,6 +51,7 @@ def test_an_unchanged_rerun_passes_and_writes_the_same_baseline(store, suite):
     assert {path.name: path.read_bytes() for path in suite.parent.glob("baselines/*.*")} == before
 
 
+@pytest.mark.slow
 def test_a_longer_green_fails_naming_figure_junction_size_and_input(store, suite):
     timing = {"junction": "10001", "green": [60, 8]}
     edit_scenario(suite, "signal_crossing", signals={"junctions": [timing]})
@@ -86,6 +87,7 @@ def test_a_lower_speed_limit_fails_naming_the_segment(store, suite):
     assert "segment r2: free_speed is" in told
 
 
+@pytest.mark.slow
 def test_a_changed_figure_without_a_changed_input_is_a_changed_behaviour(store, suite):
     path = suite.parent / "baselines" / "t_junction_signs.json"
     data = json.loads(path.read_text())
@@ -116,6 +118,7 @@ def test_a_tolerance_of_the_suite_lets_it_pass(store, suite):
     ]
 
 
+@pytest.mark.slow
 def test_without_a_baseline_it_fails_and_says_how_to_write_one(store, suite):
     (suite.parent / "baselines" / "t_junction_signs.json").unlink()
     result = run(store, suite)
@@ -123,6 +126,7 @@ def test_without_a_baseline_it_fails_and_says_how_to_write_one(store, suite):
     assert "--update-baseline" in lines(case(result, "t_junction_signs"))[0]
 
 
+@pytest.mark.slow
 def test_a_seed_that_the_baseline_does_not_have_fails(store, suite):
     suite.write_text(suite.read_text().replace("[1, 2]", "[1, 7]"))
     result = run(store, suite)
@@ -132,6 +136,7 @@ def test_a_seed_that_the_baseline_does_not_have_fails(store, suite):
     assert "the baseline has no seed 7" in found.problems[1]
 
 
+@pytest.mark.slow
 def test_expectations_are_held_against_every_seed(store, suite):
     suite.write_text(suite.read_text().replace('"teleported == 0"', '"mean_delay <= 1 s"'))
     result = run(store, suite)
@@ -159,6 +164,7 @@ def test_a_run_that_is_not_usable_fails_as_its_own_cause_unless_the_suite_says_o
     assert headline(without).startswith("signals: ")
 
 
+@pytest.mark.slow
 def test_a_run_that_dies_is_an_error_not_a_difference(store, suite):
     suite.write_text("time_limit = 0.001\n" + suite.read_text())
     result = run(store, suite)
@@ -207,6 +213,7 @@ def test_a_bad_suite_is_refused_with_file_key_and_value(suite, old, new, words):
     assert words in str(caught.value)
 
 
+@pytest.mark.slow
 def test_each_scenario_that_cannot_be_used_is_one_error_and_the_others_run(store, tiny):
     suite = tiny("good", "misfit", "unreadable", "elsewhere", "spoilt")
     folder = suite.parent
@@ -231,6 +238,7 @@ def test_each_scenario_that_cannot_be_used_is_one_error_and_the_others_run(store
     assert "version 9" in headline(case(result, "spoilt"))
 
 
+@pytest.mark.slow
 def test_a_map_that_cannot_be_built_is_an_error_of_its_scenarios_only(store, tiny):
     suite = tiny("good", "on_broken")
     maps = suite.parent / "maps"
@@ -242,6 +250,7 @@ def test_a_map_that_cannot_be_built_is_an_error_of_its_scenarios_only(store, tin
     assert "broken.xodr" in headline(case(result, "on_broken"))
 
 
+@pytest.mark.slow
 def test_a_scenario_or_map_that_is_named_and_not_there_is_an_error_of_its_own(store, tiny):
     suite = tiny("good")
     text = suite.read_text().replace('"maps/*.xodr"', '"maps/t_junction_signs.xodr"')
@@ -261,6 +270,7 @@ def test_a_map_that_is_not_there_and_that_no_scenario_needs_refuses_the_suite(st
         run(store, suite)
 
 
+@pytest.mark.slow
 def test_what_the_baseline_has_and_the_suite_has_not_is_missing(store, tiny, tiny_baseline):
     suite = tiny("here")
     folder = suite.parent / "baselines"
@@ -277,6 +287,7 @@ def test_what_the_baseline_has_and_the_suite_has_not_is_missing(store, tiny, tin
     assert result.exit_code == 1
 
 
+@pytest.mark.slow
 def test_baselines_of_scenarios_that_fall_short_are_left_unless_forced(store, tiny):
     suite = tiny("one", "other")
     folder = suite.parent / "baselines"
@@ -297,6 +308,7 @@ def test_baselines_of_scenarios_that_fall_short_are_left_unless_forced(store, ti
     assert (folder / "one.json").read_bytes() != before
 
 
+@pytest.mark.slow
 def test_a_better_figure_is_a_change_and_fails_only_where_the_suite_says_so(store, tiny):
     suite = tiny("one")
     path = suite.parent / "baselines" / "one.json"
@@ -314,6 +326,7 @@ def test_a_better_figure_is_a_change_and_fails_only_where_the_suite_says_so(stor
     assert (statuses(result), result.exit_code) == ({"one": "failed"}, 1)
 
 
+@pytest.mark.slow
 def test_a_changed_map_fails_where_the_suite_says_so(store, tiny):
     suite = tiny("one")
     path = suite.parent / "maps" / "t_junction_signs.xodr"
@@ -329,6 +342,7 @@ def test_a_changed_map_fails_where_the_suite_says_so(store, tiny):
     assert headline(result.cases[0]) == f"the map: this suite allows no change of map; {NOWHERE}"
 
 
+@pytest.mark.slow
 def test_a_map_that_is_only_written_otherwise_is_said_to_mean_the_same(store, tiny):
     suite = tiny("one")
     run(store, suite, update=Update(True))
@@ -339,6 +353,7 @@ def test_a_map_that_is_only_written_otherwise_is_said_to_mean_the_same(store, ti
     assert headline(changed) == f"changed since the baseline: {same}"
 
 
+@pytest.mark.slow
 def test_demand_per_km_that_follows_a_changed_limit_is_put_down_to_the_map(store, tmp_path):
     suite = write_tiny(tmp_path / "suite", "one")
     background = {"id": "all", "mix": {"car": 1}, "per_km": 6}
@@ -375,6 +390,7 @@ def wrong(run):
 """
 
 
+@pytest.mark.slow
 def test_a_figure_of_the_suites_own_is_expected_and_held_against_the_baseline(store, tiny):
     suite = tiny("one")
     (suite.parent / "figures.py").write_text(FIGURES)
@@ -433,6 +449,7 @@ def test_a_large_suite_with_everything_in_it_is_reported_whole(store, tiny, coun
     assert f"2 error, 1 missing, 1 new, {count - 4} passed" in suite_summary(result)
 
 
+@pytest.mark.slow
 def test_a_changed_map_of_a_suite_is_none_to_choose_or_sample_from(tmp_path):
     own = Workspace.open(tmp_path / "own")
     own.add_map(ROOT / "maps" / "t_junction_signs.xodr")
@@ -501,6 +518,7 @@ def test_seeds_redraw_placed_traffic_and_their_scatter_decides(store, tiny):
     assert changed.changed_inputs == ("redraw traffic -> open",)
 
 
+@pytest.mark.slow
 def test_other_seeds_than_those_of_the_baseline_need_its_scatter(store, tiny):
     suite = read_suite(tiny("one")).with_seeds((7, 8))
     (found,) = run_suite(store, suite).cases
@@ -511,6 +529,7 @@ def test_other_seeds_than_those_of_the_baseline_need_its_scatter(store, tiny):
     )
 
 
+@pytest.mark.slow
 def test_seeds_that_hardly_vary_are_warned_of_in_every_test(store, tiny):
     suite = tiny("one")
     document = json.loads((suite.parent / "one.scenario.json").read_text())
@@ -543,6 +562,7 @@ def in_parts(store, tiny, tmp_path):
     return suite, files
 
 
+@pytest.mark.slow
 def test_parts_are_judged_together_as_if_they_had_run_here(store, in_parts, tmp_path):
     suite, _ = in_parts
     (tmp_path / "elsewhere").mkdir()
@@ -589,6 +609,7 @@ def test_parts_that_do_not_fit_together_or_to_the_suite_are_refused(store, in_pa
         run_suite(store, read_suite(suite), parts=read_parts(files[1:]))
 
 
+@pytest.mark.slow
 def test_baselines_are_written_from_parts(store, in_parts):
     suite, files = in_parts
     merged = run_suite(store, read_suite(suite), parts=read_parts(files), update=Update(True))

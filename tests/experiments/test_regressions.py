@@ -80,6 +80,7 @@ def first_lines(store, file):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pattern", "new", "outcome", "words"),
     [
@@ -145,6 +146,7 @@ def finer(document):
     document["simulation"]["step_length"] = 0.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("edit", "cause"),
     [(sporty, "actors"), (slower, "actors"), (more, "demand"), (finer, "settings")],
@@ -166,6 +168,7 @@ def test_a_change_of_traffic_is_caught_by_every_scenario_with_its_cause_and_plac
     assert somewhere > len(NAMES) / 2 - (cause == "settings")
 
 
+@pytest.mark.slow
 def test_reruns_without_a_change_pass(store, suite):
     results = [run_suite(store, read_suite(suite), processes=2) for _ in range(RERUNS)]
     verdicts = {case.status.value for result in results for case in result.cases}

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,6 +11,7 @@ def grid(count: int) -> np.ndarray:
     return np.array([(x * 100.0, y) for x in axis for y in axis])
 
 
+@pytest.mark.slow
 @given(st.floats(0.2, 0.8), st.floats(-0.3, 0.3))
 def test_the_boundary_is_within_half_a_cell_of_the_true_one(at: float, slope: float) -> None:
     points = grid(21)

@@ -69,6 +69,7 @@ def test_a_study_that_is_killed_and_resumed_has_the_table_of_another(
     assert (begun / TABLE_FILE).read_bytes() == (other / TABLE_FILE).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_scenario_is_sampled_once_for_all_of_its_seeds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -151,6 +152,7 @@ def test_a_parameter_is_not_called_as_a_column(tmp_path: Path) -> None:
         begin_study(place(), plan_file(tmp_path, vary=vary), tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_the_report_pairs_runs_of_variants_by_seed(begun: Path) -> None:
     carry_out_study(begun, MadeUp(broken=frozenset({"crossing/slow/seed-2"})))
     table = study_results(begun).table

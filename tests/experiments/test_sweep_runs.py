@@ -93,6 +93,7 @@ def test_the_boundary_lies_between_safe_cases_and_others(swept: Sweep) -> None:
         assert 12.0 <= end[1] <= 26.0
 
 
+@pytest.mark.slow
 def test_a_case_runs_alone_with_the_same_figures(swept: Sweep, tmp_path: Path) -> None:
     settings = RunSettings(recording=Recording(emissions=False, criticality=True))
     file = swept.folder / "cases" / "case-003.scenario.json"
@@ -116,6 +117,7 @@ def test_the_page_has_each_case_and_links_that_lead_somewhere(swept: Sweep) -> N
         assert (swept.folder / "cases" / f"{name}.scenario.json").is_file()
 
 
+@pytest.mark.slow
 def test_a_sweep_that_was_interrupted_ends_with_the_same_bytes(
     swept: Sweep, cut_in: Scenario, tmp_path: Path
 ) -> None:
@@ -185,6 +187,7 @@ def test_what_a_folder_sweeps_can_be_read(swept: Sweep, cut_in: Scenario, tmp_pa
         read_sweep(tmp_path)
 
 
+@pytest.mark.slow
 def test_cases_that_are_not_possible_are_rows_with_the_reason(
     cut_in: Scenario, tmp_path: Path
 ) -> None:
@@ -220,6 +223,7 @@ def test_a_sweep_that_cannot_be_is_refused(
     assert not list(tmp_path.rglob("*.json"))  # the folder is left to another sweep
 
 
+@pytest.mark.slow
 def test_a_figure_of_an_installed_package_is_a_column_and_can_be_limited(
     cut_in: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -235,6 +239,7 @@ def test_a_figure_of_an_installed_package_is_a_column_and_can_be_limited(
     assert found["safe"].to_list() == [False, False], "the ego begins at 30 m/s"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "words"),
     [

@@ -101,6 +101,7 @@ def every_kind() -> dict[str, tuple[str, str]]:
     return found
 
 
+@pytest.mark.slow
 def test_what_the_table_refuses_is_what_the_reader_does_not_know(tmp_path: Path) -> None:
     kinds = every_kind()
     assert len(kinds) > 40
@@ -115,6 +116,7 @@ def test_what_the_table_refuses_is_what_the_reader_does_not_know(tmp_path: Path)
     assert unknown & kinds.keys() == {kind for kind in kinds if VERDICTS[kind] == "refused"}
 
 
+@pytest.mark.slow
 def test_all_that_is_exported_is_in_the_table_as_written(tmp_path: Path) -> None:
     workspace = Workspace.open(tmp_path / "w")
     workspace.add_map(ROOT / "maps" / "motorway_weave.xodr")

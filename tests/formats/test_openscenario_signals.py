@@ -59,6 +59,7 @@ def shown(controller: Any, signal: str, time: float) -> str:
     return str(state.get("state"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.0, 17.0])
 def test_controllers_show_at_each_time_what_the_lights_of_a_run_show(
     tmp_path: Path, offset: float

@@ -79,6 +79,7 @@ def test_it_is_written_and_read_in_python(
     assert len(read.lists["taken"]) == len(actors)
 
 
+@pytest.mark.slow
 def test_it_is_written_and_read_on_the_command_line(
     package: Path, workspace: odscen.Workspace, sampled: Path, tmp_path: Path
 ) -> None:

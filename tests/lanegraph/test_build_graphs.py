@@ -62,6 +62,7 @@ def test_left_hand_traffic_drives_on_positive_lanes() -> None:
     np.testing.assert_allclose(graph.lanes.x[:5], [9, 7, 5, 3, 1])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=50)
 @given(
     st.floats(3.0, 200.0),
@@ -218,6 +219,7 @@ def test_lanes_that_would_not_fit_into_memory_are_refused() -> None:
         build(network(road("1", section(*(lane(-i) for i in range(1, 5))), length=999_999.0)))
 
 
+@pytest.mark.slow
 def test_more_lanes_are_built_where_more_are_allowed() -> None:
     odr = network(road("1", section(*(lane(-i) for i in range(1, 3))), length=600_000.0))
     table = RoadTable.of(odr)
@@ -234,6 +236,7 @@ def test_two_builds_of_a_map_give_equal_bytes() -> None:
     assert to_graphml(one) == to_graphml(other)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=25)
 @given(
     st.floats(1.0, 60.0),

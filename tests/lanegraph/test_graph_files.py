@@ -86,6 +86,7 @@ def test_graphml_survives_being_rewritten_by_networkx(name: str) -> None:
     assert differences(graph, from_graphml(rewritten.getvalue())) == []
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(st.lists(st.floats(), min_size=1, max_size=4))
 def test_every_number_survives(values: list[float]) -> None:
@@ -94,6 +95,7 @@ def test_every_number_survives(values: list[float]) -> None:
     assert differences(graph, from_npz_bytes(to_npz_bytes(graph))) == []
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"]), min_size=1))
 def test_every_road_id_survives(road: str) -> None:
@@ -196,6 +198,7 @@ def test_entities_are_not_expanded() -> None:
         from_graphml(bomb)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_damaged_npz_is_read_or_refused_but_never_crashes(data: st.DataObject) -> None:

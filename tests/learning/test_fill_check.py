@@ -149,6 +149,7 @@ COLUMNS = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None)
 @given(st.sampled_from(sorted(GRAPHS)), st.data())
 def test_whatever_comes_back_what_is_kept_passes_every_check_and_touches_nothing(

@@ -73,6 +73,7 @@ def left(store: Workspace, scratch: Path) -> list[str]:
     return [path.name for folder in (store.root / "maps", scratch) for path in folder.iterdir()]
 
 
+@pytest.mark.slow
 @linux
 def test_a_map_that_needs_too_much_memory_is_refused_and_the_next_one_is_built(
     store: Workspace, scratch: Path, motorway: Path
@@ -88,6 +89,7 @@ def test_a_map_that_needs_too_much_memory_is_refused_and_the_next_one_is_built(
     assert store.add_map(SMALL).name == "t_junction_signs"
 
 
+@pytest.mark.slow
 def test_a_map_that_takes_too_long_is_refused(
     store: Workspace, scratch: Path, motorway: Path
 ) -> None:
@@ -107,6 +109,7 @@ def test_a_child_that_does_not_end_is_ended_by_the_clock(
     assert children() == []
 
 
+@pytest.mark.slow
 def test_a_child_that_is_killed_is_an_error_that_says_so(store: Workspace, scratch: Path) -> None:
     def kill(_what: str, _share: float) -> None:
         for child in children():
@@ -143,6 +146,7 @@ def test_progress_is_told_again_while_nothing_changes(store: Workspace, motorway
         store.add_map(motorway, progress=count)
 
 
+@pytest.mark.slow
 def test_a_child_that_waits_takes_the_next_map(store: Workspace) -> None:
     for child in children():  # one that other tests have left, and that may be full
         child.kill()
@@ -155,6 +159,7 @@ def test_a_child_that_waits_takes_the_next_map(store: Workspace) -> None:
     assert [one.pid for one in children()] == before
 
 
+@pytest.mark.slow
 def test_two_maps_are_built_at_once(store: Workspace, motorway: Path) -> None:
     begun, over = threading.Event(), threading.Event()
 
@@ -177,6 +182,7 @@ def test_two_maps_are_built_at_once(store: Workspace, motorway: Path) -> None:
     assert store.map_names() == ["t_junction_signs"]
 
 
+@pytest.mark.slow
 def test_a_killed_command_leaves_no_process_and_no_folder(tmp_path: Path, motorway: Path) -> None:
     root, scratch = tmp_path / "other", tmp_path / "tmp"
     scratch.mkdir()
@@ -208,6 +214,7 @@ def test_a_fork_leaves_the_waiting_child_to_its_parent() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.slow
 def test_modules_beside_the_caller_do_not_hide_those_of_python(tmp_path: Path) -> None:
     (tmp_path / "json.py").write_text("raise SystemExit('not this one')")
     command = ["-P", "-m", "odscen", "maps", "add", str(SMALL), "--workspace", "w"]

@@ -35,6 +35,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_map_has_lanes_of_netconvert_nearly_everywhere(
     workspace: Workspace, name: str
@@ -47,6 +48,7 @@ def test_every_map_has_lanes_of_netconvert_nearly_everywhere(
     assert entry.fidelity().normal.p50 < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_sampled_scenarios_run_to_their_end_on_netconverts_network(
     workspace: Workspace, name: str, tmp_path: Path
@@ -70,6 +72,7 @@ def test_lights_by_netconvert_are_named_by_their_junctions(workspace: Workspace)
     assert len(light["signals"]) >= 8
 
 
+@pytest.mark.slow
 def test_maps_keep_their_converter_until_another_is_named(tmp_path: Path) -> None:
     place = Workspace.open(tmp_path)
     assert place.add_map(CROSSING).converter == "odscen"
@@ -80,6 +83,7 @@ def test_maps_keep_their_converter_until_another_is_named(tmp_path: Path) -> Non
     assert (back.converter, back == made) == ("odscen", False)
 
 
+@pytest.mark.slow
 def test_a_map_built_by_an_older_odscen_is_rebuilt_by_its_own_converter(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

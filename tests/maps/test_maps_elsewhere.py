@@ -46,6 +46,7 @@ def test_ways_in_carla_end_only_at_the_borders_of_the_map(path, carla):
         assert (road.length - waypoint.s if forward else waypoint.s) < 2.1
 
 
+@pytest.mark.slow
 def test_ways_in_carla_do_not_end_in_the_large_town(carla):
     pytest.importorskip("scenariogeneration", reason="needs the maintainers' tools")
     from tools.make_maps.__main__ import map_text

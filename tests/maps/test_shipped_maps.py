@@ -92,6 +92,7 @@ def test_the_script_writes_the_same_bytes_again(name):
     assert map_text(name).encode() == path.read_bytes()
 
 
+@pytest.mark.slow
 def test_the_large_town_has_over_a_hundred_junctions():
     pytest.importorskip("scenariogeneration", reason="needs the maintainers' tools")
     from tools.make_maps.__main__ import map_text
@@ -371,6 +372,7 @@ def test_the_rural_road_uses_what_it_is_for():
     assert sum(float(r.get("length")) for r in root.iter("road") if r.get("junction") == "-1") > 4e3
 
 
+@pytest.mark.slow
 def test_varied_towns_differ_and_each_is_the_same_every_time():
     pytest.importorskip("scenariogeneration", reason="needs the maintainers' tools")
     from tools.make_maps.__main__ import map_text

@@ -27,6 +27,7 @@ def workspace(tmp_path_factory):
     return store
 
 
+@pytest.mark.slow
 def test_a_map_is_built_once(tmp_path):
     store = Workspace.open(tmp_path)
     written = (store.add_map(SMALL).folder / "map.json").stat()
@@ -70,6 +71,7 @@ def test_a_failed_build_leaves_the_old_map_and_no_trace(tmp_path):
     assert [path.name for path in (tmp_path / "maps").iterdir()] == ["t_junction_signs"]
 
 
+@pytest.mark.slow
 def test_other_content_of_the_same_name_replaces_the_map(tmp_path):
     store = Workspace.open(tmp_path)
     old = store.add_map(SMALL, name="m")
@@ -92,6 +94,7 @@ def outdate(entry):
     write_sums(entry.folder, sums_of(entry.folder))
 
 
+@pytest.mark.slow
 def test_a_map_of_an_older_builder_is_built_again_when_opened_not_when_listed(
     tmp_path, monkeypatch
 ):
@@ -113,6 +116,7 @@ def test_a_map_of_an_older_builder_is_built_again_when_opened_not_when_listed(
     assert {**opened.info, "build_seconds": 0} == {**small.info, "build_seconds": 0}
 
 
+@pytest.mark.slow
 def test_an_outdated_map_that_is_found_by_its_content_is_built_again(tmp_path):
     store = Workspace.open(tmp_path)
     entry = store.add_map(SMALL)
@@ -123,6 +127,7 @@ def test_an_outdated_map_that_is_found_by_its_content_is_built_again(tmp_path):
     assert store.first_map(lambda one: one.sha256 == "") is None
 
 
+@pytest.mark.slow
 def test_an_outdated_map_that_is_damaged_is_listed_but_not_found(tmp_path):
     store = Workspace.open(tmp_path)
     entry = store.add_map(SMALL, name="a")
@@ -171,6 +176,7 @@ def test_the_environment_names_the_workspace(tmp_path, monkeypatch):
     assert Workspace.open().root == tmp_path / "w"
 
 
+@pytest.mark.slow
 def test_every_real_map_is_added(shared_maps, tmp_path):
     store = Workspace.open(tmp_path)
     for path in sorted(shared_maps.glob("esmini/*.xodr")):
@@ -185,6 +191,7 @@ def flip(path):
     path.write_bytes(content)
 
 
+@pytest.mark.slow
 def test_one_broken_map_hides_no_other_and_can_be_added_again_or_removed(tmp_path):
     store = Workspace.open(tmp_path)
     good, bad = store.add_map(SMALL, name="good"), store.add_map(SMALL, name="bad")
@@ -203,6 +210,7 @@ def test_one_broken_map_hides_no_other_and_can_be_added_again_or_removed(tmp_pat
     assert store.map_names() == ["good"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["graph_npz", "net", "lane_table", "drawing", "xodr"])
 def test_a_byte_that_has_changed_in_a_map_is_named_before_it_is_read(tmp_path, key):
     store = Workspace.open(tmp_path)

@@ -113,6 +113,7 @@ def effects() -> dict[tuple[str, str], bool]:
     return found
 
 
+@pytest.mark.slow
 def test_what_the_table_calls_read_changes_the_model_and_nothing_else_does() -> None:
     table = rows()
     found = effects()

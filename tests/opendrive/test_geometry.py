@@ -110,6 +110,7 @@ def test_a_param_poly_that_describes_a_circle_runs_like_an_arc() -> None:
     assert curve[2] == pytest.approx(arc[2], abs=2e-3)
 
 
+@pytest.mark.slow
 @given(st.floats(-0.01, 0.01), st.floats(-1e-4, 1e-4), st.floats(1.0, 80.0))
 def test_a_poly3_is_run_through_by_arc_length(c: float, d: float, length: float) -> None:
     plan = plan_of(GeometryKind.POLY3, length, (0.0, 0.0, c, d))
@@ -152,6 +153,7 @@ def test_heading_and_curvature_are_derivatives_of_the_position(
     assert (curvature[2] - curvature[0]) / step == pytest.approx(change[1], abs=1e-6)
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(0, 12), min_size=1, max_size=8), st.data())
 def test_records_are_found_like_a_search_from_the_end_would(
     sizes: list[int], data: st.DataObject

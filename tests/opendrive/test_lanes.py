@@ -171,6 +171,7 @@ def cubic(tag: str, s_name: str, values: tuple[float, ...]) -> str:
     return f'<{tag} {s_name}="0" a="{a}" b="{b}" c="{c}" d="{d}"/>'
 
 
+@pytest.mark.slow
 @given(
     st.floats(-0.02, 0.02),
     st.floats(-0.02, 0.02),

@@ -31,6 +31,7 @@ def box(u: float, v: float) -> str:
     return "".join(f'<cornerLocal u="{a}" v="{b}" z="0"/>' for a, b in corners)
 
 
+@pytest.mark.slow
 @given(st.floats(-3.2, 3.2), st.floats(-0.3, 0.3))
 def test_a_crosswalk_is_crossed_across_its_road_whatever_the_headings(
     hdg: float, skew: float

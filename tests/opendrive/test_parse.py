@@ -315,6 +315,7 @@ def test_a_thousand_notes_of_one_kind_are_summed_up() -> None:
     assert odr.notes[-1] == "499 further uses of this rule [duplicate-id]"
 
 
+@pytest.mark.slow
 @given(st.floats(-1e8, 1e8), st.floats(-10, 10), st.floats(0.5, 20))
 def test_numbers_are_read_to_the_last_digit(x: float, hdg: float, width: float) -> None:
     plan = LINE.replace('x="0"', f'x="{x!r}"').replace('hdg="0"', f'hdg="{hdg!r}"')

@@ -24,6 +24,7 @@ except LimitError as error:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited by RLIMIT_AS")
 def test_too_little_memory_is_said_and_not_blamed_on_the_file() -> None:
     command = [sys.executable, "-c", STARVED]

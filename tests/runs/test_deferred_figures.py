@@ -37,6 +37,7 @@ def waiting(prepared: SumoPreparedRun, tmp_path: Path) -> Run:
     return run_prepared(prepared, tmp_path / "waiting", figures=False)
 
 
+@pytest.mark.slow
 def test_a_run_that_is_opened_ends_with_the_bytes_of_one_that_was_measured_at_once(
     prepared: SumoPreparedRun, waiting: Run, tmp_path: Path
 ) -> None:

@@ -61,6 +61,7 @@ def test_the_page_offers_them(workspace: Workspace) -> None:
     assert PRESET in offered
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("harbour")
 def test_a_scenario_with_both_runs(workspace: Workspace, sampled: Path, tmp_path: Path) -> None:
     scenario = read_scenario(sampled)

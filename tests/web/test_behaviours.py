@@ -36,6 +36,7 @@ def test_the_models_that_ship_are_offered_with_their_options(client: TestClient)
     assert [one["name"] for one in imitation["options"]] == ["sampled"]
 
 
+@pytest.mark.slow
 def test_a_run_is_driven_by_the_model_that_is_chosen(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:

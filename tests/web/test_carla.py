@@ -110,6 +110,7 @@ def test_pictures_come_while_it_runs(workspace: Workspace, standin: StandIn, sam
     assert all(part.split("\r\n\r\n")[1].startswith("\xff\xd8") for part in pictures)
 
 
+@pytest.mark.slow
 def test_a_run_that_carla_does_not_show_has_no_camera(client: TestClient, sampled: str) -> None:
     run = client.post("/api/runs", json={"scenario": sampled, "until": 1}).json()["run"]
     assert client.get(f"/api/runs/{run}/camera").status_code == 404

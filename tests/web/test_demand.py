@@ -150,6 +150,7 @@ def test_a_whole_day_keeps_who_is_there_and_is_one_step_for_undo(
     assert undone["document"] == state["document"]
 
 
+@pytest.mark.slow
 def test_a_day_that_is_being_tried_is_cancelled_within_a_second_and_changes_nothing(
     client: TestClient, state: dict[str, Any]
 ) -> None:
@@ -165,6 +166,7 @@ def test_a_day_that_is_being_tried_is_cancelled_within_a_second_and_changes_noth
     assert client.get("/api/scenarios/mine").json() == state
 
 
+@pytest.mark.slow
 def test_the_fit_of_a_run_is_that_of_its_trajectories_with_places_on_the_map(
     client: TestClient, state: dict[str, Any], workspace: Workspace
 ) -> None:
@@ -186,6 +188,7 @@ def test_the_fit_of_a_run_is_that_of_its_trajectories_with_places_on_the_map(
     assert [(row["x"], row["y"]) for row in found["rows"]] == list(points.values())
 
 
+@pytest.mark.slow
 def test_a_run_without_counts_has_no_fit(client: TestClient, sampled: str) -> None:
     run = client.post("/api/runs", json={"scenario": sampled, "until": 5}).json()["run"]
     finished(client, run)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import pytest
 from starlette.testclient import TestClient
 
 from odscen.figures.measures.registry import names_of
@@ -23,6 +24,7 @@ def test_the_page_is_told_what_figures_are(client: TestClient) -> None:
     assert figures["teleported"]["on_page"]
 
 
+@pytest.mark.slow
 def test_figures_of_installed_packages_are_offered_to_the_page(
     client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

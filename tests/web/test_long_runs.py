@@ -90,6 +90,7 @@ def test_a_worker_that_dies_leaves_a_long_run_that_can_go_on(client: TestClient,
     assert finished(client, run)["state"] == "completed"
 
 
+@pytest.mark.slow
 def test_a_server_that_ends_leaves_long_runs_that_can_go_on(
     client: TestClient, workspace: Workspace, busy: str
 ) -> None:
@@ -99,6 +100,7 @@ def test_a_server_that_ends_leaves_long_runs_that_can_go_on(
     assert client.get(f"/api/runs/{run}").json()["state"] == "interrupted"
 
 
+@pytest.mark.slow
 def test_only_long_runs_can_be_interrupted(client: TestClient, sampled: str) -> None:
     run = start(client, sampled, paused=True)
     wait_for(lambda: client.get(f"/api/runs/{run}").json()["state"] == "paused")
@@ -122,6 +124,7 @@ def test_the_forecast_grows_with_what_is_recorded(client: TestClient, busy: str)
     assert client.get("/api/runs").json() == []
 
 
+@pytest.mark.slow
 def test_what_is_recorded_can_be_chosen(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -135,6 +138,7 @@ def test_what_is_recorded_can_be_chosen(
     assert shown.status_code == 422
 
 
+@pytest.mark.slow
 def test_files_of_a_run_are_listed_and_downloaded_and_no_others(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:

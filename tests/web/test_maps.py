@@ -27,6 +27,7 @@ def upload(client: TestClient, content: bytes, file: str = "m.xodr", **form: str
     return client.post("/api/maps", files={"file": (file, content)}, data=form)
 
 
+@pytest.mark.slow
 def test_the_server_says_that_it_is_there_and_how_the_page_is_built(client: TestClient) -> None:
     assert client.get("/api/health").json()["version"]
     page = client.get("/")
@@ -116,6 +117,7 @@ def test_graph_columns_are_the_graph(client: TestClient, workspace: Workspace) -
     assert "content-encoding" not in plain.headers
 
 
+@pytest.mark.slow
 def test_a_map_is_added_in_the_background_and_removed(client: TestClient) -> None:
     content = (SHIPPED / "t_junction_signs.xodr").read_bytes()
     done = job(client, upload(client, content, "t junction.xodr"))
@@ -186,6 +188,7 @@ def test_assets_list_seven_categories_models_and_weather(client: TestClient) -> 
     assert "ClearNoon" in [one["name"] for one in assets["weather"]]
 
 
+@pytest.mark.slow
 def test_a_map_can_be_added_with_a_network_by_netconvert(
     client: TestClient, workspace: Workspace
 ) -> None:
@@ -209,6 +212,7 @@ def motorway() -> bytes:
     return document(*roads).encode()
 
 
+@pytest.mark.slow
 def test_a_map_that_takes_long_does_not_delay_another_and_can_be_cancelled(
     client: TestClient, workspace: Workspace
 ) -> None:
@@ -234,6 +238,7 @@ def test_the_end_of_the_server_ends_what_is_being_added(workspace: Workspace) ->
     assert [path.name for path in (workspace.root / "maps").iterdir()] == [CROSSING]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "content", [b"[" * 100_000, b'{"name": ' + b"9" * 400 + b"}", b"<graphml>" + b"<a>" * 100_000]
 )
@@ -259,6 +264,7 @@ def test_a_damaged_map_is_listed_as_broken_and_hides_no_other(
     assert client.get("/api/broken-maps").json() == []
 
 
+@pytest.mark.slow
 def test_maps_of_an_older_odscen_are_listed_and_previewed_as_they_are_and_built_when_opened(
     tmp_path: Path,
 ) -> None:
@@ -283,6 +289,7 @@ def test_maps_of_an_older_odscen_are_listed_and_previewed_as_they_are_and_built_
         assert json.loads(about.read_text())["builder"] != "1"
 
 
+@pytest.mark.slow
 def test_a_map_of_another_format_is_taken_by_the_importer_of_an_installed_package(
     client: TestClient, workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -310,6 +317,7 @@ def test_a_map_of_another_format_is_taken_by_the_importer_of_an_installed_packag
     own_importer.forget()
 
 
+@pytest.mark.slow
 def test_a_file_of_no_known_format_is_refused_with_what_it_seems_to_be(client: TestClient) -> None:
     ended = job(client, upload(client, b"<osm/>", "town.osm"))  # type: ignore[arg-type]
     assert "it seems to be OpenStreetMap" in ended["error"]["message"]

@@ -148,6 +148,7 @@ def test_watching_changes_nothing_in_what_is_recorded(
         ).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_run_is_paused_stepped_sped_up_and_stopped(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -178,6 +179,7 @@ def test_a_run_is_paused_stepped_sped_up_and_stopped(
     assert late.status_code == 409
 
 
+@pytest.mark.slow
 def test_the_pace_is_kept(client: TestClient, sampled: str) -> None:
     begun = time.monotonic()
     run = start(client, sampled, speed=10, until=20)
@@ -189,6 +191,7 @@ def test_the_pace_is_kept(client: TestClient, sampled: str) -> None:
     assert time.monotonic() - begun > 1.9  # a busy machine may be late; nothing may be early
 
 
+@pytest.mark.slow
 def test_a_finished_run_has_figures_a_report_and_a_replay(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -218,6 +221,7 @@ def test_a_finished_run_has_figures_a_report_and_a_replay(
     assert client.get(f"/api/runs/{run}").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_finished_run_says_what_became_of_its_egos(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -237,6 +241,7 @@ def test_a_finished_run_says_what_became_of_its_egos(
     ]
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_told_over_time(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -261,6 +266,7 @@ def test_a_finished_run_is_told_over_time(
     assert len(shares["edges"]) == len(shares["share"]) + 1
 
 
+@pytest.mark.slow
 def test_incidents_of_a_finished_run_are_those_that_were_told_live(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -282,6 +288,7 @@ def test_incidents_of_a_finished_run_are_those_that_were_told_live(
     assert crash in client.get(f"/api/runs/{run}/events").json()["events"]
 
 
+@pytest.mark.slow
 def test_a_replay_has_no_more_rows_than_asked_for(client: TestClient, sampled: str) -> None:
     run = start(client, sampled)
     finished(client, run)
@@ -291,6 +298,7 @@ def test_a_replay_has_no_more_rows_than_asked_for(client: TestClient, sampled: s
     assert half["times"][0] == whole["times"][0]
 
 
+@pytest.mark.slow
 def test_runs_of_one_scenario_are_found_after_a_restart_too(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -312,6 +320,7 @@ def test_runs_of_one_scenario_are_found_after_a_restart_too(
     assert [row["run"] for row in listed] == [first, second]
 
 
+@pytest.mark.slow
 def test_runs_from_the_command_line_are_among_those_of_their_scenario(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -323,6 +332,7 @@ def test_runs_from_the_command_line_are_among_those_of_their_scenario(
     assert [row["run"] for row in listed] == [made, numbered] == [sampled, f"{sampled}-1"]
 
 
+@pytest.mark.slow
 def test_runs_of_a_changed_scenario_can_be_told_apart(client: TestClient, sampled: str) -> None:
     def digest() -> str:
         run = start(client, sampled, until=2)
@@ -342,6 +352,7 @@ def test_runs_of_a_changed_scenario_can_be_told_apart(client: TestClient, sample
     assert digest() != before
 
 
+@pytest.mark.slow
 def test_a_run_whose_preparation_fails_can_be_removed(
     client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -363,6 +374,7 @@ def test_a_scenario_with_errors_is_not_run(client: TestClient) -> None:
     assert client.get("/api/runs").json() == []
 
 
+@pytest.mark.slow
 def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_other(
     client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -392,6 +404,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
     assert finished(client, good)["state"] == "stopped"
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_is_a_failed_run(client: TestClient, sampled: str) -> None:
     run = start(client, sampled, speed=1)
     with client.websocket_connect(f"/api/runs/{run}/live") as socket:
@@ -416,6 +429,7 @@ def test_a_socket_for_an_unknown_run_is_refused(client: TestClient) -> None:
         pass
 
 
+@pytest.mark.slow
 def test_a_client_that_never_reads_costs_the_others_nothing(served: str, sampled: str) -> None:
     url = f"http://{served}/api"
     run = httpx2.post(f"{url}/runs", json={"scenario": sampled, "speed": 5}).json()["run"]
@@ -440,6 +454,7 @@ def test_a_client_that_never_reads_costs_the_others_nothing(served: str, sampled
     assert httpx2.get(f"{url}/health").status_code == 200
 
 
+@pytest.mark.slow
 def test_a_slow_client_gets_the_newest_frame_and_only_that(served: str, sampled: str) -> None:
     url = f"http://{served}/api"
     wish = {"scenario": sampled, "speed": 5}  # so that it lasts longer than a busy machine takes
@@ -457,6 +472,7 @@ def test_a_slow_client_gets_the_newest_frame_and_only_that(served: str, sampled:
     assert all(b - a > 1 for a, b in itertools.pairwise(steps[1:]))  # a queue would give each
 
 
+@pytest.mark.slow
 def test_several_run_at_once_and_the_end_of_the_server_is_their_end(
     client: TestClient, sampled: str
 ) -> None:
@@ -469,6 +485,7 @@ def test_several_run_at_once_and_the_end_of_the_server_is_their_end(
     assert {shared.runs.info(name).state for name in names} == {"stopped"}
 
 
+@pytest.mark.slow
 def test_at_most_so_many_go_on_at_a_time(
     client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -481,6 +498,7 @@ def test_at_most_so_many_go_on_at_a_time(
     finished(client, run)
 
 
+@pytest.mark.slow
 def test_the_server_never_imports_libsumo(workspace: Workspace, sampled: str) -> None:
     script = """
 import sys, time
@@ -504,6 +522,7 @@ with TestClient(create_app(Workspace.open(Path(sys.argv[1]))), base_url="http://
     assert done.stdout.split() == ["completed", "False"]
 
 
+@pytest.mark.slow
 def test_a_worker_ends_when_the_program_that_started_it_is_gone(
     workspace: Workspace, sampled: str, tmp_path: Path
 ) -> None:
@@ -549,6 +568,7 @@ def _alive(pid: int) -> bool:
     return psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
 
 
+@pytest.mark.slow
 def test_threads_end_with_the_server(client: TestClient, sampled: str) -> None:
     run = start(client, sampled)
     finished(client, run)
@@ -579,6 +599,7 @@ def test_an_interrupted_long_run_is_listed_as_such_and_can_be_removed(
     assert not folder.exists()
 
 
+@pytest.mark.slow
 def test_a_run_says_how_far_its_routes_by_travel_time_have_been_found(
     client: TestClient, sampled: str
 ) -> None:

@@ -196,6 +196,7 @@ def test_an_edit_of_a_part_takes_every_field_that_the_part_has(kind: str, part: 
     assert part.model_fields.keys() <= message.model_fields.keys()
 
 
+@pytest.mark.slow
 def test_edits_over_the_wire_give_the_same_documents_as_in_python(
     client: TestClient, workspace: Workspace, new: str, places: dict[str, str]
 ) -> None:
@@ -254,6 +255,7 @@ def test_what_an_edit_refuses_changes_nothing(
     assert client.get(f"/api/scenarios/{new}").json() == before
 
 
+@pytest.mark.slow
 def test_a_region_is_filled_by_an_installed_generator_and_its_options(
     client: TestClient, sampled: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -370,6 +372,7 @@ def test_of_two_tabs_that_edit_at_once_exactly_one_wins(client: TestClient, new:
     assert sorted(codes) == [200] + [409] * 7
 
 
+@pytest.mark.slow
 def test_undo_and_redo_are_named_and_survive_a_restart(
     client: TestClient, workspace: Workspace, new: str
 ) -> None:
@@ -407,6 +410,7 @@ def test_a_file_that_another_program_changed_is_a_new_version_that_can_be_undone
     assert back["document"]["seed"] == 0
 
 
+@pytest.mark.slow
 def test_scenarios_are_listed_renamed_downloaded_uploaded_and_removed(
     client: TestClient, sampled: str
 ) -> None:
@@ -448,6 +452,7 @@ def test_a_scenario_whose_map_is_gone_can_still_be_looked_at(client: TestClient,
     assert client.get(f"/api/scenarios/{new}/roi").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_way_is_shown_as_it_is_driven_without_a_lane_change_at_its_very_start(
     client: TestClient, workspace: Workspace
 ) -> None:
@@ -496,6 +501,7 @@ def test_goals_ways_and_neighbours_are_those_of_the_graph(
     assert roi["candidates"] == list(edits.eligible_segments(scenario, graph))
 
 
+@pytest.mark.slow
 def test_the_plan_has_each_actor_at_its_start_when_it_departs_and_at_its_goal_at_the_end(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:

@@ -41,6 +41,7 @@ def test_names_never_become_paths(client: TestClient, workspace: Workspace, name
     assert sorted(path for path in workspace.root.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_a_file_name_never_becomes_a_path(client: TestClient, workspace: Workspace) -> None:
     document = client.post("/api/scenarios", json={"map": "signal_crossing"}).json()["document"]
     import json

@@ -145,6 +145,7 @@ def test_an_unknown_light_and_a_program_that_is_refused_are_told(
     assert "K2" in refused.text
 
 
+@pytest.mark.slow
 def test_a_run_tells_what_its_lights_showed_and_when_detectors_were_occupied(
     client: TestClient, own: str
 ) -> None:
@@ -170,6 +171,7 @@ def test_a_run_tells_what_its_lights_showed_and_when_detectors_were_occupied(
     assert client.get("/api/runs/nothing/signals/1").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_run_that_is_watched_shows_which_detectors_are_occupied_as_its_log_says_later(
     client: TestClient, workspace: Workspace
 ) -> None:
@@ -191,6 +193,7 @@ def test_a_run_that_is_watched_shows_which_detectors_are_occupied_as_its_log_say
     assert {kinds[name] for on in seen.occupied.values() for name in on} == {False, True}
 
 
+@pytest.mark.slow
 def test_areas_for_buses_are_shown_and_occupied_only_while_a_bus_is_under_way(
     client: TestClient, buses: str
 ) -> None:
@@ -235,6 +238,7 @@ def shown(client: TestClient, name: str) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_a_green_five_seconds_longer_is_in_sumos_file_and_in_what_a_run_shows(
     client: TestClient, sampled: str
 ) -> None:
@@ -273,6 +277,7 @@ def test_a_refused_green_says_why_and_changes_nothing(client: TestClient, own: s
     assert state(client, own) == before
 
 
+@pytest.mark.slow
 def test_the_maps_program_is_taken_over_and_its_turn_gets_an_arrow(
     client: TestClient, sampled: str
 ) -> None:

@@ -137,6 +137,7 @@ def test_what_the_catalogue_has_of_a_map_is_what_the_schema_says(
     same(MapDetails, details)
 
 
+@pytest.mark.slow
 def test_columns_that_are_sent_unchecked_are_what_the_schema_says(
     client: TestClient, sampled: str
 ) -> None:
@@ -149,6 +150,7 @@ def test_columns_that_are_sent_unchecked_are_what_the_schema_says(
     same(ReplayColumns, replay)
 
 
+@pytest.mark.slow
 def test_the_summary_of_a_run_is_what_the_schema_says(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -212,6 +214,7 @@ def test_the_schema_has_the_texts_of_the_live_view(kind: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_every_text_of_the_live_view_is_of_the_schema(client: TestClient, sampled: str) -> None:
     wish = {"scenario": sampled, "until": 10, "paused": True}
     run = client.post("/api/runs", json=wish).json()["run"]
@@ -231,6 +234,7 @@ def test_every_text_of_the_live_view_is_of_the_schema(client: TestClient, sample
         same(LiveMessage, text)
 
 
+@pytest.mark.slow
 def test_a_run_of_an_earlier_version_still_opens_and_one_that_cannot_be_read_is_failed(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:

@@ -70,6 +70,7 @@ def test_too_much_demand_becomes_what_is_usable_with_a_margin_and_the_same_each_
     assert done.usability["level"] == "usable"
 
 
+@pytest.mark.slow
 def test_demand_that_fits_stays_as_it_is(workspace: Workspace, crowded: Scenario) -> None:
     graph = load_map(workspace.map(CROSSING)).sumo.graph
     few = edits.set_background(crowded, graph, background="all", trips=40)
@@ -78,6 +79,7 @@ def test_demand_that_fits_stays_as_it_is(workspace: Workspace, crowded: Scenario
     assert (sizing.share, len(sizing.trials)) == (1.0, SEEDS)
 
 
+@pytest.mark.slow
 def test_the_junctions_propose_the_background_of_an_hour(
     workspace: Workspace, crowded: Scenario
 ) -> None:

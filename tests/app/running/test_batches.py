@@ -53,6 +53,7 @@ def test_several_runs_come_back_in_order_whatever_order_they_end_in(checked: Any
     assert [r.folder.name for r in results] == ["run0", "run1", "run2"]
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_be_prepared_ends_the_others_and_tells_its_reason(
     checked: Any, tmp_path: Path
 ) -> None:
@@ -63,6 +64,7 @@ def test_a_run_that_cannot_be_prepared_ends_the_others_and_tells_its_reason(
     assert not (tmp_path / "runs" / "r3").exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_be_prepared_is_left_out_where_somebody_is_told(checked: Any) -> None:
     broken = checked("broken", simulator=Failing(InputError("no such place")))
     told: dict[str, str] = {}
@@ -75,6 +77,7 @@ def test_a_run_that_cannot_be_prepared_is_left_out_where_somebody_is_told(checke
     assert [result.folder.name for result in results] == ["good"]
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_preparation_of_a_run(
     checked: Any, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:

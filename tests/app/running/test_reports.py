@@ -85,6 +85,7 @@ def _refusals(workspace: Workspace, folder: Path, name: str) -> dict[str, list[I
     return said
 
 
+@pytest.mark.slow
 def test_a_warm_up_is_left_out_of_the_figures_and_can_be_chosen_anew_for_a_finished_run(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -109,6 +110,7 @@ def test_a_warm_up_is_left_out_of_the_figures_and_can_be_chosen_anew_for_a_finis
         interval_rows(workspace, done, interval=7.0)
 
 
+@pytest.mark.slow
 def test_charts_of_a_run_with_a_clock_have_times_of_day(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

@@ -56,6 +56,7 @@ def test_modules_of_other_packages_are_their_own_after_a_run_has_been_imported()
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [1, 2])
 def test_numpy_works_in_threads_after_odscen_has_been_imported(turn: int) -> None:
     work = "odscen.run; from odscen.lanegraph import shortest_paths; np.unique(np.arange(9) // 2)"

@@ -20,6 +20,7 @@ from odscen.runs.run_settings import RunSettings
 SETTINGS = RunSettings(until=20.0)
 
 
+@pytest.mark.slow
 def test_what_a_road_user_of_an_earlier_run_did_is_done_again(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -42,6 +43,7 @@ def test_what_a_road_user_of_an_earlier_run_did_is_done_again(
         assert np.interp(times, new["time"], new[key]) == pytest.approx(was, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_rule_and_replaces_the_one_before(
     sampled: Path, tmp_path: Path
 ) -> None:

@@ -29,6 +29,7 @@ def watchers() -> list[threading.Thread]:
     return [one for one in threading.enumerate() if one.name == "odscen-watch"]
 
 
+@pytest.mark.slow
 def test_a_watched_run_has_the_bytes_of_one_that_is_not(
     workspace: Workspace, sampled: Path, tmp_path: Path, plain: Run
 ) -> None:
@@ -41,6 +42,7 @@ def test_a_watched_run_has_the_bytes_of_one_that_is_not(
     assert watchers() == []
 
 
+@pytest.mark.slow
 def test_steps_are_where_the_trajectories_are(
     workspace: Workspace, sampled: Path, tmp_path: Path, plain: Run
 ) -> None:
@@ -58,6 +60,7 @@ def test_steps_are_where_the_trajectories_are(
             assert np.abs(speed - step.speed[order]).max(initial=0.0) < 1e-4
 
 
+@pytest.mark.slow
 def test_leaving_the_loop_stops_the_run_and_keeps_what_happened(
     workspace: Workspace, sampled: Path, tmp_path: Path, plain: Run
 ) -> None:
@@ -75,6 +78,7 @@ def test_leaving_the_loop_stops_the_run_and_keeps_what_happened(
     assert watchers() == []
 
 
+@pytest.mark.slow
 def test_an_error_in_the_loop_comes_out_and_leaves_no_process(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -92,6 +96,7 @@ def test_an_error_in_the_loop_comes_out_and_leaves_no_process(
     assert watchers() == []
 
 
+@pytest.mark.slow
 def test_a_run_that_nobody_looks_at_is_stopped_too(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -136,6 +141,7 @@ def _driven(path: Path) -> Scenario:
     )
 
 
+@pytest.mark.slow
 def test_a_program_lets_an_actor_brake_and_drive_on_from_the_step_it_looks_at(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -158,6 +164,7 @@ def test_a_program_lets_an_actor_brake_and_drive_on_from_the_step_it_looks_at(
     assert said[:2] == [("act-1", "rule_started", 1.0), ("act-1", "rule_acted", 1.0)]
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_an_action_is_said_at_once(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -173,6 +180,7 @@ def test_what_is_wrong_with_an_action_is_said_at_once(
             steps.act("own", walk={"to": [0.0, 0.0]})
 
 
+@pytest.mark.slow
 def test_a_program_ends_the_run_by_a_rule(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

@@ -44,6 +44,7 @@ def greens(folder: Path, group: str, one: Scenario) -> list[tuple[float, float]]
     return [(a, b) for (a, on), (b, _) in pairwise(begins) if on]
 
 
+@pytest.mark.slow
 def test_an_intergreen_that_is_set_is_shown_in_a_run_to_the_second(tmp_path: Path) -> None:
     one = scenario(one_plan(**BARE), walkers=0.0, until=300.0)
     longer = edits.set_intergreen(one, LIGHTS, JUNCTION, ending="K1", beginning="K3L", seconds=9)
@@ -71,6 +72,7 @@ def test_a_group_of_its_own_has_green_in_the_stages_that_were_chosen(tmp_path: P
     assert not any(a < end and begin < b for a, b in own for begin, end in others)
 
 
+@pytest.mark.slow
 def test_a_detector_prolongs_the_green_of_its_stage_as_long_as_its_gap_says(
     tmp_path: Path,
 ) -> None:
@@ -90,6 +92,7 @@ def test_a_detector_prolongs_the_green_of_its_stage_as_long_as_its_gap_says(
     assert all(20.0 <= s <= 36.0 + 6.0 for some in lengths.values() for s in some)
 
 
+@pytest.mark.slow
 def test_plans_of_the_day_switch_at_their_times_with_their_own_greens(tmp_path: Path) -> None:
     one = scenario(one_plan(**BARE), walkers=0.0, clock=9 * 3600.0 - 150.0, until=400.0)
     one = edits.set_plan(one, LIGHTS, JUNCTION, "B", times=["00:00", "09:00"])

@@ -146,6 +146,7 @@ def test_settings_that_cannot_be_are_refused(
         time_signals(workspace, placed(workspace, scenario(None)), **settings)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_lights_of_a_coordination_whose_cycles_differ_get_one(workspace: Workspace) -> None:
     """As when one of them has got an arrow, and with it a longer cycle."""
     workspace.add_map(ROOT / "maps" / "town_5x5.xodr")

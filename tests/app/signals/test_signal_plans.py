@@ -66,6 +66,7 @@ def by_netconvert(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     return store
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", ["fixed", "actuated"])
 def test_a_program_as_json_and_as_tllogic_gives_the_same_run(
     workspace: Workspace, tmp_path: Path, control: str
@@ -261,6 +262,7 @@ def test_a_scenario_with_a_program_is_read_as_it_was_written(
     assert json.loads(file.read_text())["signals"]["junctions"][0]["junction"] == "10001"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", ["fixed", "actuated"])
 def test_the_program_of_the_guide_runs_on_a_network_by_netconvert_too(
     by_netconvert: Workspace, tmp_path: Path, control: str
@@ -282,6 +284,7 @@ def test_the_program_of_the_guide_runs_on_a_network_by_netconvert_too(
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "signals",
     [
@@ -330,6 +333,7 @@ def test_conflicting_greens_are_refused_on_a_network_by_netconvert_with_both_mov
     assert "which meet; they cannot have green together" in message
 
 
+@pytest.mark.slow
 def test_lights_of_a_town_by_netconvert_have_movements_and_crossings(tmp_path: Path) -> None:
     store = Workspace.open(tmp_path)
     entry = store.add_map(
@@ -344,6 +348,7 @@ def test_lights_of_a_town_by_netconvert_have_movements_and_crossings(tmp_path: P
         assert all(name.removeprefix("walk ").startswith("r") for name in names)
 
 
+@pytest.mark.slow
 def test_the_program_of_the_guide_fits_a_network_that_netconvert_has_read_and_written(
     workspace: Workspace, tmp_path: Path
 ) -> None:

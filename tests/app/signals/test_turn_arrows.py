@@ -128,6 +128,7 @@ def test_turns_that_have_an_arrow_keep_it_and_a_light_has_four_stages_at_most(
     assert new == own
 
 
+@pytest.mark.slow
 def test_turns_that_share_their_lane_go_through_gaps_alone(workspace: Workspace) -> None:
     """The lights of the town have no lane for left turns alone that meets oncoming traffic."""
     graph = load_map(workspace.map("town_5x5")).sumo.graph
@@ -161,6 +162,7 @@ def test_who_turns_through_gaps_never_sees_yellow_while_oncoming_traffic_goes_on
         assert both
 
 
+@pytest.mark.slow
 def test_left_turns_with_arrows_wait_less_and_none_collides(
     workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -87,6 +87,7 @@ def test_one_who_is_taken_away_is_forgotten() -> None:
     assert doors.moved(ACTORS) == {}
 
 
+@pytest.mark.slow
 def test_on_a_server_a_bus_opens_its_doors_at_its_stop_and_never_drives_with_one_open(
     workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -56,6 +56,7 @@ def drive(
     return result, report, rows, events
 
 
+@pytest.mark.slow
 def test_a_follower_brakes_behind_an_ego_that_brakes_in_carla(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -87,6 +88,7 @@ def test_a_follower_brakes_behind_an_ego_that_brakes_in_carla(
     assert not [event for event in events if event["kind"] == "collision"]
 
 
+@pytest.mark.slow
 def test_sumos_ego_is_where_the_hero_is(workspace: Workspace, tmp_path: Path) -> None:
     actors = [
         {
@@ -131,6 +133,7 @@ def test_who_has_right_of_way_brakes_for_an_ego_that_ignores_it_or_the_crash_is_
     assert stopped or crashed
 
 
+@pytest.mark.slow
 def test_an_ego_that_runs_through_a_column_in_a_junction_collides_and_that_is_reported(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -179,6 +182,7 @@ def test_an_ego_of_ours_waits_for_a_driver_and_is_taken_away(
     assert rows["vehicle_speed"].tail(5).max() == pytest.approx(0.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_without_an_ego_nobody_can_drive_it(workspace: Workspace, tmp_path: Path) -> None:
     xodr = MAPS / "motorway_weave.xodr"
     path = scenario_of(

@@ -66,6 +66,7 @@ def run(
         return result, report, server.actors()
 
 
+@pytest.mark.slow
 def test_the_hook_gets_world_and_actors_after_each_tick_and_the_ego_is_the_hero(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -111,6 +112,7 @@ def test_cars_have_different_colours_and_each_its_own_in_every_run(
     assert colours_of(second) == seen
 
 
+@pytest.mark.slow
 def test_a_hook_that_fails_ends_the_run_with_its_name(workspace: Workspace, tmp_path: Path) -> None:
     def broken(_world: Any, _actors: Mapping[str, Any]) -> None:
         raise ValueError("no such thing")
@@ -127,6 +129,7 @@ def test_a_hook_that_is_none_is_refused(words: str) -> None:
         load_hook(words)
 
 
+@pytest.mark.slow
 def test_a_sensor_on_the_ego_is_recorded_into_the_runs_folder(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -210,6 +213,7 @@ def test_a_wrong_sensor_is_refused_with_its_place(changed: dict[str, Any], words
         parse_sensors(json.dumps(data), file="sensors.json")
 
 
+@pytest.mark.slow
 def test_an_attribute_that_the_sensor_does_not_have_ends_the_run_with_its_name(
     workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -112,6 +112,7 @@ def recorded(run: Run) -> bool:
     return bool(summary["stopped"]) and all((folder / name).is_file() for name in files)
 
 
+@pytest.mark.slow
 def test_nothing_wrong_is_exit_code_0(start: Start) -> None:
     with StandIn(CROSSING) as server:
         code, told, _ = start(server).wait()
@@ -129,6 +130,7 @@ def test_an_absent_server_is_told_before_anything_runs(start: Start) -> None:
     assert list(run.out.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_another_version_is_told(start: Start) -> None:
     with StandIn(CROSSING, version="0.9.14") as server:
         code, told, _ = start(server).wait()
@@ -136,6 +138,7 @@ def test_another_version_is_told(start: Start) -> None:
         assert "release 0.9.14" in told["error"]["message"]
 
 
+@pytest.mark.slow
 def test_another_map_is_told_if_it_may_not_be_changed(start: Start) -> None:
     with StandIn(MAPS / "roundabout.xodr") as server:
         code, told, _ = start(server, "--keep-map").wait()
@@ -144,6 +147,7 @@ def test_another_map_is_told_if_it_may_not_be_changed(start: Start) -> None:
         assert is_as_before(server)
 
 
+@pytest.mark.slow
 def test_another_map_is_changed_if_it_may_be(start: Start) -> None:
     with StandIn(MAPS / "roundabout.xodr") as server:
         code, told, _ = start(server).wait()
@@ -208,6 +212,7 @@ def test_refused_spawns_are_tried_again_and_nobody_is_missing(start: Start) -> N
         assert is_as_before(server)
 
 
+@pytest.mark.slow
 def test_those_whom_the_server_never_takes_are_named(start: Start) -> None:
     with StandIn(CROSSING, refuse_spawn_every=1) as server:
         code, told, words = start(server).wait()
@@ -236,6 +241,7 @@ def test_another_client_that_ticks_ends_the_run_with_its_frames(start: Start) ->
         assert is_as_before(server)
 
 
+@pytest.mark.slow
 def test_a_time_that_others_set_ends_the_run(start: Start) -> None:
     with StandIn(CROSSING, time_factor=2.0) as server:
         code, told, _ = start(server).wait()
@@ -268,6 +274,7 @@ def test_a_stream_that_stays_cut_ends_the_run(start: Start) -> None:
         assert is_as_before(server)
 
 
+@pytest.mark.slow
 def test_when_sumo_dies_nothing_is_left_in_carla(start: Start) -> None:
     with StandIn(CROSSING) as server:
         run = start(server, until=60.0)

@@ -80,6 +80,7 @@ def test_what_only_a_ticking_client_can_do_is_refused() -> None:
             options.check()
 
 
+@pytest.mark.slow
 def test_a_server_that_no_client_ticks_ends_in_a_message(
     workspace: Workspace, tmp_path: Path
 ) -> None:

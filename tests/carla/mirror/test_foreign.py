@@ -63,6 +63,7 @@ def mirrored(
     return told, rows
 
 
+@pytest.mark.slow
 def test_traffic_brakes_for_two_vehicles_that_another_client_drives_and_resumes_when_one_goes(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -91,6 +92,7 @@ def test_foreign_vehicles_are_in_no_count_and_in_no_recording(
     assert {event["actor"] for event in told["events"]} <= set(ROADS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("foreign", "seen"), [(None, set()), (ForeignRoles(("scenario",)), {"north"})]
 )

@@ -195,6 +195,7 @@ def check(
     return off
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_signalised_crossing_is_shown_exactly(
     workspace: Workspace, sample: Sample, tmp_path: Path, seed: int
@@ -206,6 +207,7 @@ def test_a_signalised_crossing_is_shown_exactly(
     assert max(off["feet"]) <= 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensed_speed", [False, True])
 def test_sensors_see_speeds_only_where_vehicles_keep_physics(
     workspace: Workspace, sample: Sample, tmp_path: Path, sensed_speed: bool

@@ -80,6 +80,7 @@ def test_the_transcript_has_calls_their_answers_and_the_states_of_the_world(
     assert len(set(states)) == len(states)
 
 
+@pytest.mark.slow
 def test_a_run_against_its_recording_makes_the_same_calls_and_comes_to_the_same(
     workspace: Workspace, recorded: tuple[Path, Path, Path, dict[str, Any]], tmp_path: Path
 ) -> None:
@@ -133,6 +134,7 @@ def test_a_run_by_another_clients_clock_can_be_replayed_as_well(
         assert (folder / name).read_bytes() == (before / name).read_bytes(), name
 
 
+@pytest.mark.slow
 def test_a_call_that_has_changed_is_named(
     workspace: Workspace, recorded: tuple[Path, Path, Path, dict[str, Any]], tmp_path: Path
 ) -> None:
@@ -172,6 +174,7 @@ def test_a_last_line_that_was_cut_is_left_out(
     assert parse_transcript(lines, file="run.jsonl") == frames[:2]
 
 
+@pytest.mark.slow
 def test_a_recording_that_cannot_be_written_is_refused_before_anything_is_said(
     tmp_path: Path,
 ) -> None:

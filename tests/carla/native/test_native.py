@@ -48,6 +48,7 @@ def planned(workspace: Workspace) -> Any:
     return made
 
 
+@pytest.mark.slow
 def test_everybody_begins_where_and_ends_where_the_plan_says(planned: Any, sample: Sample) -> None:
     plan, _, actors = planned(sample(TOWN, seed=3))
     assert len(actors) == len(plan.actors)
@@ -255,6 +256,7 @@ def test_a_spawn_that_is_refused_comes_later(options: Any, sample: Sample) -> No
     assert told["figures"]["depart_delay_max"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_server_that_takes_nobody_ends_the_run(options: Any, sample: Sample) -> None:
     path = sample(CROSSING, seed=5)
     with StandIn(CROSSING, refuse_spawn_every=1) as server:
@@ -282,6 +284,7 @@ def test_another_client_that_ticks_ends_the_run(options: Any, sample: Sample) ->
     assert "only one client may tick" in told["error"]
 
 
+@pytest.mark.slow
 def test_what_a_crashed_traffic_manager_leaves_is_taken_away(options: Any, sample: Sample) -> None:
     path = sample(CROSSING, seed=5)
     with StandIn(CROSSING) as server:

@@ -95,6 +95,7 @@ def test_a_manager_is_called_by_leaving_and_entering_synchronous_mode(manager: _
     assert manager.asked == FREEING
 
 
+@pytest.mark.slow
 def test_a_tick_whose_frame_has_come_is_freed_until_it_ends(manager: _Manager) -> None:
     frames = [7]
     watch = TickWatch(manager.port, lambda: frames[0], patience=0.0)
@@ -107,6 +108,7 @@ def test_a_tick_whose_frame_has_come_is_freed_until_it_ends(manager: _Manager) -
     assert manager.asked[:4] == 2 * FREEING
 
 
+@pytest.mark.slow
 def test_a_server_that_takes_its_time_over_a_frame_is_left_alone(manager: _Manager) -> None:
     watch = TickWatch(manager.port, lambda: 7, patience=0.0)
     with watch.tick():

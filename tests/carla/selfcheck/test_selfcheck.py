@@ -72,6 +72,7 @@ def own_world(server: StandIn) -> Iterator[Any]:
     yield world
 
 
+@pytest.mark.slow
 def test_a_server_that_does_as_expected_passes_every_check_and_is_as_it_was(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -133,6 +134,7 @@ def test_each_line_says_what_a_server_does_that_does_otherwise(workspace: Worksp
     assert as_expected == {"release", "frames of a tick"}, "tested below"
 
 
+@pytest.mark.slow
 def test_nothing_more_is_checked_where_others_tick_as_well(workspace: Workspace) -> None:
     with StandIn(CROSSING, frames_per_tick=2) as server:
         report = selfcheck(workspace, address_of(server))
@@ -143,6 +145,7 @@ def test_nothing_more_is_checked_where_others_tick_as_well(workspace: Workspace)
     assert lines["given back"].state == CheckState.OK
 
 
+@pytest.mark.slow
 def test_an_interrupted_check_gives_the_server_back(workspace: Workspace) -> None:
     def stop(_what: str, _share: float) -> None:
         os.kill(os.getpid(), signal.SIGINT)
@@ -154,6 +157,7 @@ def test_an_interrupted_check_gives_the_server_back(workspace: Workspace) -> Non
     assert by_name(report)["given back"].seen == "as before"
 
 
+@pytest.mark.slow
 def test_another_release_is_the_only_line(workspace: Workspace) -> None:
     with StandIn(CROSSING, version="0.9.15") as server:
         report = selfcheck(workspace, address_of(server))
@@ -163,6 +167,7 @@ def test_another_release_is_the_only_line(workspace: Workspace) -> None:
     assert len(report.unchecked) == 19
 
 
+@pytest.mark.slow
 def test_the_page_and_the_data_have_every_line(tmp_path: Path, workspace: Workspace) -> None:
     with StandIn(CROSSING, frames_per_tick=2, version="0.9.16-dirty") as server:
         done = subprocess.run(

@@ -74,6 +74,7 @@ def test_a_folder_that_cannot_be_is_told_by_name(tmp_path: Path) -> None:
         pass
 
 
+@pytest.mark.slow
 def test_the_picture_shows_what_is_there_north_up_and_follows() -> None:
     pytest.importorskip("carla", reason="co-simulation needs the package carla")
     pictures: list[Picture] = []
@@ -103,6 +104,7 @@ def test_the_picture_shows_what_is_there_north_up_and_follows() -> None:
     assert middle(pictures[-1]) == pytest.approx((0.0, 0.0), abs=1.0)
 
 
+@pytest.mark.slow
 def test_pictures_that_come_faster_than_they_are_written_are_counted() -> None:
     pytest.importorskip("carla", reason="co-simulation needs the package carla")
     written: list[Picture] = []

@@ -13,6 +13,7 @@ from tests.cli.conftest import odscen
 carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
 
 
+@pytest.mark.slow
 def test_the_models_of_a_server_take_the_place_of_those_shipped(tmp_path: Path) -> None:
     shipped = shipped_assets().blueprints
     with StandIn(MAPS / "roundabout.xodr") as server:

@@ -55,6 +55,7 @@ def vehicles(server: StandIn) -> list[str]:
     return [a["type_id"] for a in server.actors() if a["type_id"].startswith("vehicle.")]
 
 
+@pytest.mark.slow
 def test_the_world_is_ours_inside_and_as_it_was_outside() -> None:
     with StandIn(CROSSING) as stand_in:
         assert is_free_running(stand_in)
@@ -70,6 +71,7 @@ def test_the_world_is_ours_inside_and_as_it_was_outside() -> None:
         assert server.left_behind == []
 
 
+@pytest.mark.slow
 def test_a_time_step_that_was_never_set_is_not_restored_as_a_number() -> None:
     with StandIn(CROSSING) as stand_in:
         client = carla.Client(stand_in.host, stand_in.port)
@@ -82,6 +84,7 @@ def test_a_time_step_that_was_never_set_is_not_restored_as_a_number() -> None:
         assert is_free_running(stand_in)
 
 
+@pytest.mark.slow
 def test_a_tick_is_two_calls_however_many_actors_there_are() -> None:
     with StandIn(CROSSING) as stand_in, Server(address_of(stand_in)) as server:
         server.synchronize(0.05)
@@ -95,6 +98,7 @@ def test_a_tick_is_two_calls_however_many_actors_there_are() -> None:
             assert stand_in.calls() == {"apply_batch": 1, "tick_cue": 1}
 
 
+@pytest.mark.slow
 def test_what_others_spawned_is_left_alone() -> None:
     with StandIn(CROSSING) as stand_in:
         world = carla.Client(stand_in.host, stand_in.port).get_world()
@@ -113,6 +117,7 @@ def spawn_and_fail(address: Address) -> None:
         raise ZeroDivisionError
 
 
+@pytest.mark.slow
 def test_the_world_is_restored_after_an_error_too() -> None:
     with StandIn(CROSSING) as stand_in:
         with pytest.raises(ZeroDivisionError):
@@ -128,6 +133,7 @@ def sooner_or_later(holds: Callable[[], bool]) -> bool:
     return holds()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late", ["", "call", "tick"])
 def test_weather_and_traffic_lights_are_given_back(late: str) -> None:
     """Also by a server whose threads come to what nobody waits for after the next call, or tick."""
@@ -158,6 +164,7 @@ def test_an_absent_server_is_named_with_what_to_do() -> None:
         connect(Address("127.0.0.1", port, 0.5))
 
 
+@pytest.mark.slow
 def test_a_server_that_is_only_starting_is_waited_for() -> None:
     port = free_port()
     listener = socket.socket()
@@ -195,6 +202,7 @@ def test_half_an_address_is_completed(text: str, host: str, port: int) -> None:
     assert Address.parse(text, timeout=3.0) == Address(host, port, 3.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", ["0.9.16-dirty", "0.9.16-12-g0123abc", "7a1b0e5c"])
 def test_a_server_that_was_built_from_source_is_taken_with_a_warning(version: str) -> None:
     with StandIn(CROSSING, version=version) as stand_in:
@@ -202,6 +210,7 @@ def test_a_server_that_was_built_from_source_is_taken_with_a_warning(version: st
         assert f"calls itself {version}, the package carla is 0.9.16" in warning
 
 
+@pytest.mark.slow
 def test_another_client_that_ticks_is_noticed_at_once() -> None:
     with StandIn(CROSSING) as stand_in:
         with Server(address_of(stand_in)) as server:
@@ -217,6 +226,7 @@ def test_another_client_that_ticks_is_noticed_at_once() -> None:
         assert is_free_running(stand_in)
 
 
+@pytest.mark.slow
 def test_another_release_is_refused_before_anything_is_touched() -> None:
     with StandIn(CROSSING, version="0.9.15") as stand_in:
         with pytest.raises(CarlaError, match=r"release 0\.9\.15, the package carla is 0\.9\.16"):
@@ -224,6 +234,7 @@ def test_another_release_is_refused_before_anything_is_touched() -> None:
         assert set(stand_in.calls()) == {"version"}
 
 
+@pytest.mark.slow
 def test_another_map_is_refused_by_name_if_none_may_be_loaded() -> None:
     text = ROUNDABOUT.read_text(encoding="utf-8")
     with (
@@ -234,6 +245,7 @@ def test_another_map_is_refused_by_name_if_none_may_be_loaded() -> None:
         ensure_map(server, "roundabout", text, load=False)
 
 
+@pytest.mark.slow
 def test_the_server_loads_the_map_if_it_has_it() -> None:
     text = ROUNDABOUT.read_text(encoding="utf-8")
     maps = {"roundabout": ROUNDABOUT}
@@ -243,6 +255,7 @@ def test_the_server_loads_the_map_if_it_has_it() -> None:
         assert ensure_map(server, "roundabout", text) == "there"
 
 
+@pytest.mark.slow
 def test_the_server_makes_a_world_of_our_map_if_it_does_not_have_it() -> None:
     text = ROUNDABOUT.read_text(encoding="utf-8")
     # A map of that name that is another one does not do.
@@ -268,6 +281,7 @@ def tick_until_death(stand_in: StandIn) -> None:
         server.apply(Batch())
 
 
+@pytest.mark.slow
 def test_a_server_that_dies_is_told() -> None:
     with StandIn(CROSSING) as stand_in:
         with pytest.raises(CarlaError, match="is gone: no server listens"):
@@ -281,6 +295,7 @@ def kill_and_fail(stand_in: StandIn) -> None:
         raise ZeroDivisionError
 
 
+@pytest.mark.slow
 def test_the_first_error_is_not_hidden_by_one_of_restoring() -> None:
     with StandIn(CROSSING) as stand_in, pytest.raises(ZeroDivisionError):
         kill_and_fail(stand_in)

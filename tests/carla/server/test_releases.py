@@ -52,6 +52,7 @@ def test_only_the_release_that_was_tried_is_taken_without_a_warning() -> None:
     assert release_of("0.9.17").generates_worlds
 
 
+@pytest.mark.slow
 def test_a_release_that_makes_no_worlds_says_what_to_do_instead() -> None:
     with StandIn(CROSSING) as stand_in, Server(Address(stand_in.host, stand_in.port)) as server:
         server.release = release_of("0.10.0")

@@ -48,6 +48,7 @@ def test_lights_that_change_alone_are_shown_by_the_next_tick_of_a_server_with_se
             assert set(server.light_states().values()) == {state}
 
 
+@pytest.mark.slow
 def test_a_generated_world_has_no_walls_and_roads_of_the_maps_width() -> None:
     with (
         StandIn(MAPS / "t_junction_signs.xodr") as stand_in,
@@ -70,6 +71,7 @@ def world_by_default(stand_in: StandIn, xodr: str) -> Any:
     return client.generate_opendrive_world(xodr, carla.OpendriveGenerationParameters())
 
 
+@pytest.mark.slow
 def test_the_ground_in_junctions_of_a_generated_world_is_the_maps() -> None:
     xs = [-6.0, -2.0, 1.0, 3.0, 6.0]
     with StandIn(CROSSING) as stand_in, Server(address_of(stand_in)) as server:
@@ -150,6 +152,7 @@ def test_a_large_map_without_a_hero_survives_pedestrians_far_from_its_spectator(
     assert walkers == []
 
 
+@pytest.mark.slow
 def test_a_dormant_walker_that_is_put_somewhere_ends_the_server() -> None:
     with StandIn(CROSSING, large_map=True, refuse_grounded=False) as stand_in:
         sleep_beyond(stand_in, 10.0)

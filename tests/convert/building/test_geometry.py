@@ -157,6 +157,7 @@ def streets(draw: st.DrawFn) -> str:
     )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(streets())
 def test_any_street_lies_where_it_should_and_back(text: str) -> None:

@@ -97,6 +97,7 @@ def test_the_table_survives_json(path: Path) -> None:
     assert table_to_json(table_from_json(text)) == text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["signal_crossing", "esmini/fabriksgatan_traffic_lights"])
 def test_two_conversions_give_the_same_bytes(name: str) -> None:
     content = named(name).read_bytes()

@@ -60,6 +60,7 @@ def test_who_gives_way_without_a_sign_sees_others_45_m_before_at_50_kmh() -> Non
     assert {link.get("visibility") for link in links if link.get("state") == "O"} == {None}
 
 
+@pytest.mark.slow
 def test_who_turns_across_an_empty_road_does_not_slow_down_to_look(tmp_path: Path) -> None:
     """A car from 50 km/h: 8.3 m/s is the map's limit in the junction, 6.4 m/s what it had to be."""
     net, routes, out = (tmp_path / name for name in ("net.xml", "routes.xml", "fcd.xml"))

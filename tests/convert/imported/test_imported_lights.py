@@ -62,6 +62,7 @@ def ours(name: str) -> tuple[bytes, tuple[SumoLight, ...]]:
     return network.net_xml, network.table.lights
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["signal_crossing", "left_hand_crossing", "town_5x5"])
 def test_a_network_of_ours_has_the_links_and_conflicts_that_it_was_written_with(name: str) -> None:
     net, lights = ours(name)

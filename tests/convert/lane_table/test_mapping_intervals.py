@@ -3,6 +3,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -64,6 +65,7 @@ def test_a_relation_without_extent_is_none() -> None:
     assert monotone(point, growing=True) is None
 
 
+@pytest.mark.slow
 @given(st.lists(intervals(), max_size=12))
 def test_answering_spans_are_disjoint_and_lie_on_their_pieces(
     listed: list[MappingInterval],

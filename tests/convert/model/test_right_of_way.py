@@ -244,6 +244,7 @@ all_rules = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(movements, max_size=8), st.lists(crossings, max_size=3), all_rules)
 def test_of_two_that_meet_one_waits_or_both_in_turn_and_all_wait_for_persons(
     listed: list[Movement], walkways: list[Walkway], rules: Rules

@@ -188,6 +188,7 @@ def test_what_is_no_known_light_or_leads_to_no_junction_is_lost_with_its_reason(
     assert "no lane" in lost["2"]
 
 
+@pytest.mark.slow
 def test_a_pedestrian_light_without_a_crossing_is_lost() -> None:
     network = made(crossing({"1": signal(1, "1000002")}))
     assert "no crossing" in entries(network, ElementOutcome.LOST)["1"]

@@ -87,6 +87,7 @@ def gaps(first: list[str], second: list[str]) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 @given(junctions())
 def test_no_two_that_are_kept_apart_may_go_at_a_time(junction: Junction) -> None:
     groups, conflicts = junction
@@ -95,6 +96,7 @@ def test_no_two_that_are_kept_apart_may_go_at_a_time(junction: Junction) -> None
             assert not {phase.state[i], phase.state[j]} <= GOING
 
 
+@pytest.mark.slow
 @given(junctions())
 def test_who_gives_way_to_another_that_is_green_has_the_green_that_does(
     junction: Junction,
@@ -108,6 +110,7 @@ def test_who_gives_way_to_another_that_is_green_has_the_green_that_does(
             assert letter != "g" or any(pair[0] == link for pair in conflicts.yielding)
 
 
+@pytest.mark.slow
 @given(junctions())
 def test_every_group_has_green_and_red_unless_it_meets_no_other(
     junction: Junction,
@@ -120,6 +123,7 @@ def test_every_group_has_green_and_red_unless_it_meets_no_other(
         assert "r" in shown or not any(link in pair for pair in conflicts.apart)
 
 
+@pytest.mark.slow
 @given(junctions())
 def test_phases_last_and_fit_their_links(junction: Junction) -> None:
     groups, conflicts = junction
@@ -130,6 +134,7 @@ def test_phases_last_and_fit_their_links(junction: Junction) -> None:
         assert set(phase.state) <= set("Ggyr")
 
 
+@pytest.mark.slow
 @given(junctions())
 def test_between_two_greens_the_junction_is_cleared(junction: Junction) -> None:
     groups, conflicts = junction
@@ -141,6 +146,7 @@ def test_between_two_greens_the_junction_is_cleared(junction: Junction) -> None:
                 assert gap >= needed
 
 
+@pytest.mark.slow
 @given(junctions())
 def test_yellow_follows_green_and_lasts_as_long_as_it_should(
     junction: Junction,
@@ -217,6 +223,7 @@ def test_two_stages_share_a_cycle_as_webster_has_it() -> None:
     assert sum(phase.duration for phase in phases) == pytest.approx(webster, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_crossing_of_two_roads_has_two_stages_with_turns_that_give_way() -> None:
     net = read_net(converted(named("signal_crossing")).network.net_xml)
     (light,) = converted(named("signal_crossing")).xml.findall("tlLogic")
@@ -239,11 +246,13 @@ LIGHTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LIGHTS)
 def test_the_lights_of_the_map_are_those_of_the_network(name: str) -> None:
     assert len(converted(named(name)).xml.findall("tlLogic")) == LIGHTS[name]
 
 
+@pytest.mark.slow
 @each_map()
 def test_on_no_map_have_two_that_meet_green_together_unless_one_gives_way(path: Path) -> None:
     net = read_net(converted(path).network.net_xml)

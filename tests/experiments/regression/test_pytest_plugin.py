@@ -57,6 +57,7 @@ def test_scenario_files_are_left_alone_unless_asked_for(project, workspace):
     assert "1 passed" in done.stdout, done.stdout
 
 
+@pytest.mark.slow
 def test_scenario_files_are_collected_with_every_seed(project, workspace):
     (project / "pytest.ini").write_text(
         "[pytest]\nodscen_collect = true\nodscen_seeds = 1 2\n"
@@ -67,6 +68,7 @@ def test_scenario_files_are_collected_with_every_seed(project, workspace):
     assert "t_junction_signs.scenario.json::seed-2 PASSED" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_missed_expectation_fails_the_file_in_plain_words(project, workspace):
     (project / "pytest.ini").write_text("[pytest]\nodscen_expect = mean_delay <= 1 s\n")
     done = run_pytest(project, workspace, "t_junction_signs.scenario.json")
@@ -124,6 +126,7 @@ def test_options_stand_in_the_configuration_and_fixtures_of_a_module_run_scenari
     assert "4 passed" in done.stdout, done.stdout
 
 
+@pytest.mark.slow
 def test_the_workspace_option_moves_no_root_and_takes_no_tests_away(project, workspace):
     (project / "pyproject.toml").write_text('[tool.pytest.ini_options]\ntestpaths = ["tests"]\n')
     (project / "tests").mkdir()

@@ -7,7 +7,7 @@ import polars as pl
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.figures.by_place.queue_metres import GAP, _joined, _SlowRows
+from odscen.figures.by_place.queue_metres import GAP, _join_queue, _SlowRows
 
 PERIOD = 0.5
 PASSES = 3
@@ -70,5 +70,5 @@ def test_who_is_reached_by_a_queue_is_in_it_until_it_drives_on(rows: list[dict])
         front=np.array([row["front"] for row in rows]),
         rear=np.array([row["rear"] for row in rows]),
     )
-    found = _joined(table) if rows else []
+    found = _join_queue(table) if rows else []
     assert {(rows[k]["id"], rows[k]["time"]) for k in found} == in_queue(rows)

@@ -73,6 +73,7 @@ def test_rows_written_down_early_are_those_of_the_outcomes() -> None:
     assert list(found.rows()) == rows
 
 
+@pytest.mark.slow
 @given(
     st.lists(
         st.builds(

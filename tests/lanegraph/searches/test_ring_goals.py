@@ -44,6 +44,7 @@ def farthest(matrix: csr_matrix, start: int, is_road: np.ndarray) -> list[int]:
     return [int(lane * LENGTH + by_lane[lane].argmax()) for lane in np.flatnonzero(kept)]
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), st.booleans(), st.sampled_from([0.0, 0.1, 0.5]))
 def test_goals_are_those_of_a_search_of_all_nodes_that_are_allowed(

@@ -68,6 +68,7 @@ def test_a_recorder_pairs_what_was_seen_with_what_came_of_it(tmp_path) -> None:
         np.testing.assert_array_equal(arrays["x"], first)
 
 
+@pytest.mark.slow
 def test_training_learns_a_rule_and_the_same_seed_gives_the_same_bytes() -> None:
     rng = np.random.default_rng(0)
     x = rng.random((20_000, len(FEATURES))).astype(np.float32)

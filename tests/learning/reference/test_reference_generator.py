@@ -59,6 +59,7 @@ def test_weights_of_another_version_are_refused_with_both_versions() -> None:
         model_from_bytes(buffer.getvalue(), file="old.npz")
 
 
+@pytest.mark.slow
 def test_it_places_about_as_many_as_are_wanted_and_nearly_all_pass_the_check() -> None:
     given = request(24)
     fill = ReferenceGenerator().fill(GRAPH, given, np.random.default_rng(1))
@@ -69,6 +70,7 @@ def test_it_places_about_as_many_as_are_wanted_and_nearly_all_pass_the_check() -
     assert (fill.initial_speed >= 0).all()
 
 
+@pytest.mark.slow
 def test_the_same_random_numbers_give_the_same_fill() -> None:
     one, two = (
         ReferenceGenerator().fill(GRAPH, request(20), np.random.default_rng(7)) for _ in range(2)

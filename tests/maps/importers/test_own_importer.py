@@ -60,6 +60,7 @@ def test_the_example_of_the_seam_runs() -> None:
     assert (failed, tried) == (0, 3)
 
 
+@pytest.mark.slow
 def test_the_file_is_added_and_its_original_kept_with_its_checksum(
     store: Workspace, place: Path
 ) -> None:
@@ -76,6 +77,7 @@ def test_the_file_is_added_and_its_original_kept_with_its_checksum(
     assert [one.file for one in store.map("place").damaged()] == ["original.road"]
 
 
+@pytest.mark.slow
 def test_its_rows_come_first_in_the_import_report(store: Workspace, place: Path) -> None:
     report = store.add_map(place).info["report"]
     assert report["entries"][0] == {
@@ -89,6 +91,7 @@ def test_its_rows_come_first_in_the_import_report(store: Workspace, place: Path)
     assert ConversionReport.from_dict(report).to_dict() == report
 
 
+@pytest.mark.slow
 def test_a_map_is_kept_until_file_options_or_importer_change(
     store: Workspace, place: Path, installed: Path
 ) -> None:
@@ -106,6 +109,7 @@ def test_a_map_is_kept_until_file_options_or_importer_change(
     assert rebuilt.sha256 == wide.sha256
 
 
+@pytest.mark.slow
 def test_a_map_whose_importer_is_gone_is_used_as_it_is(
     store: Workspace, place: Path, installed: Path
 ) -> None:
@@ -118,6 +122,7 @@ def test_a_map_whose_importer_is_gone_is_used_as_it_is(
         store.add_map(place, importing=ImportSettings(options={"lane_width": 3.0}))
 
 
+@pytest.mark.slow
 def test_a_network_that_is_brought_in_keeps_the_import(store: Workspace, place: Path) -> None:
     entry = store.add_map(place)
     changed = store.set_network("place", entry.path("net"))
@@ -126,6 +131,7 @@ def test_a_network_that_is_brought_in_keeps_the_import(store: Workspace, place: 
     assert changed.sha256 == entry.sha256
 
 
+@pytest.mark.slow
 def test_a_damaged_map_is_built_again_from_the_original(store: Workspace, place: Path) -> None:
     entry = store.add_map(place, importing=ImportSettings(options={"lane_width": 4.0}))
     entry.path("xodr").write_text("<OpenDRIVE/>")
@@ -136,6 +142,7 @@ def test_a_damaged_map_is_built_again_from_the_original(store: Workspace, place:
     assert store.map("place") == entry
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -152,6 +159,7 @@ def test_what_the_importer_refuses_names_file_and_line(
     assert store.map_names() == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "error", "words"),
     [
@@ -173,6 +181,7 @@ def test_what_goes_wrong_in_the_importer_ends_with_a_message(
     assert store.map_names() == []
 
 
+@pytest.mark.slow
 def test_options_that_it_does_not_have_are_refused(store: Workspace, place: Path) -> None:
     for options, words in (
         ({"width": 3.0}, "importer road: it has no option 'width'; there are lane_width"),
@@ -200,6 +209,7 @@ def test_opendrive_is_an_entry_of_the_list_and_is_asked_first() -> None:
     assert importer_for(PLACE, "PLACE.ROAD").name == "road"
 
 
+@pytest.mark.slow
 def test_a_file_that_no_importer_takes_says_what_it_seems_to_be(
     store: Workspace, tmp_path: Path
 ) -> None:
@@ -208,12 +218,14 @@ def test_a_file_that_no_importer_takes_says_what_it_seems_to_be(
         store.add_map(tmp_path / "town.osm")
 
 
+@pytest.mark.slow
 def test_packed_opendrive_is_refused_with_what_to_do(store: Workspace, tmp_path: Path) -> None:
     (tmp_path / "town.xodr").write_bytes(gzip.compress(b"<OpenDRIVE/>"))
     with pytest.raises(OpenDriveError, match=r"^town\.xodr: this is a gzip archive: unpack it"):
         store.add_map(tmp_path / "town.xodr")
 
 
+@pytest.mark.slow
 def test_the_command_line_takes_it(place: Path, tmp_path: Path) -> None:
     def odscen_maps(*words: str) -> dict[str, object]:
         command = [sys.executable, "-m", "odscen", "maps", *words, "--json"]
@@ -230,6 +242,7 @@ def test_the_command_line_takes_it(place: Path, tmp_path: Path) -> None:
     assert [row["name"] for row in listed["importers"]] == ["opendrive", "road"]  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_a_scenario_is_made_on_it(store: Workspace, place: Path) -> None:
     store.add_map(place)
     settings = odscen.GenerationSettings(map_name="place", seed=1, fill=0.2)

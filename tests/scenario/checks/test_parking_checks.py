@@ -17,6 +17,7 @@ def codes(scenario: Scenario, *, parking: object = None) -> list[str]:
     return [one.code for one in check(scenario, town.sumo.graph, parking=known)]  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_parking_survives_being_written_and_read_and_is_left_out_without() -> None:
     one = parking_scenario({"begin": 0.2, "stay": {"kind": "uniform", "low": 60, "high": 90}})
     text = dumps(one)

@@ -18,6 +18,7 @@ SCHEMA = Path(__file__).parents[3] / "docs" / "scenario.schema.json"
 MAP = MapReference(name="toy", sha256="0" * 64)
 
 
+@pytest.mark.slow
 @given(scenarios)
 def test_a_document_reads_back_as_it_was_written(scenario: Scenario) -> None:
     text = dumps(scenario)

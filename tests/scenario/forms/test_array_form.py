@@ -50,6 +50,7 @@ def on_the_map(draw: st.DrawFn) -> Scenario:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(on_the_map())
 def test_any_document_comes_back_from_its_arrays_byte_for_byte(scenario: Scenario) -> None:

@@ -47,6 +47,7 @@ def placed(draw: st.DrawFn) -> Scenario:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(placed())
 def test_document_graph_and_graphml_convert_without_loss(scenario: Scenario) -> None:

@@ -39,6 +39,7 @@ def config(text: str) -> SamplingConfig:
     return loads_config(text)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from(sorted(GRAPHS)),

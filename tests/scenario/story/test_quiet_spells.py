@@ -105,6 +105,7 @@ def _same(when: list[dict[str, Any]], car: Any, other: Any, step: float, changes
     assert patient == always
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @stories
 def test_the_same_happens_at_the_same_instants(**story: Any) -> None:

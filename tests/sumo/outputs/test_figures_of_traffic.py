@@ -325,6 +325,7 @@ def test_figures_of_the_run_are_ratios_of_its_trips(run):
     assert found["co2_per_km"] * found["vehicle_km"] == pytest.approx(1000.0 * found["co2_total"])
 
 
+@pytest.mark.slow
 def test_queues_in_metres_are_those_of_detectors_along_the_lanes(run):
     """SUMO's E2 detectors: jams from the first front to the last rear; ours from the stop line."""
     root = etree.parse(run.folder / "queues.xml").getroot()

@@ -26,6 +26,7 @@ def stages(states: pl.DataFrame) -> list[tuple[str, float]]:
     return [(name, s) for name, s in list(rows)[1:-1] if name.startswith("stage")]
 
 
+@pytest.mark.slow
 def test_every_change_of_a_light_is_in_the_log_and_every_call_of_a_detector(
     tmp_path: Path,
 ) -> None:
@@ -46,6 +47,7 @@ def test_every_change_of_a_light_is_in_the_log_and_every_call_of_a_detector(
     assert 0.0 < run.summary["figures"]["unused_green"] < 1.0
 
 
+@pytest.mark.slow
 def test_lights_are_fixed_time_in_the_mesoscopic_model(tmp_path: Path) -> None:
     one = scenario(program(), control="actuated", clock=EVENING)
     run = carried_out(one, tmp_path / "meso", meso=True)
@@ -56,6 +58,7 @@ def test_lights_are_fixed_time_in_the_mesoscopic_model(tmp_path: Path) -> None:
     assert run.summary["figures"]["cycle_failures"] is None
 
 
+@pytest.mark.slow
 def test_greens_in_the_figures_are_those_of_the_log(tmp_path: Path) -> None:
     run = carried_out(scenario(None), tmp_path / "one")
     table = pl.read_csv(run.folder / "figures" / "signals.csv")
@@ -107,6 +110,7 @@ def assert_intergreens(states: pl.DataFrame) -> None:
         before = state
 
 
+@pytest.mark.slow
 def test_an_actuated_run_says_nothing_of_lights_or_detectors(tmp_path: Path) -> None:
     for name, junction in (("own", program()), ("map", None)):
         run = carried_out(scenario(junction, control="actuated", clock=EVENING), tmp_path / name)

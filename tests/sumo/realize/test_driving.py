@@ -145,6 +145,7 @@ def test_nobody_keeps_a_shorter_headway_than_a_step() -> None:
     assert dict(made(style="sporty", step_length=1.0).attributes)["tau"] == "1"
 
 
+@pytest.mark.slow
 def test_the_step_length_does_not_change_the_saturation_flow(tmp_path: Path) -> None:
     """Vehicles per hour and lane that leave a queue on a straight approach with 50 km/h."""
     net = tmp_path / "straight.net.xml"

@@ -68,6 +68,7 @@ def recorded(prepare: Prepare, out: Path, text: str) -> pl.DataFrame:
     return pl.read_parquet(out / "trajectories.parquet")
 
 
+@pytest.mark.slow
 def test_records_every_two_seconds_are_those_of_all_records_at_these_times(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -77,6 +78,7 @@ def test_records_every_two_seconds_are_those_of_all_records_at_these_times(
     assert some.equals(everything.filter(pl.col("timestep_time") % 2 == 0))
 
 
+@pytest.mark.slow
 def test_a_region_records_those_inside_and_nobody_far_from_it(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -92,6 +94,7 @@ def test_a_region_records_those_inside_and_nobody_far_from_it(
     assert some["vehicle_x"].is_between(50 - 5, 100 + 5).all()  # a body's length beside it
 
 
+@pytest.mark.slow
 def test_a_run_that_records_no_trajectories_has_everything_else(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -161,6 +164,7 @@ def test_routes_out_of_order_are_refused(tmp_path: Path) -> None:
         RouteSlices(routes).cut(0, 200.0, tmp_path / "t.xml")
 
 
+@pytest.mark.slow
 def test_columns_have_one_name_whoever_comes_first(prepare: Prepare, tmp_path: Path) -> None:
     """SUMO names them after a walker who is on the road before any vehicle."""
     car = (

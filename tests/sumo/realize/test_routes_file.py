@@ -96,6 +96,7 @@ def test_people_walk_between_the_segments_of_a_matrix() -> None:
     assert all(a.problem is None for a in actors)
 
 
+@pytest.mark.slow
 def test_trips_without_a_way_are_told_and_not_made() -> None:
     scenario = empty("motorway_weave")
     graph = built("motorway_weave").sumo.graph
@@ -122,6 +123,7 @@ def test_placed_actors_keep_their_place_and_time_among_demand() -> None:
     assert not any(a.spawn in starts for name, a in together.items() if name not in alone)
 
 
+@pytest.mark.slow
 def test_background_traffic_is_there_from_the_start_and_keeps_coming(tmp_path: Path) -> None:
     graph = built(TOWN).sumo.graph
     scenario = set_background(empty(TOWN, duration=600), graph, background="around", fill=0.05)
@@ -137,6 +139,7 @@ def test_background_traffic_is_there_from_the_start_and_keeps_coming(tmp_path: P
     assert 0.5 * len(first) < np.mean(later) < 2.0 * len(first)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step_length", [0.5, 1.0])
 def test_each_lane_of_a_motorway_takes_what_hcm_gives_it(
     step_length: float, tmp_path: Path
@@ -193,6 +196,7 @@ def test_traffic_made_from_the_counts_of_a_known_demand_reproduces_them() -> Non
     assert planned(scenario, CROSSING) == planned(scenario, CROSSING)
 
 
+@pytest.mark.slow
 def test_counts_leave_room_for_the_traffic_that_is_there_already() -> None:
     graph = built(CROSSING).sumo.graph
     known, rows = surveyed(CROSSING, trips=600)
@@ -201,6 +205,7 @@ def test_counts_leave_room_for_the_traffic_that_is_there_already() -> None:
     assert sum(name.startswith("survey.") for name in ids) < 0.1 * len(ids)
 
 
+@pytest.mark.slow
 def test_counts_that_contradict_each_other_are_named_as_the_reason() -> None:
     graph = built(CROSSING).sumo.graph
     _, rows = surveyed(CROSSING, trips=1200)
@@ -244,6 +249,7 @@ def test_a_run_is_counted_as_it_was_planned_where_traffic_is_light(tmp_path: Pat
     assert sum(abs(row.modelled - row.counted) for row in found.rows) <= 0.05 * sum(whole.values())
 
 
+@pytest.mark.slow
 def test_a_day_of_traffic_keeps_every_way_into_a_junction_below_what_it_carries() -> None:
     sumo_map = built(TOWN).sumo
     trips, load = town_day(empty(TOWN, duration=86_400), sumo_map, trips=20_000, day="weekday")
@@ -254,6 +260,7 @@ def test_a_day_of_traffic_keeps_every_way_into_a_junction_below_what_it_carries(
     assert 0.08 < peak_share("weekday") < 0.09
 
 
+@pytest.mark.slow
 def test_more_trips_than_a_town_carries_are_made_fewer() -> None:
     _, load = town_day(empty(TOWN, duration=86_400), built(TOWN).sumo, trips=400_000, day="weekday")
     assert load.trips < 400_000

@@ -40,6 +40,7 @@ def server_pid() -> int:
     return server._process.pid
 
 
+@pytest.mark.slow
 def test_a_forked_process_records_the_bytes_of_one_that_was_started(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -48,6 +49,7 @@ def test_a_forked_process_records_the_bytes_of_one_that_was_started(
     assert made(prepare, tmp_path / "second", forked=True) == fresh
 
 
+@pytest.mark.slow
 def test_results_that_are_left_to_us_are_those_that_the_process_makes(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -82,6 +84,7 @@ def test_records_that_results_cannot_be_made_of_fail_their_run(
     assert ended.error.startswith("SUMO has not written")
 
 
+@pytest.mark.slow
 def test_a_crash_of_sumo_ends_one_run_and_leaves_the_next_alone(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -101,6 +104,7 @@ def test_a_crash_of_sumo_ends_one_run_and_leaves_the_next_alone(
     assert server_pid() == before
 
 
+@pytest.mark.slow
 def test_a_server_that_was_killed_is_replaced(prepare: Prepare, tmp_path: Path) -> None:
     good = made(prepare, tmp_path / "good", forked=True)
     before = server_pid()
@@ -109,6 +113,7 @@ def test_a_server_that_was_killed_is_replaced(prepare: Prepare, tmp_path: Path) 
     assert server_pid() != before
 
 
+@pytest.mark.slow
 def test_a_server_that_dies_during_a_run_costs_nothing(prepare: Prepare, tmp_path: Path) -> None:
     killed = []
 
@@ -122,6 +127,7 @@ def test_a_server_that_dies_during_a_run_costs_nothing(prepare: Prepare, tmp_pat
     assert result.status == "completed"
 
 
+@pytest.mark.slow
 def test_another_environment_has_a_server_of_its_own(
     prepare: Prepare, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -141,6 +147,7 @@ def test_what_is_forked_brings_neither_tables_nor_numpy_along() -> None:
     assert done.stdout.split() == ["False", "False", "False", "True"]
 
 
+@pytest.mark.slow
 def test_what_polars_sets_for_itself_does_not_start_another_server() -> None:
     code = (
         "from odscen.sumo.runner import forked_worker as f; f.get_ready();"
@@ -164,6 +171,7 @@ def test_where_no_server_starts_the_run_says_so(
     assert list((tmp_path / "runs").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_nothing_is_left_of_a_server_when_its_user_has_ended() -> None:
     code = (
         "from odscen.sumo.runner import forked_worker as f; f.get_ready();"

@@ -77,6 +77,7 @@ def killed(
     return str(result.summary["error"]) if result.status == "failed" else ""
 
 
+@pytest.mark.slow
 def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
     long: SumoPreparedRun, tmp_path: Path
 ) -> None:
@@ -93,6 +94,7 @@ def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
     assert all(path.exists() for path in map(Path, result.to_dict()["files"].values()))
 
 
+@pytest.mark.slow
 def test_the_parts_read_as_one_table_without_a_gap_or_a_row_twice(
     long: SumoPreparedRun, tmp_path: Path
 ) -> None:
@@ -109,6 +111,7 @@ def test_the_parts_read_as_one_table_without_a_gap_or_a_row_twice(
     assert {one.id for one in outcomes} == set(table["vehicle_id"])
 
 
+@pytest.mark.slow
 def test_a_table_with_too_many_rows_is_read_with_every_nth_record(
     long: SumoPreparedRun, tmp_path: Path
 ) -> None:
@@ -173,6 +176,7 @@ def test_a_town_resumed_after_any_slice_ends_with_the_bytes_of_the_run_left_alon
         assert results(run) == alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [8, 40, 59])
 def test_a_run_of_which_only_the_completing_process_is_killed_says_so_and_resumes(
     long: SumoPreparedRun,
@@ -189,6 +193,7 @@ def test_a_run_of_which_only_the_completing_process_is_killed_says_so_and_resume
     assert results(run) == whole
 
 
+@pytest.mark.slow
 def test_slices_whose_processes_cannot_be_forked_are_the_same_bytes(
     long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -197,6 +202,7 @@ def test_slices_whose_processes_cannot_be_forked_are_the_same_bytes(
     assert results(run) == whole
 
 
+@pytest.mark.slow
 def test_slices_below_the_process_that_forks_for_all_runs_are_the_same_bytes(
     long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path
 ) -> None:
@@ -209,6 +215,7 @@ def test_slices_below_the_process_that_forks_for_all_runs_are_the_same_bytes(
     assert results(tmp_path / "run") == whole
 
 
+@pytest.mark.slow
 def test_a_slice_whose_parent_is_killed_ends_and_the_run_resumes(
     long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path
 ) -> None:
@@ -243,6 +250,7 @@ def children(parent: int | None, words: str) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_what_was_written_is_completed_when_the_simulation_crashes(
     long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -252,6 +260,7 @@ def test_what_was_written_is_completed_when_the_simulation_crashes(
     assert checkpoint.last_number(run) == 2
 
 
+@pytest.mark.slow
 def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
     long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -272,6 +281,7 @@ def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
     assert results(run) == whole
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_in_a_clear_message_and_a_run_that_resumes(
     long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -287,6 +297,7 @@ def test_a_full_disk_ends_in_a_clear_message_and_a_run_that_resumes(
     assert results(run) == whole
 
 
+@pytest.mark.slow
 def test_too_little_memory_is_named_with_what_to_do_and_the_run_resumes(
     long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -299,6 +310,7 @@ def test_too_little_memory_is_named_with_what_to_do_and_the_run_resumes(
     assert results(run) == whole
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [1, 5, 9])
 def test_killed_while_it_is_resumed_a_run_still_ends_with_the_same_bytes(
     long: SumoPreparedRun,
@@ -336,6 +348,7 @@ def test_a_disk_without_room_for_another_slice_stops_the_run_before_anything_is_
                 check_room(tmp_path, 4)
 
 
+@pytest.mark.slow
 def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
     long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -368,6 +381,7 @@ def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_starts(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_the_forecast_holds_for_a_run_like_this(long: SumoPreparedRun, tmp_path: Path) -> None:
     expected = forecast.forecast(long.plan, long.sumo_files, every=None)
     result = run_prepared(long, tmp_path / "run")
@@ -380,6 +394,7 @@ def test_the_forecast_holds_for_a_run_like_this(long: SumoPreparedRun, tmp_path:
     assert 10 < expected.running < 90
 
 
+@pytest.mark.slow
 def test_watching_goes_on_across_slices_and_changes_nothing(
     long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path
 ) -> None:
@@ -399,6 +414,7 @@ def test_watching_goes_on_across_slices_and_changes_nothing(
     assert results(tmp_path / "run") == whole
 
 
+@pytest.mark.slow
 def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
     long: SumoPreparedRun, tmp_path: Path
 ) -> None:
@@ -419,6 +435,7 @@ def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
     assert run_status.going(tmp_path / "run") is None
 
 
+@pytest.mark.slow
 def test_whoever_waits_for_room_at_a_boundary_is_not_lost(
     long: SumoPreparedRun, tmp_path: Path
 ) -> None:
@@ -440,6 +457,7 @@ def test_whoever_waits_for_room_at_a_boundary_is_not_lost(
     assert not [event for event in events if event.kind is EventKind.LOST]
 
 
+@pytest.mark.slow
 def test_whoever_does_not_come_back_with_a_saved_state_is_told(
     long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -459,6 +477,7 @@ def test_whoever_does_not_come_back_with_a_saved_state_is_told(
     assert [(event.actor, event.time) for event in lost] == [(car, SLICE)]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(fast_allocator() is None, reason="there is no faster allocator here")
 def test_the_allocator_makes_no_difference_to_results(
     long: SumoPreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -468,6 +487,7 @@ def test_the_allocator_makes_no_difference_to_results(
     assert results(tmp_path / "run") == whole
 
 
+@pytest.mark.slow
 def test_whatever_of_its_start_is_changed_deleted_or_added_an_interrupted_run_is_not_resumed(
     long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -508,6 +528,7 @@ def test_a_run_that_a_socket_drives_is_named_again_by_its_socket(
     assert "not what drives this run" in str(again.exception)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stored", ["command", "name"])
 def test_code_that_only_the_folder_names_is_not_executed(
     long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stored: str

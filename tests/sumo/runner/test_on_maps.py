@@ -93,6 +93,7 @@ def test_sampled_actors_start_in_their_places_and_arrive(name: str, tmp_path: Pa
     assert all(o.depart_delay == 0 for o in outcomes)
 
 
+@pytest.mark.slow
 def test_a_scenario_gives_the_same_bytes_twice_and_plain_sumo_the_same_trajectories(
     tmp_path: Path,
 ) -> None:
@@ -122,6 +123,7 @@ def test_sumo_loads_the_files_without_a_word(tmp_path: Path) -> None:
     assert not [line for line in lines if "disconnect" in line.lower()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("buses", [False, True])
 @pytest.mark.parametrize("name", ["signal_crossing", "left_hand_crossing", "town_5x5"])
 def test_sumo_has_nothing_to_say_of_actuated_lights_and_their_detectors(
@@ -140,6 +142,7 @@ def test_sumo_has_nothing_to_say_of_actuated_lights_and_their_detectors(
     assert "tlLogic" not in said
 
 
+@pytest.mark.slow
 def test_recorded_speeds_stay_below_what_each_actor_wants(tmp_path: Path) -> None:
     name = "signal_crossing"
     result = run_prepared(
@@ -187,6 +190,7 @@ def test_a_hand_placed_spawn_inside_a_junction_is_kept(tmp_path: Path) -> None:
     assert result.summary["insertion_error_max"] < 0.5
 
 
+@pytest.mark.slow
 def test_the_report_is_written_before_the_folder_appears(tmp_path: Path) -> None:
     name = "roundabout"
     prepared = prepare(sampled(name), built(name).sumo, net_file(name, tmp_path))
@@ -216,6 +220,7 @@ def test_positions_per_metre_are_measured_between_neighbours() -> None:
     assert np.isnan(scale[2])
 
 
+@pytest.mark.slow
 def test_actors_wait_for_their_departure(tmp_path: Path) -> None:
     name = "roundabout"
     first = next(a for a in sampled(name).actors if a.category is Category.CAR)

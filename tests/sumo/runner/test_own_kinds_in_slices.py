@@ -40,6 +40,7 @@ def scenario() -> Any:
     return document(MOTORWAY, [van], [rule], until=16.0)
 
 
+@pytest.mark.slow
 def test_it_fires_at_the_instant_and_acts_as_the_package_says(tmp_path: Path) -> None:
     assert run_prepared(prepared(scenario()), tmp_path / "run").status == "completed"
     found = read(tmp_path / "run")

@@ -31,6 +31,7 @@ SAME_EVERYWHERE = (
 )
 
 
+@pytest.mark.slow
 def test_a_run_inserts_everyone_in_place_and_everyone_arrives(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -46,6 +47,7 @@ def test_a_run_inserts_everyone_in_place_and_everyone_arrives(
     assert 20 < result.summary["sim_seconds"] < 200
 
 
+@pytest.mark.slow
 def test_all_files_named_in_the_summary_are_there_and_the_parquet_reads(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -60,6 +62,7 @@ def test_all_files_named_in_the_summary_are_there_and_the_parquet_reads(
     assert on_disk == result.summary
 
 
+@pytest.mark.slow
 def test_events_tell_departure_and_arrival_of_each_actor(prepare: Prepare, tmp_path: Path) -> None:
     run_prepared(prepare(), tmp_path / "run")
     events = events_from_json((tmp_path / "run" / "events.json").read_text())
@@ -70,6 +73,7 @@ def test_events_tell_departure_and_arrival_of_each_actor(prepare: Prepare, tmp_p
         assert mine[1].travel_time == mine[1].time - mine[0].time
 
 
+@pytest.mark.slow
 def test_the_same_plan_gives_the_same_bytes_in_two_folders(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -80,6 +84,7 @@ def test_the_same_plan_gives_the_same_bytes_in_two_folders(
         assert (first / name).read_bytes() == (second / name).read_bytes(), name
 
 
+@pytest.mark.slow
 def test_plain_sumo_on_the_same_files_records_the_same_trajectories(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -96,6 +101,7 @@ def test_plain_sumo_on_the_same_files_records_the_same_trajectories(
     assert (tmp_path / "run" / "sumo" / "trajectories.parquet").read_bytes() == ours
 
 
+@pytest.mark.slow
 def test_plain_sumo_stops_at_the_same_end_as_we_do(prepare: Prepare, tmp_path: Path) -> None:
     result = run_prepared(prepare(until=10.0), tmp_path / "run")
     assert result.summary["sim_seconds"] == 10.0
@@ -108,6 +114,7 @@ def test_plain_sumo_stops_at_the_same_end_as_we_do(prepare: Prepare, tmp_path: P
     assert (tmp_path / "run" / "sumo" / "trajectories.parquet").read_bytes() == ours
 
 
+@pytest.mark.slow
 def test_what_sumo_refuses_is_a_failed_run_in_sumos_own_words(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -123,6 +130,7 @@ def test_what_sumo_refuses_is_a_failed_run_in_sumos_own_words(
     assert (tmp_path / "run" / "sumo.log").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("net", "reason"), [("hello", "invalid document structure"), ("<net></net>", "SIGSEGV")]
 )
@@ -139,6 +147,7 @@ def test_a_network_that_sumo_cannot_read_or_crashes_on_is_a_failed_run(
     assert result.exit_code == 3
 
 
+@pytest.mark.slow
 def test_a_run_over_its_time_limit_is_stopped_and_has_failed(
     prepare: Prepare, tmp_path: Path
 ) -> None:
@@ -149,6 +158,7 @@ def test_a_run_over_its_time_limit_is_stopped_and_has_failed(
     assert "trajectories" not in result.summary["files"]
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_leaves_no_folder(prepare: Prepare, tmp_path: Path) -> None:
     def interrupt(_progress: Progress) -> None:
         raise KeyboardInterrupt
@@ -167,6 +177,7 @@ def test_progress_is_told_and_never_runs_backwards(prepare: Prepare, tmp_path: P
     assert all(0 <= p.share <= 1 and p.planned == 5 for p in seen)
 
 
+@pytest.mark.slow
 def test_expectations_are_judged_and_decide_the_exit_code(prepare: Prepare, tmp_path: Path) -> None:
     wanted = parse_expectation("arrived>=0.95"), parse_expectation("sim_seconds<5")
     judged = replace(prepare(), settings=RunSettings(expectations=wanted))
@@ -175,6 +186,7 @@ def test_expectations_are_judged_and_decide_the_exit_code(prepare: Prepare, tmp_
     assert result.exit_code == 1
 
 
+@pytest.mark.slow
 def test_finish_adds_files_before_the_folder_appears(prepare: Prepare, tmp_path: Path) -> None:
     def finish(folder: Path, summary: object) -> None:
         assert not (tmp_path / "run").exists()
@@ -185,6 +197,7 @@ def test_finish_adds_files_before_the_folder_appears(prepare: Prepare, tmp_path:
     assert result.summary["files"]["report"] == "report.html"
 
 
+@pytest.mark.slow
 def test_outcomes_in_actors_json_have_the_figures_of_the_plan(
     prepare: Prepare, tmp_path: Path
 ) -> None:

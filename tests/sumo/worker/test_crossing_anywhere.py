@@ -51,6 +51,7 @@ def on_the_road(found: Told) -> np.ndarray:
     return (track.y > 102.0) & (track.y < 108.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [0.1, 0.5, 1.0])
 def test_it_walks_straight_to_the_opposite_sidewalk_and_on_to_its_goal(
     tmp_path: Path, step: float
@@ -71,6 +72,7 @@ def test_it_walks_straight_to_the_opposite_sidewalk_and_on_to_its_goal(
     assert track.travelled[-1] == pytest.approx(planned.route_length, abs=4.0)
 
 
+@pytest.mark.slow
 def test_without_it_the_crosswalk_is_used_and_nothing_is_different(tmp_path: Path) -> None:
     usual = walker(crosses_anywhere=False)
     assert story_of(usual) is None
@@ -84,6 +86,7 @@ def test_one_who_stays_on_its_side_does_not_cross() -> None:
     assert story_of(walker(goal=280.0) | {"goal": walk_node_at(TOWN, 280.0, NEAR)}) is None
 
 
+@pytest.mark.slow
 def test_places_on_the_way_are_passed_before_it_crosses(tmp_path: Path) -> None:
     past = walker(via=[walk_node_at(TOWN, 270.0, NEAR)])
     found = run(document(TOWN, [past], [], step=0.5, until=120.0), tmp_path / "run")
@@ -101,6 +104,7 @@ def test_meso_and_rules_of_the_same_name_are_no_obstacle() -> None:
     assert '"id": "anna.crosses_"' in story
 
 
+@pytest.mark.slow
 def test_a_driver_brakes_for_it(tmp_path: Path) -> None:
     ego = {
         "id": "ego", "category": "car", "spawn": node_at(TOWN, 228.0, 103.4), "ego": True,

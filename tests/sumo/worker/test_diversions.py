@@ -149,6 +149,7 @@ def test_who_is_bound_for_a_closed_road_is_stranded_and_counted(
     assert run.kinds(EventKind.MEASURE_END) == [(run.summary["sim_seconds"], "measure_end", "shut")]
 
 
+@pytest.mark.slow
 def test_a_closed_turn_is_driven_around_and_only_by_those_that_it_is_closed_to(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:
@@ -271,6 +272,7 @@ def test_a_light_that_fails_shows_nothing_and_comes_back(
         assert "G" in "".join(later["state"])
 
 
+@pytest.mark.slow
 def test_a_bus_that_is_led_around_keeps_the_stops_that_it_can_reach(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:

@@ -73,6 +73,7 @@ def node_on_approach(name: str, metres: float) -> str:
     return node_id(sumo.graph, min(own, key=lambda node: abs(own[node] - metres)))
 
 
+@pytest.mark.slow
 def test_who_appears_too_near_a_red_light_to_stop_is_there_at_the_wanted_speed(
     tmp_path: Path,
 ) -> None:

@@ -67,6 +67,7 @@ def test_queues_with_a_common_head_ask_for_each_vehicle_once() -> None:
     assert street.asked == ["a", "c", "d", "b"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("until", "dissolved"), [(280.0, False), (400.0, True)])
 def test_a_light_that_never_turns_green_is_named_with_place_and_time(
     prepare: Prepare, grid: Path, tmp_path: Path, until: float, dissolved: bool

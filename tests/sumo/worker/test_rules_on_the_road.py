@@ -94,6 +94,7 @@ def test_at_a_crossroads_without_signs_right_goes_before_left(right: str, left: 
     assert run.said == ""
 
 
+@pytest.mark.slow
 def test_who_enters_a_roundabout_waits_for_those_in_it() -> None:
     made = converted(named("roundabout"))
     ring = [Car(f"r{k}", "3.0.f 3.1.f 7.0.f 8.0.f 5.0.f 2.1.b 2.0.b", depart=3.0 * k)
@@ -161,6 +162,7 @@ def test_a_car_does_not_wait_at_a_crosswalk_without_anybody(street: Converted) -
     assert run.slowest("a") > 5.0
 
 
+@pytest.mark.slow
 def test_cars_wait_for_red_and_go_with_green() -> None:
     made = converted(named("signal_crossing"))
     [light] = made.xml.iter("tlLogic")

@@ -194,6 +194,7 @@ CHECKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_a_template_has_the_geometry_that_its_numbers_say(

@@ -98,6 +98,7 @@ def walked(name: str) -> tuple[list[tuple[int, int]], Traffic]:
     return near, drive(here.made, *persons, until=3600.0, step=0.5)
 
 
+@pytest.mark.slow
 @each_map
 def test_persons_arrive_where_they_want_to(name: str) -> None:
     graph = town(name).made.graph.walks

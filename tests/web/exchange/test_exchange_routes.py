@@ -71,6 +71,7 @@ def report_of(client: TestClient, *files: tuple[str, str | bytes], **form: str) 
     return found
 
 
+@pytest.mark.slow
 def test_a_file_and_its_map_become_a_scenario_with_a_report(client: TestClient) -> None:
     report = report_of(client, ("cut_in.xosc", CUT_IN), ("road.xodr", ROAD))
     assert {one: report[one] for one in ("scenario", "file", "map", "added", "sweep")} == {
@@ -306,6 +307,7 @@ def test_the_command_line_reads_the_same(known: TestClient, tmp_path: Path) -> N
         assert there[verdict] == [row._asdict() for row in here.lists[verdict]]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not SHARED.is_dir(), reason="../shared/osc is not here")
 def test_a_scene_of_esmini_is_imported_with_its_map(client: TestClient) -> None:
     file, road = SHARED / "xosc/cut-in.xosc", SHARED / "xodr/e6mini.xodr"
@@ -333,6 +335,7 @@ def test_a_finished_run_is_downloaded_as_it_happened(client: TestClient, sampled
     assert client.get(f"/api/runs/{run}/export", params={"to": "graphml"}).status_code == 422
 
 
+@pytest.mark.slow
 def test_a_format_of_a_package_is_listed_downloaded_and_read(
     client: TestClient, sampled: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

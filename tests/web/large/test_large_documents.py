@@ -37,6 +37,7 @@ def edit(client: TestClient, name: str, version: int, **fields: Any) -> Any:
     return client.post(f"/api/scenarios/{name}/edits", json=body)
 
 
+@pytest.mark.slow
 def test_a_child_answers_all_that_is_asked_of_a_large_scenario(
     far: TestClient, sampled: str
 ) -> None:
@@ -144,6 +145,7 @@ def test_a_run_of_a_large_scenario_is_checked_watched_and_reported_by_another_pr
     assert far.get(f"/api/runs/{run}/report.html").status_code == 200
 
 
+@pytest.mark.slow
 def test_the_same_run_of_a_large_and_a_small_scenario_gives_the_same_bytes(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -157,6 +159,7 @@ def test_the_same_run_of_a_large_and_a_small_scenario_gives_the_same_bytes(
         assert files[0] == files[1]
 
 
+@pytest.mark.slow
 def test_a_run_of_a_large_scenario_is_paused_and_stopped(far: TestClient, sampled: str) -> None:
     run = start(far, sampled, paused=True)
     wait_for(lambda: far.get(f"/api/runs/{run}").json()["state"] == "paused")
@@ -164,6 +167,7 @@ def test_a_run_of_a_large_scenario_is_paused_and_stopped(far: TestClient, sample
     assert finished(far, run)["state"] == "stopped"
 
 
+@pytest.mark.slow
 def test_a_large_scenario_with_errors_is_not_run(far: TestClient) -> None:
     far.post("/api/scenarios", json={"map": CROSSING, "name": "empty"})
     for path in ("/api/runs", "/api/runs/forecast"):

@@ -34,6 +34,7 @@ def table_of(workspace: Workspace, study: str) -> bytes:
     return (workspace.studies / study / "results.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_scenarios_run_with_every_weather_and_seed(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -70,6 +71,7 @@ def test_scenarios_run_with_every_weather_and_seed(
     assert client.get(path).status_code == 404
 
 
+@pytest.mark.slow
 def test_a_study_that_was_stopped_and_resumed_has_the_same_table(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -92,6 +94,7 @@ def test_a_study_that_was_stopped_and_resumed_has_the_same_table(
     assert table_of(workspace, "parted") == table_of(workspace, "whole")
 
 
+@pytest.mark.slow
 def test_runs_that_are_not_possible_are_told_with_their_words(
     client: TestClient, sampled: str
 ) -> None:

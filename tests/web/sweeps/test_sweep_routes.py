@@ -210,6 +210,7 @@ def test_a_sweep_that_was_stopped_and_resumed_has_the_same_table(
     assert not (workspace().sweeps / name).exists()
 
 
+@pytest.mark.slow
 def test_a_plan_says_how_many_cases_there_are_and_what_they_take(client: TestClient) -> None:
     planned = asked(client, "/plan", {**WISH, "processes": 2}, status=200)
     assert (planned["cases"], planned["tried"]) == (6, "case-004")
@@ -220,6 +221,7 @@ def test_a_plan_says_how_many_cases_there_are_and_what_they_take(client: TestCli
     assert not [one for one in client.get("/api/sweeps").json() if one["state"] == "running"]
 
 
+@pytest.mark.slow
 def test_values_of_a_table_belong_together(client: TestClient) -> None:
     rows = {"parameters": ["van", "gap"], "table": [[12, 10], [26, 40]]}
     planned = asked(client, "/plan", {**WISH, "vary": [rows]}, status=200)

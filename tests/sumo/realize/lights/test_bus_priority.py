@@ -73,6 +73,7 @@ def test_a_fixed_time_program_keeps_its_cycle_where_no_bus_comes() -> None:
         assert phases[longer].get("maxDur") == f"{BUS_GREEN:g}"
 
 
+@pytest.mark.slow
 def test_an_actuated_program_with_a_cycle_keeps_to_it_with_priority(tmp_path: Path) -> None:
     stages = [{**stage, "min_green": 5, "max_green": 30} for stage in program()["stages"][:3]]
     junction = one_plan(stages=[*stages, program()["stages"][3]], cycle=84, bus_priority=True)

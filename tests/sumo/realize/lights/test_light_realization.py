@@ -121,6 +121,7 @@ def pauses(seen: list[Shown], design: DesignedProgram) -> dict[tuple[str, str], 
     return least
 
 
+@pytest.mark.slow
 def test_a_stage_on_call_comes_only_if_somebody_waits(tmp_path: Path) -> None:
     called = shown(tmp_path / "called", scenario(one_plan(), walkers=120.0))
     quiet = shown(tmp_path / "quiet", scenario(one_plan(), walkers=0.0))
@@ -180,6 +181,7 @@ def test_an_arrow_comes_on_call_for_who_found_no_gap_in_oncoming_traffic(tmp_pat
     assert 2 <= stages(seen).count("2") < stages(seen).count("1")
 
 
+@pytest.mark.slow
 def test_whoever_calls_a_stage_gets_it_in_the_next_cycle(tmp_path: Path) -> None:
     one = only_from(1, "4.0.1.64", control="fixed")
     trips = pl.read_parquet(carried_out(one, tmp_path).folder / "trips.parquet")
@@ -190,6 +192,7 @@ def test_whoever_calls_a_stage_gets_it_in_the_next_cycle(tmp_path: Path) -> None
     assert max(trips["waiting_time"].to_list()) <= cycle
 
 
+@pytest.mark.slow
 def test_vehicles_call_in_a_run_in_slices_as_in_one_piece(tmp_path: Path) -> None:
     one = only_from(1, "4.0.1.64", control="actuated")
     runs = [
@@ -201,6 +204,7 @@ def test_vehicles_call_in_a_run_in_slices_as_in_one_piece(tmp_path: Path) -> Non
     assert slices.equals(whole)
 
 
+@pytest.mark.slow
 def test_a_detector_prolongs_its_stage_up_to_the_bound_and_no_other(tmp_path: Path) -> None:
     busy = shown(tmp_path / "busy", scenario(one_plan(), control="actuated", vehicles=900.0))
     idle = shown(tmp_path / "idle", scenario(one_plan(), control="actuated", vehicles=40.0))
@@ -258,6 +262,7 @@ def test_plans_of_the_day_take_over_in_the_first_stage_and_fall_in_step(tmp_path
     assert {round(b - a, 3) for a, b in pairwise(firsts[1:])} == {76.0}
 
 
+@pytest.mark.slow
 def test_programs_of_actuated_lights_without_detectors_of_their_own_get_loops(
     tmp_path: Path,
 ) -> None:

@@ -58,6 +58,7 @@ def phases(logic: etree._Element) -> list[tuple[str | None, ...]]:
     return [tuple(phase.get(name) for name in names) for phase in logic.iterfind("phase")]
 
 
+@pytest.mark.slow
 def test_lights_are_known_by_their_junctions_and_their_movements_by_segments() -> None:
     (light,) = scenario_lights(crossing().sumo)
     assert light.names == (JUNCTION,)
@@ -258,6 +259,7 @@ def test_an_offset_lets_the_first_stage_begin_later(tmp_path: Path) -> None:
     assert first == (light.phases[0].state, light.phases[0].duration)
 
 
+@pytest.mark.slow
 def test_traffic_from_one_side_gets_more_green_where_the_light_is_actuated(tmp_path: Path) -> None:
     green: dict[str, float] = {}
     for control in ("fixed", "actuated"):
@@ -269,6 +271,7 @@ def test_traffic_from_one_side_gets_more_green_where_the_light_is_actuated(tmp_p
     assert green["actuated"] > 1.3 * green["fixed"]
 
 
+@pytest.mark.slow
 def test_a_run_has_the_file_only_where_the_scenario_changes_something(tmp_path: Path) -> None:
     plain = prepare(from_one_side(), crossing().sumo, net_file(tmp_path))
     changed = prepare(timed(control="actuated"), crossing().sumo, net_file(tmp_path))

@@ -93,6 +93,7 @@ def test_the_report_has_the_stations(run: Run, tmp_path: Path) -> None:
     assert "loop" in page
 
 
+@pytest.mark.slow
 def test_a_run_without_stations_says_so(tmp_path: Path) -> None:
     sumo_map = built(MAP).sumo
     prepared = prepare(

@@ -89,6 +89,7 @@ def test_a_bus_in_a_bay_holds_up_no_other_vehicle(tmp_path: Path) -> None:
     assert car(bay=False) > car(bay=True) + 15.0
 
 
+@pytest.mark.slow
 def test_a_run_in_slices_has_the_same_visits(tmp_path: Path) -> None:
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     for folder in (whole, cut):

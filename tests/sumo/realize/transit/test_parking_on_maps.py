@@ -52,6 +52,7 @@ def plan_of(folder: Path) -> Plan:
     return Plan.from_json((folder / "plan.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_trips_begin_and_end_parked_in_the_shares_of_the_demand(tmp_path: Path) -> None:
     scenario = parking_scenario({"begin": 0.1, "end": 0.2, "stay": STAY}, trips=200)
     folder, stays = run(scenario, tmp_path)
@@ -68,6 +69,7 @@ def test_trips_begin_and_end_parked_in_the_shares_of_the_demand(tmp_path: Path) 
     assert lasted.max() <= 200.5  # type: ignore[operator]
 
 
+@pytest.mark.slow
 def test_a_trip_is_from_leaving_a_place_to_taking_one(tmp_path: Path) -> None:
     scenario = parking_scenario({"begin": 0.2, "end": 0.3, "stay": STAY})
     folder, stays = run(scenario, tmp_path)
@@ -90,6 +92,7 @@ def test_a_trip_is_from_leaving_a_place_to_taking_one(tmp_path: Path) -> None:
             assert row["time_loss"] <= row["duration"]
 
 
+@pytest.mark.slow
 def test_cars_stand_in_the_places_that_the_map_draws(tmp_path: Path) -> None:
     folder, stays = run(parking_scenario({"end": 0.3, "stay": STAY}), tmp_path)
     plan = plan_of(folder)
@@ -102,6 +105,7 @@ def test_cars_stand_in_the_places_that_the_map_draws(tmp_path: Path) -> None:
         assert min(math.dist(middle, (one.x, one.y)) for one in places[area]) < 0.05
 
 
+@pytest.mark.slow
 def test_an_area_never_holds_more_cars_than_it_has_places(tmp_path: Path) -> None:
     scenario = parking_scenario({"begin": 0.3, "end": 0.9, "stay": 400}, trips=150)
     folder, stays = run(scenario, tmp_path)

@@ -62,6 +62,7 @@ def only(kind: DrivingKind, value: float, *, vehicle: str = "ahead") -> dict[str
     return {"name": f"{HERE}:Only", "options": options}
 
 
+@pytest.mark.slow
 def test_a_model_that_controls_nobody_leaves_every_byte_as_it_is(tmp_path: Path) -> None:
     driven(tmp_path / "plain")
     run = driven(tmp_path / "seen", name=f"{HERE}:Nobody")
@@ -70,11 +71,13 @@ def test_a_model_that_controls_nobody_leaves_every_byte_as_it_is(tmp_path: Path)
         assert (tmp_path / "plain" / name).read_bytes() == (run.folder / name).read_bytes(), name
 
 
+@pytest.mark.slow
 def test_an_observation_that_is_kept_holds_what_it_showed(tmp_path: Path) -> None:
     run = driven(tmp_path / "kept", name=f"{HERE}:Keeper")
     assert run.status == "completed", run.summary["error"]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_idm_drives(tmp_path: Path) -> None:
     options = {"spread": 0.1, "headway": 3.0}
     one, two = (driven(tmp_path / n, name="idm", options=options) for n in "ab")
@@ -84,6 +87,7 @@ def test_the_same_seed_gives_the_same_bytes_and_idm_drives(tmp_path: Path) -> No
     assert track(plain, "behind")["x"][-1] - track(one, "behind")["x"][-1] > 1.0
 
 
+@pytest.mark.slow
 def test_an_unchecked_speed_is_the_speed_and_then_sumo_drives_again(tmp_path: Path) -> None:
     run = driven(tmp_path / "run", **only(DrivingKind.SPEED_UNCHECKED, 3.0))
     rows = track(run, "ahead")
@@ -92,6 +96,7 @@ def test_an_unchecked_speed_is_the_speed_and_then_sumo_drives_again(tmp_path: Pa
     assert rows["speed"][-1] > 4.0
 
 
+@pytest.mark.slow
 def test_a_checked_speed_does_not_run_into_the_vehicle_ahead(tmp_path: Path) -> None:
     fast = driven(tmp_path / "checked", **only(DrivingKind.SPEED, 40.0, vehicle="behind"))
     hit = driven(tmp_path / "blind", **only(DrivingKind.SPEED_UNCHECKED, 60.0, vehicle="behind"))
@@ -99,12 +104,14 @@ def test_a_checked_speed_does_not_run_into_the_vehicle_ahead(tmp_path: Path) -> 
     assert "collision" in hit.events()["kind"].to_list()
 
 
+@pytest.mark.slow
 def test_a_place_on_the_lane_is_taken(tmp_path: Path) -> None:
     rows = track(driven(tmp_path / "run", **only(DrivingKind.LANE_POSITION, 0.5)), "ahead")
     during = rows.filter(pl.col("time").is_between(1.05, 2.95))["x"].to_numpy()
     np.testing.assert_allclose(np.diff(during), 0.5, atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_pose_is_that_of_the_centre_of_the_body_off_the_road_too(tmp_path: Path) -> None:
     rows = track(driven(tmp_path / "run", **only(DrivingKind.POSE, 400.0)), "ahead")
     during = rows.filter(pl.col("time").is_between(1.05, 2.95))
@@ -114,6 +121,7 @@ def test_a_pose_is_that_of_the_centre_of_the_body_off_the_road_too(tmp_path: Pat
     np.testing.assert_allclose(during["hdg"].to_numpy(), 0.5, atol=0.002)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "words"),
     [
@@ -130,6 +138,7 @@ def test_what_cannot_be_ends_the_run_with_instant_and_value(
     assert first == f"behaviour {HERE}:Wrong at 1 s: {words}"
 
 
+@pytest.mark.slow
 def test_a_program_over_a_pipe_drives_as_the_class_does(tmp_path: Path) -> None:
     script = tmp_path / "drive.py"
     script.write_text(SERVE.format(ROOT, "Only('ahead', 1, 3.0)"))
@@ -139,6 +148,7 @@ def test_a_program_over_a_pipe_drives_as_the_class_does(tmp_path: Path) -> None:
         assert (own.folder / name).read_bytes() == (run.folder / name).read_bytes(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "words"),
     [
@@ -156,6 +166,7 @@ def test_a_program_that_dies_or_hangs_fails_the_run_with_a_reason(
     assert words in run.summary["error"]
 
 
+@pytest.mark.slow
 def test_the_class_and_the_program_of_the_documents_drive(tmp_path: Path) -> None:
     text = (Path(__file__).parents[4] / "docs" / "behaviour.md").read_text(encoding="utf-8")
     blocks = [part.partition("```")[0] for part in text.split("```python\n")[1:]]

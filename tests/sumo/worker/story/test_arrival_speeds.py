@@ -55,6 +55,7 @@ def test_no_place_is_reached_at_a_standstill_that_lasts_for_metres() -> None:
         Arriving.model_validate({**MEET, "speed": 0.0, "steady": 5.0})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_who_arrives_drives_the_last_metres_at_the_speed_on_arrival(
     tmp_path: Path, step: float
@@ -78,6 +79,7 @@ def test_who_arrives_drives_the_last_metres_at_the_speed_on_arrival(
     )
 
 
+@pytest.mark.slow
 def test_a_walker_waits_and_arrives_at_its_speed(tmp_path: Path) -> None:
     actors, rules, _ = crossing_child()
     [ego, _] = actors

@@ -44,6 +44,7 @@ def test_a_rule_ends_the_run_with_the_step_in_which_it_fires(tmp_path: Path, ste
     assert summary["actors"]["inserted"] == 2
 
 
+@pytest.mark.slow
 def test_a_run_that_a_rule_ends_is_the_same_twice_and_ends_in_its_slice(tmp_path: Path) -> None:
     whole = [run(ending(0.1), tmp_path / name).folder for name in ("a", "b")]
     for name in ("events.json", "actors.json", "trajectories.parquet"):

@@ -37,6 +37,7 @@ def kinds(found: Told, rule: str) -> list[str]:
     return [str(one.kind) for one in found.events if one.rule == rule]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("gap", [8.0, 20.0])
 def test_a_cut_in_ends_in_the_lane_of_the_other_with_the_gap_that_was_asked_for(
@@ -66,6 +67,7 @@ def test_a_gap_that_cannot_be_reached_in_time_is_said(tmp_path: Path) -> None:
     assert "for a gap of 10 m in time" in (event.detail or "")
 
 
+@pytest.mark.slow
 def test_a_lane_is_named_by_a_place_that_it_leads_to(tmp_path: Path) -> None:
     there = node_at(MOTORWAY, 600.0, LEFT)
     rules = [after(1.0, {"lane": {"to": there, "over": 4.0}})]
@@ -78,6 +80,7 @@ def test_a_lane_is_named_by_a_place_that_it_leads_to(tmp_path: Path) -> None:
     assert event.detail == "none of the lanes beside it leads to the place"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_a_path_is_followed_to_the_times_of_its_points(tmp_path: Path, step: float) -> None:
     points = [[430.0, RIGHT + 1.0], [470.0, MIDDLE], [520.0, MIDDLE]]
@@ -96,6 +99,7 @@ def test_a_path_is_followed_to_the_times_of_its_points(tmp_path: Path, step: flo
     assert van.x[-1] > 600.0, "SUMO leads it on"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_speeds_at_the_points_of_a_path_change_evenly(tmp_path: Path, step: float) -> None:
     rules = [after(1.0, {"path": {"points": [[450.0, MIDDLE], [500.0, MIDDLE]],
@@ -109,6 +113,7 @@ def test_speeds_at_the_points_of_a_path_change_evenly(tmp_path: Path, step: floa
     assert along(van, ends) == pytest.approx(500.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_path_off_the_route_is_followed_and_sumo_leads_back_to_the_goal(tmp_path: Path) -> None:
     van = {
         "id": "van", "category": "car", "spawn": node_at(TOWN, 215.0, 103.4),
@@ -138,6 +143,7 @@ def test_where_no_route_leads_on_from_the_end_of_a_path_that_is_said(tmp_path: P
     assert event.detail == "no route leads from where it is to its goal"
 
 
+@pytest.mark.slow
 def test_a_walker_follows_a_path_across_the_road(tmp_path: Path) -> None:
     child = {
         "id": "child", "category": "pedestrian", "spawn": walk_node_at(TOWN, 270.0, 100.5),
@@ -185,6 +191,7 @@ def test_a_recorded_trajectory_is_replayed_exactly_and_traffic_reacts(
     assert not [one for one in found.events if one.kind == "collision"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_an_actor_appears_when_a_rule_says_so_where_it_says(tmp_path: Path, step: float) -> None:
     actors = [fast("ego", 370.0, MIDDLE, 10.0, ego=True), fast("van", 460.0, RIGHT)]
@@ -201,6 +208,7 @@ def test_an_actor_appears_when_a_rule_says_so_where_it_says(tmp_path: Path, step
     assert found.instant("r", "ended") == pytest.approx(3.0 + step + 1.5, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_run_waits_for_whom_a_rule_lets_appear(tmp_path: Path) -> None:
     actors = [
         fast("van", 860.0, MIDDLE, depart=0.0),
@@ -214,6 +222,7 @@ def test_a_run_waits_for_whom_a_rule_lets_appear(tmp_path: Path) -> None:
     assert [one.actor for one in found.events if one.kind == "arrived"] == ["van", "child"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("when", "appears"), [(9.0, True), (90.0, False)])
 def test_whoever_appears_by_a_rule_waits_for_no_room_before(
     tmp_path: Path, when: float, appears: bool
@@ -232,6 +241,7 @@ def test_whoever_appears_by_a_rule_waits_for_no_room_before(
     assert latent_delay(late, 40.0) == 0.0
 
 
+@pytest.mark.slow
 def test_a_child_appears_on_its_sidewalk_and_walks(tmp_path: Path) -> None:
     spawn = walk_node_at(TOWN, 270.0, 100.5)
     child = {
@@ -246,6 +256,7 @@ def test_a_child_appears_on_its_sidewalk_and_walks(tmp_path: Path) -> None:
     assert track.travelled[-1] > 5.0
 
 
+@pytest.mark.slow
 def test_a_new_goal_is_where_the_trip_then_ends(tmp_path: Path) -> None:
     goal = node_at(MOTORWAY, 640.0, MIDDLE)
     rules = [after(2.0, {"goal": {"to": goal}})]
@@ -258,6 +269,7 @@ def test_a_new_goal_is_where_the_trip_then_ends(tmp_path: Path) -> None:
     assert [one.detail for one in found.of_rule("r", "acted")] == [f"goal {goal}"]
 
 
+@pytest.mark.slow
 def test_a_walker_goes_to_its_new_goal(tmp_path: Path) -> None:
     goal = walk_node_at(TOWN, 300.0, 100.5)
     child = {
@@ -288,6 +300,7 @@ def waiting_at_red() -> tuple[dict[str, Any], dict[str, Any]]:
     return car, {"light": light.names[0], "movement": movement.name}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shows", ["green", "off"])
 def test_a_rule_switches_a_light_and_the_car_at_red_goes(tmp_path: Path, shows: str) -> None:
     car, movement = waiting_at_red()
@@ -304,6 +317,7 @@ def test_a_rule_switches_a_light_and_the_car_at_red_goes(tmp_path: Path, shows: 
     assert said.detail.endswith(shows)
 
 
+@pytest.mark.slow
 def test_a_light_that_was_off_shows_its_program_again(tmp_path: Path) -> None:
     car, movement = waiting_at_red()
     off, on = ({"light": movement["light"], "shows": one} for one in ("off", "program"))
@@ -318,6 +332,7 @@ def test_a_light_that_was_off_shows_its_program_again(tmp_path: Path) -> None:
     assert found.instant("red") == pytest.approx(2.1, abs=0.11)
 
 
+@pytest.mark.slow
 def test_lights_and_horn_are_reported(tmp_path: Path) -> None:
     rules = [
         after(1.0, {"lights": {"indicator": "left", "high_beam": True}}, {"horn": {}}),
@@ -333,6 +348,7 @@ def test_lights_and_horn_are_reported(tmp_path: Path) -> None:
     assert math.isfinite(said[0][0])
 
 
+@pytest.mark.slow
 def test_what_is_to_appear_beside_all_lanes_appears_where_it_is_placed_with_a_word(
     tmp_path: Path,
 ) -> None:

@@ -51,6 +51,7 @@ def alone(folder: Path, *then: dict[str, Any], step: float, speed: float = 20.0)
     return run(document(MOTORWAY, actors, [after(1.23, *then)], step=step), folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_braking_at_6_from_20_stops_after_33_m_whatever_the_vehicle_type_allows(
     tmp_path: Path, step: float
@@ -93,6 +94,7 @@ def test_a_change_of_speed_takes_its_time_and_its_metres(
     assert van.speed[van.time > end + step] == pytest.approx(change["to"], abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_a_stop_is_after_so_many_metres_and_lasts_until_go(tmp_path: Path, step: float) -> None:
     rules = [after(1.23, {"stop": {"within": 50.0}}), after(9.0, {"go": {}}, name="on")]
@@ -105,6 +107,7 @@ def test_a_stop_is_after_so_many_metres_and_lasts_until_go(tmp_path: Path, step:
     assert van.speed[-1] > 15.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize(("y", "by", "to"), [(RIGHT, 1, MIDDLE), (LEFT, -1, MIDDLE)])
 def test_a_lane_change_is_a_half_cosine_from_lane_to_lane(
@@ -120,6 +123,7 @@ def test_a_lane_change_is_a_half_cosine_from_lane_to_lane(
     assert np.abs(van.hdg).max() < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_an_offset_is_kept_beside_the_lane_and_taken_back(tmp_path: Path, step: float) -> None:
     there = {"offset": {"to": 0.8, "over": 2.0}}
@@ -132,6 +136,7 @@ def test_an_offset_is_kept_beside_the_lane_and_taken_back(tmp_path: Path, step: 
     assert van.y[van.time > 6.6] == pytest.approx(MIDDLE, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_actions_run_together_or_one_after_the_other(tmp_path: Path, step: float) -> None:
     together = {"together": [{"lane": {"by": 1, "over": 3.0}}, {"speed": {"to": 15, "over": 2}}]}
@@ -146,6 +151,7 @@ def test_actions_run_together_or_one_after_the_other(tmp_path: Path, step: float
     assert van.y[-1] == pytest.approx(MIDDLE, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("gap", [{"metres": 15.0}, {"seconds": 1.0}])
 def test_a_gap_is_reached_and_kept(tmp_path: Path, gap: dict[str, float], step: float) -> None:
@@ -158,6 +164,7 @@ def test_a_gap_is_reached_and_kept(tmp_path: Path, gap: dict[str, float], step: 
     assert found.instant("r", "ended") == pytest.approx(17.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_gap_that_is_reached_once_lets_the_next_rule_begin(tmp_path: Path) -> None:
     actors = [fast("ego", 430.0, MIDDLE, 15.0, ego=True), fast("van", 370.0, MIDDLE)]
     reach = {"keep_gap": {"to": "ego", "metres": 15.0, "once": True}}
@@ -172,6 +179,7 @@ def test_a_gap_that_is_reached_once_lets_the_next_rule_begin(tmp_path: Path) -> 
     assert van.speed[-1] == pytest.approx(5.0, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("gap", [{"metres": 15.0}, {"seconds": 1.0}])
 def test_a_gap_is_kept_ahead(tmp_path: Path, gap: dict[str, float], step: float) -> None:
@@ -183,6 +191,7 @@ def test_a_gap_is_kept_ahead(tmp_path: Path, gap: dict[str, float], step: float)
     assert between == pytest.approx(15.0, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_two_arrive_at_their_places_at_one_instant(tmp_path: Path, step: float) -> None:
     places = node_at(MOTORWAY, 640.0, MIDDLE), node_at(MOTORWAY, 600.0, RIGHT)
@@ -201,6 +210,7 @@ def test_two_arrive_at_their_places_at_one_instant(tmp_path: Path, step: float) 
         assert abs(x - wanted) / speed < 0.1
 
 
+@pytest.mark.slow
 def test_who_is_to_arrive_earlier_than_it_can_is_told_so(tmp_path: Path) -> None:
     places = node_at(MOTORWAY, 400.0, MIDDLE), node_at(MOTORWAY, 700.0, RIGHT)
     actors = [fast("ego", 370.0, MIDDLE, ego=True), fast("van", 400.0, RIGHT, 10.0)]
@@ -211,6 +221,7 @@ def test_who_is_to_arrive_earlier_than_it_can_is_told_so(tmp_path: Path) -> None
     assert found.tracks["van"].speed[-1] > 9.0
 
 
+@pytest.mark.slow
 def test_a_vehicle_vanishes_at_once_and_release_gives_it_back(tmp_path: Path) -> None:
     rules = [after(3.0, {"vanish": {}})]
     actors = [fast("van", 370.0, MIDDLE), fast("other", 420.0, RIGHT)]
@@ -223,6 +234,7 @@ def test_a_vehicle_vanishes_at_once_and_release_gives_it_back(tmp_path: Path) ->
     assert other.speed[-1] > 15.0
 
 
+@pytest.mark.slow
 def test_rules_that_want_one_actor_at_once_follow_each_other_with_an_event(
     tmp_path: Path,
 ) -> None:
@@ -237,6 +249,7 @@ def test_rules_that_want_one_actor_at_once_follow_each_other_with_an_event(
     assert found.instant("fast", "ended") == pytest.approx(5.0)
 
 
+@pytest.mark.slow
 def test_a_rule_on_a_vehicle_that_is_not_there_yet_says_so(tmp_path: Path) -> None:
     actors = [fast("van", 370.0, MIDDLE, depart=5.0), fast("other", 420.0, RIGHT)]
     rules = [
@@ -253,6 +266,7 @@ def test_a_rule_on_a_vehicle_that_is_not_there_yet_says_so(tmp_path: Path) -> No
     assert found.tracks["van"].speed[-1] == pytest.approx(10.0)
 
 
+@pytest.mark.slow
 def test_a_lane_that_is_not_there_or_ends_is_told_and_sumo_drives_on(tmp_path: Path) -> None:
     actors = [fast("van", 370.0, LEFT)]
     found = run(document(MOTORWAY, actors, [after(1.0, {"lane": {"by": 1}})]), tmp_path / "run")
@@ -261,6 +275,7 @@ def test_a_lane_that_is_not_there_or_ends_is_told_and_sumo_drives_on(tmp_path: P
     assert found.tracks["van"].x[-1] > found.tracks["van"].x[0] + 300.0
 
 
+@pytest.mark.slow
 def test_bodies_that_meet_beside_their_lanes_have_collided_at_their_instant(
     tmp_path: Path,
 ) -> None:
@@ -333,6 +348,7 @@ def test_a_walker_crosses_mid_block_and_the_ego_brakes(tmp_path: Path, step: flo
     assert child.y[-1] > NORTH - 1.0
 
 
+@pytest.mark.slow
 def test_a_walker_that_stops_on_the_road_stays_there_and_is_waited_for(tmp_path: Path) -> None:
     actors, rules, _ = crossing_child(to=[270.6, 103.4])
     found = run(document(TOWN, actors, rules, until=30.0), tmp_path / "run")
@@ -342,6 +358,7 @@ def test_a_walker_that_stops_on_the_road_stays_there_and_is_waited_for(tmp_path:
     assert ego.x[-1] < 270.6 - 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_a_walker_arrives_where_the_ego_is_at_that_instant(tmp_path: Path, step: float) -> None:
     actors, rules, _ = crossing_child()
@@ -358,6 +375,7 @@ def test_a_walker_arrives_where_the_ego_is_at_that_instant(tmp_path: Path, step:
     assert abs(x - graph.lanes.x[node_index(graph, place)]) / 8.0 < 0.1
 
 
+@pytest.mark.slow
 def test_the_same_rules_give_the_same_bytes_twice(tmp_path: Path) -> None:
     actors, rules, _ = crossing_child()
     scenario = document(TOWN, actors, rules, until=20.0)
@@ -366,6 +384,7 @@ def test_the_same_rules_give_the_same_bytes_twice(tmp_path: Path) -> None:
         assert (first / name).read_bytes() == (second / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_walker_released_on_the_road_stays_there_with_an_event(tmp_path: Path) -> None:
     """SUMO ends in a fault where a person waits on an edge without sidewalk."""
     actors, rules, _ = crossing_child()
@@ -406,6 +425,7 @@ def test_a_lane_that_ends_during_a_change_ends_the_change_with_an_event(tmp_path
     assert found.tracks["van"].travelled[-1] > 100.0
 
 
+@pytest.mark.slow
 def test_a_rule_waits_for_green_and_another_lets_a_car_run_the_red(tmp_path: Path) -> None:
     name = "signal_crossing"
     made_on = loaded(name)

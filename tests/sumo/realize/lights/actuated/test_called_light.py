@@ -92,6 +92,7 @@ def only_leg(number: int, *, vehicles: float) -> Scenario:
     return one.model_copy(update={"flows": tuple(f for f in one.flows if f.spawn == spawn)})
 
 
+@pytest.mark.slow
 def test_a_light_rests_in_the_stage_of_those_who_come(tmp_path: Path) -> None:
     seen = shown(carried_out(only_leg(0, vehicles=300.0), tmp_path))
     assert len(seen) == 1
@@ -110,6 +111,7 @@ def test_each_vehicle_of_a_quiet_leg_gets_its_green_and_the_light_returns(tmp_pa
     assert all(end - begin <= 15.0 for begin, end in own if end < UNTIL)
 
 
+@pytest.mark.slow
 def test_crossings_have_green_only_if_somebody_waits(tmp_path: Path) -> None:
     without = shown(carried_out(scenario(None, control="actuated", walkers=0.0), tmp_path / "no"))
     first = max(end for n in WALKS for _, end in greens(without, n)[:1])
@@ -125,6 +127,7 @@ def test_crossings_have_green_only_if_somebody_waits(tmp_path: Path) -> None:
     assert max(people["waiting_time"]) < 90.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("vehicles", "walkers"), [(120.0, 60.0), (500.0, 200.0)])
 def test_no_intergreen_is_shorter_than_the_paths_need(
     tmp_path: Path, vehicles: float, walkers: float
@@ -148,6 +151,7 @@ def test_no_intergreen_is_shorter_than_the_paths_need(
     assert pairs > 100
 
 
+@pytest.mark.slow
 def test_greens_keep_their_bounds_while_others_wait(tmp_path: Path) -> None:
     one = scenario(None, control="actuated", vehicles=900.0, walkers=60.0)
     seen = shown(carried_out(one, tmp_path))
@@ -160,6 +164,7 @@ def test_greens_keep_their_bounds_while_others_wait(tmp_path: Path) -> None:
             assert all(LEAST_CALLED <= e - b <= longest + clearance for b, e in own)
 
 
+@pytest.mark.slow
 def test_half_of_the_usual_traffic_waits_less_at_actuated_lights(tmp_path: Path) -> None:
     loss = {}
     for control in ("fixed", "actuated"):
@@ -171,6 +176,7 @@ def test_half_of_the_usual_traffic_waits_less_at_actuated_lights(tmp_path: Path)
     assert means["actuated"] < 0.8 * means["fixed"]  # type: ignore[operator]
 
 
+@pytest.mark.slow
 def test_a_run_with_calls_writes_no_warning_about_detectors(tmp_path: Path) -> None:
     run = carried_out(scenario(None, control="actuated"), tmp_path)
     log = (run.folder / "sumo.log").read_text()
@@ -178,6 +184,7 @@ def test_a_run_with_calls_writes_no_warning_about_detectors(tmp_path: Path) -> N
     assert "tlLogic" not in log
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("walkers", [0.0, 40.0])
 def test_a_stage_of_their_own_comes_only_for_people_who_wait(
     tmp_path: Path, walkers: float
