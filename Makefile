@@ -106,7 +106,7 @@ screenshots: $(READY) $(PAGE) chromium
 
 # Rewrites golden files and the published schema from what the code does now; read the diff.
 golden: $(READY)
-	ODSCEN_GOLDEN=write $(BIN)/python -m pytest -q -m golden
+	ODSCEN_GOLDEN=write ODSCEN_SLOW=all $(BIN)/python -m pytest -q -m golden
 
 # Writes maps/*.xodr again.
 maps: $(READY)
