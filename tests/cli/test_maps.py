@@ -313,4 +313,4 @@ def test_the_first_line_of_a_map_says_what_is_lost_for_traffic(tmp_path):
     file.write_text(text)
     done = odscen("maps", "add", file, "--workspace", tmp_path / "w")
     assert done.code == 0
-    assert "; lost for traffic: 1 access rules, 1 roads, 2 signs not understood" in done.err
+    assert "; lost for traffic: 1 access rule, 1 road, 2 signs not understood" in done.err

@@ -400,6 +400,14 @@ _LOSSES = (
     ("crosswalks", "crosswalk"),
 )
 """What is lost for traffic, by what the reason of the report has; signals by their element."""
+_SINGLE = {
+    "roads": "road",
+    "connections": "connection",
+    "access rules": "access rule",
+    "crosswalks": "crosswalk",
+    "lights and signs": "light or sign",
+    "signs not understood": "sign not understood",
+}
 
 
 def _describe_losses(entry: MapEntry) -> str:
@@ -418,7 +426,9 @@ def _describe_losses(entry: MapEntry) -> str:
             counts.update(() if kind is None else (kind,))
     if not counts:
         return ""
-    lost = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items()))
+    lost = ", ".join(
+        f"{count} {_SINGLE[kind] if count == 1 else kind}" for kind, count in sorted(counts.items())
+    )
     return f"; lost for traffic: {lost}"
 
 
