@@ -231,8 +231,8 @@ def _draw_flows(
     usable = np.array([graph.lanes.lanes.junctions[lane] is None for lane in graph.lanes.lane])
     usable &= everywhere.lanes
     ahead = graph.lanes.lanes.lengths[graph.lanes.lane] - graph.lanes.offset
-    for one in loaded:
-        usable &= True if one.usable.spawnable is None else one.usable.spawnable
+    for network in loaded:
+        usable &= True if network.usable.spawnable is None else network.usable.spawnable
     random = stream(0, "compare", entry.sha256)
     reference = MapReference(name=entry.name, sha256=entry.sha256, spacing=graph.lanes.spacing)
     count = max(1, round(per_hour / PER_FLOW))
@@ -302,8 +302,8 @@ def _keep_routed_flows(
         Actor(id=flow.id, category="car", spawn=flow.spawn, goal=flow.goal)
         for flow in flows.values()
     )
-    one = scenario.model_copy(update={"actors": actors})
-    without = {problem.nodes for network in loaded for problem in route_fit(one, network.sumo)}
+    routed = scenario.model_copy(update={"actors": actors})
+    without = {problem.nodes for network in loaded for problem in route_fit(routed, network.sumo)}
     return {spawn: flow for spawn, flow in flows.items() if (flow.spawn,) not in without}
 
 

@@ -42,7 +42,7 @@ def acting_differences(
         appears ``at`` that place appears where it is placed.
     """
     at = {name: _round_values(list(pose)) for name, pose in (placed or {}).items()}
-    old, new = (_plain_document(one, at) for one in (before, after))
+    old, new = (_plain_document(scenario, at) for scenario in (before, after))
     old["rules"] = {rule["id"]: _plain_rule(rule, old, {}) for rule in old["rules"]}
     new["rules"] = _rules_by_name(new, old["rules"])
     return tuple(field_differences(old, new))
@@ -52,7 +52,7 @@ def _plain_document(scenario: Scenario, placed: Mapping[str, Pose]) -> Parts:
     data: Parts = _round_values(scenario.model_dump(mode="json", exclude={"name", "formulas"}))
     data["roi"] = sorted(data["roi"])
     for name in ("actors", "flows", "measures"):
-        data[name] = {one["id"]: one for one in data[name]}
+        data[name] = {part["id"]: part for part in data[name]}
     for rule in data["rules"]:
         own = data["actors"].get(rule["actor"], {}).get("initial_speed")
         for part in _action_parts(rule["then"]):
@@ -74,7 +74,7 @@ def _round_values(value: Any) -> Any:
     if isinstance(value, float):
         return round(value, _DIGITS) + 0.0
     if isinstance(value, list):
-        return [_round_values(one) for one in value]
+        return [_round_values(item) for item in value]
     if isinstance(value, dict):
         return {key: _round_values(one) for key, one in value.items()}
     return value
@@ -93,7 +93,9 @@ def _rules_by_name(new: Parts, old: Mapping[str, Parts]) -> Parts:
                 names |= {} if known is None else {rule["id"]: known}
         if len(names) == before:
             break
-    return {names.get(one["id"], one["id"]): _plain_rule(one, new, names) for one in new["rules"]}
+    return {
+        names.get(rule["id"], rule["id"]): _plain_rule(rule, new, names) for rule in new["rules"]
+    }
 
 
 def _sorted_text(part: Parts) -> str:
@@ -120,12 +122,13 @@ def _condition_groups(
         if kind == "not":
             return _condition_groups(when["not"], actor, names, negated=not negated, delay=delay)
         parts = [
-            _condition_groups(one, actor, names, negated=negated, delay=delay) for one in when[kind]
+            _condition_groups(inner, actor, names, negated=negated, delay=delay)
+            for inner in when[kind]
         ]
         if (kind == "any") != negated:
             return [group for part in parts for group in part]
         if len(list(product(*parts))) <= _MOST_GROUPS:
-            return [_without_always(set().union(*one)) for one in product(*parts)]
+            return [_without_always(set().union(*inner)) for inner in product(*parts)]
     part = when[kind]
     if isinstance(part, dict):
         part = part | ({"of": actor} if part.get("of", "") is None else {})
@@ -149,7 +152,7 @@ def _without_always(group: set[str]) -> set[str]:
 
 def _plain_action(action: Parts, *, walks: bool) -> Parts:
     if action["together"] is not None:
-        return {"together": [_plain_action(one, walks=walks) for one in action["together"]]}
+        return {"together": [_plain_action(inner, walks=walks) for inner in action["together"]]}
     (kind,) = (key for key in action if action[key] is not None)
     part: Parts = action[kind]
     if not walks and kind == "brake" and part["hold"] is None:

@@ -83,7 +83,7 @@ def _describe_mark(mark: RoadMark | None) -> str:
 def _records_holding_at(records: Sequence[Any], s: float) -> list[Any]:
     """Records that hold at s: those with the last start before it."""
     started = [record for record in records if record.s <= s + SAME]
-    return [one for one in started if one.s == started[-1].s]
+    return [record for record in started if record.s == started[-1].s]
 
 
 def _last_record_at(records: Sequence[Any], s: float) -> Any:
@@ -100,7 +100,9 @@ def _describe_height(lane: Lane, s: float) -> str:
 
 def _describe_access(lane: Lane, s: float) -> str:
     return ", ".join(
-        sorted(f"{one.rule} {one.restriction}" for one in _records_holding_at(lane.access, s))
+        sorted(
+            f"{record.rule} {record.restriction}" for record in _records_holding_at(lane.access, s)
+        )
     )
 
 

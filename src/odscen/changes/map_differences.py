@@ -134,8 +134,8 @@ def _link_between_roads(
 def _name_as_before(pair: RoadPair, number: int, lane: int, side: int, s: float) -> _LinkEnd | None:
     """Lane of one map by its name in the map before; none if only one map has it."""
     for both in pair.stretches[number].pairs:
-        one = both[side]
-        if one is not None and one.id == lane:
+        named = both[side]
+        if named is not None and named.id == lane:
             return None if both[0] is None or both[1] is None else _link_end(pair, both[0].id, s)
     return None
 
@@ -371,18 +371,18 @@ def furniture_differences(old: Road, new: Road) -> Iterator[MapChange]:
     yield from _compare_things(old, new, old.objects, new.objects, _object_name)
 
 
-def _signal_name(one: Any) -> tuple[ChangedThing, str]:
-    return "signal", f"signal {shown_id(one.id)} (type {shown_id(one.type)})"
+def _signal_name(signal: Any) -> tuple[ChangedThing, str]:
+    return "signal", f"signal {shown_id(signal.id)} (type {shown_id(signal.type)})"
 
 
-def _reference_name(one: Any) -> tuple[ChangedThing, str]:
-    return "signal reference", f"reference to signal {shown_id(one.id)}"
+def _reference_name(reference: Any) -> tuple[ChangedThing, str]:
+    return "signal reference", f"reference to signal {shown_id(reference.id)}"
 
 
-def _object_name(one: Any) -> tuple[ChangedThing, str]:
-    if one.type == "crosswalk":
-        return "crosswalk", f"crosswalk {shown_id(one.id)}"
-    return "object", f"object {shown_id(one.id)} ({one.type or 'no type'})"
+def _object_name(item: Any) -> tuple[ChangedThing, str]:
+    if item.type == "crosswalk":
+        return "crosswalk", f"crosswalk {shown_id(item.id)}"
+    return "object", f"object {shown_id(item.id)} ({item.type or 'no type'})"
 
 
 def _compare_things(
@@ -395,22 +395,22 @@ def _compare_things(
     if before == after:
         return
     pairs, gone, came = _pair_things(before, after)
-    for one in gone:
-        what, subject = name(one)
+    for thing in gone:
+        what, subject = name(thing)
         yield MapChange(
-            "removed", what, f"{subject} of {of_road(old.id)}", place=_place_of_thing(old, one)
+            "removed", what, f"{subject} of {of_road(old.id)}", place=_place_of_thing(old, thing)
         )
-    for one in came:
-        what, subject = name(one)
+    for thing in came:
+        what, subject = name(thing)
         yield MapChange(
-            "added", what, f"{subject} of {of_road(new.id)}", place=_place_of_thing(new, one)
+            "added", what, f"{subject} of {of_road(new.id)}", place=_place_of_thing(new, thing)
         )
     for first, second in pairs:
         yield from _compare_fields(old, first, second, name)
 
 
-def _place_of_thing(road: Road, one: Any) -> ChangePlace:
-    return ChangePlace(road.id, one.s, one.s, None, one.t)
+def _place_of_thing(road: Road, thing: Any) -> ChangePlace:
+    return ChangePlace(road.id, thing.s, thing.s, None, thing.t)
 
 
 def _pair_things(
@@ -418,16 +418,16 @@ def _pair_things(
 ) -> tuple[list[tuple[Any, Any]], list[Any], list[Any]]:
     """Pair by id, the nearest first where an id is not unique; then by type and place."""
     pairs: list[tuple[Any, Any]] = []
-    gone = _take_pairs(before, list(after), pairs, key=lambda one: one.id, within=float("inf"))
+    gone = _take_pairs(before, list(after), pairs, key=lambda thing: thing.id, within=float("inf"))
     taken = {id(second) for _, second in pairs}
-    rest = [one for one in after if id(one) not in taken]
+    rest = [thing for thing in after if id(thing) not in taken]
     gone = _take_pairs(gone, rest, pairs, key=_type_and_subtype, within=_NEAR)
     taken = {id(second) for _, second in pairs}
-    return pairs, gone, [one for one in after if id(one) not in taken]
+    return pairs, gone, [thing for thing in after if id(thing) not in taken]
 
 
-def _type_and_subtype(one: Any) -> tuple[str, str]:
-    return getattr(one, "type", one.id), getattr(one, "subtype", "")
+def _type_and_subtype(thing: Any) -> tuple[str, str]:
+    return getattr(thing, "type", thing.id), getattr(thing, "subtype", "")
 
 
 def _take_pairs(
@@ -440,16 +440,16 @@ def _take_pairs(
 ) -> list[Any]:
     """Add pairs of the same key, nearest first; what found no partner is returned."""
     free: dict[Any, list[Any]] = defaultdict(list)
-    for one in after:
-        free[key(one)].append(one)
+    for thing in after:
+        free[key(thing)].append(thing)
     alone = []
-    for one in before:
-        near = min(free[key(one)], key=lambda other: _distance_apart(one, other), default=None)
-        if near is None or _distance_apart(one, near) > within:
-            alone.append(one)
+    for thing in before:
+        near = min(free[key(thing)], key=lambda other: _distance_apart(thing, other), default=None)
+        if near is None or _distance_apart(thing, near) > within:
+            alone.append(thing)
             continue
-        free[key(one)] = [other for other in free[key(one)] if other is not near]
-        pairs.append((one, near))
+        free[key(thing)] = [other for other in free[key(thing)] if other is not near]
+        pairs.append((thing, near))
     return alone
 
 
@@ -464,7 +464,7 @@ def _compare_fields(
     of = f"{subject} of {of_road(road.id)}"
     place = _place_of_thing(road, old)
     if _distance_apart(old, new) > _MOVED:
-        before, after = (f"s {metres(one.s)} m, t {metres(one.t)} m" for one in (old, new))
+        before, after = (f"s {metres(thing.s)} m, t {metres(thing.t)} m" for thing in (old, new))
         yield MapChange("moved", what, of, before, after, place)
     if old.id != new.id:
         yield MapChange("changed", what, f"id of {of}", old.id, new.id, place=place)
@@ -478,9 +478,9 @@ def _compare_fields(
             yield MapChange("changed", what, f"{label} of {of}", *values, place=place)
 
 
-def _field_names(one: Any) -> Sequence[str]:
-    names: Sequence[str] = getattr(one, "_fields", ())
-    return names or [field.name for field in fields(one)]
+def _field_names(thing: Any) -> Sequence[str]:
+    names: Sequence[str] = getattr(thing, "_fields", ())
+    return names or [field.name for field in fields(thing)]
 
 
 def _values_equal(before: Any, after: Any) -> bool:
@@ -489,16 +489,19 @@ def _values_equal(before: Any, after: Any) -> bool:
     return bool(before == after)
 
 
-def _describe_field(one: Any, field: str) -> str:
-    value = getattr(one, field)
-    if field == "value" and value is not None and one.unit in _MS_UNITS:
+def _describe_field(thing: Any, field: str) -> str:
+    value = getattr(thing, field)
+    if field == "value" and value is not None and thing.unit in _MS_UNITS:
         return f"{metres(round(value * 3.6, 2))} km/h"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
         return metres(value)
     if field == "validities":
-        return ", ".join(f"lanes {one.from_lane} to {one.to_lane}" for one in value) or "all lanes"
+        return (
+            ", ".join(f"lanes {thing.from_lane} to {thing.to_lane}" for thing in value)
+            or "all lanes"
+        )
     if isinstance(value, tuple):
         return f"{len(value)}"
     return str(value) if value not in (None, "") else "none"

@@ -81,7 +81,7 @@ def scenario_differences(before: Scenario, after: Scenario) -> tuple[ScenarioCha
     Actors, flows and whatever else has an id are paired by it, so their order is told apart from
     their content.
     """
-    old, new = (one.model_dump(mode="json") for one in (before, after))
+    old, new = (scenario.model_dump(mode="json") for scenario in (before, after))
     return tuple(field_differences(old, new))
 
 
@@ -103,7 +103,7 @@ def _compare_values(old: Any, new: Any, place: tuple[str, ...]) -> Iterator[Scen
     if isinstance(old, dict) and isinstance(new, dict):
         yield from _compare_fields(old, new, place)
     elif isinstance(old, list) and isinstance(new, list):
-        if all(isinstance(one, dict) and "id" in one for one in (*old, *new)):
+        if all(isinstance(item, dict) and "id" in item for item in (*old, *new)):
             yield from _by_id(old, new, place)
         else:
             yield ScenarioChange("changed", place, *_shorten_lists(old, new))
@@ -114,8 +114,8 @@ def _compare_values(old: Any, new: Any, place: tuple[str, ...]) -> Iterator[Scen
 def _by_id(
     old: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]], place: tuple[str, ...]
 ) -> Iterator[ScenarioChange]:
-    was = {one["id"]: one for one in old}
-    now = {one["id"]: one for one in new}
+    was = {part["id"]: part for part in old}
+    now = {part["id"]: part for part in new}
     for key, one in was.items():
         if key in now:
             yield from _compare_fields(one, now[key], (*place, key))
@@ -133,7 +133,7 @@ def _shorten_lists(old: Sequence[Any], new: Sequence[Any]) -> tuple[str, str]:
     said = _format_value(old), _format_value(new)
     if max(map(len, said)) <= _LONGEST:
         return said
-    first, second = (Counter(json.dumps(one) for one in these) for these in (old, new))
+    first, second = (Counter(json.dumps(item) for item in these) for these in (old, new))
     lost, gained = first - second, second - first
     return _describe_count(old, lost), _describe_count(new, gained)
 

@@ -216,7 +216,9 @@ def list_entries(
     document = scenarios.read_scenario(scenario)
     graph = maps.map_of(Workspace.open(workspace), document).sumo.graph
     found = demands.find_entries(document, graph)
-    rows = [(one.segment, one.direction, [lane.lane for lane in one.lanes]) for one in found]
+    rows = [
+        (entry.segment, entry.direction, [lane.lane for lane in entry.lanes]) for entry in found
+    ]
     if as_json:
         keys = ("segment", "direction", "lanes")
         print_json({"entries": [dict(zip(keys, row, strict=True)) for row in rows]})

@@ -66,7 +66,7 @@ def diff_scenarios(
             {
                 "before": str(before),
                 "after": str(after),
-                "changes": [one.to_dict() for one in found],
+                "changes": [difference.to_dict() for difference in found],
             }
         )
     else:
@@ -75,8 +75,8 @@ def diff_scenarios(
 
 
 def _print_differences(found: Sequence[MapChange] | Sequence[ScenarioChange]) -> None:
-    for one in found:
-        typer.echo(one.words)
+    for difference in found:
+        typer.echo(difference.words)
     log(f"{len(found)} differences" if found else "No difference")
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _READ = {name: one for name, one in list_formats().items() if one.read is not None}
 _WRITTEN = {name: one for name, one in list_formats().items() if one.write is not None}
-_LISTED_SUFFIXES = list(dict.fromkeys(end for one in _READ.values() for end in one.suffixes))
+_LISTED_SUFFIXES = list(dict.fromkeys(end for reader in _READ.values() for end in reader.suffixes))
 
 
 class EgoChoice(StrEnum):
@@ -61,7 +61,7 @@ def import_(
     file: Annotated[
         Path,
         typer.Argument(
-            help="; ".join(f"{one.id}: {one.label}" for one in _READ.values()) + ".",
+            help="; ".join(f"{reader.id}: {reader.label}" for reader in _READ.values()) + ".",
             metavar="|".join(f"FILE{end}" for end in _LISTED_SUFFIXES),
         ),
     ],
@@ -147,7 +147,7 @@ def export(
         typer.Option(
             parser=_check_written,
             metavar="|".join(_WRITTEN),
-            help="; ".join(f"{one.id}: {one.label}" for one in _WRITTEN.values()) + ".",
+            help="; ".join(f"{writer.id}: {writer.label}" for writer in _WRITTEN.values()) + ".",
         ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.", metavar="DIR")],

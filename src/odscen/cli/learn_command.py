@@ -54,10 +54,10 @@ def data(
         log(f"{made.file.name}: {made.skipped or f'{made.vehicles} vehicles'}")
 
     made = make_shards(Workspace.open(workspace), maps or [], out, settings=settings, done=done)
-    kept = [one for one in made if one.skipped is None]
-    log(f"{len(kept)} of {len(made)} runs kept, {sum(one.vehicles for one in kept)} vehicles")
+    kept = [shard for shard in made if shard.skipped is None]
+    log(f"{len(kept)} of {len(made)} runs kept, {sum(shard.vehicles for shard in kept)} vehicles")
     if as_json:
-        rows = [one._asdict() | {"file": str(one.file)} for one in made]
+        rows = [shard._asdict() | {"file": str(shard.file)} for shard in made]
         print_json({"runs": rows})
 
 
@@ -138,12 +138,12 @@ def evaluate(
                 told=lambda what: step(what, 0.0),
             )
     if as_json:
-        print_json({"maps": [one.to_dict() for one in found]})
+        print_json({"maps": [quality.to_dict() for quality in found]})
         return
-    for name in dict.fromkeys(one.map_name for one in found):
-        own = [one for one in found if one.map_name == name]
+    for name in dict.fromkeys(quality.map_name for quality in found):
+        own = [quality for quality in found if quality.map_name == name]
         title = f"{name}: {own[0].vehicles:.0f} vehicles in {own[0].scenes} snapshots"
-        print_table(title, ["", *(one.source for one in own)], _quality_rows(own))
+        print_table(title, ["", *(quality.source for quality in own)], _quality_rows(own))
 
 
 @app.command()
@@ -175,18 +175,21 @@ def driver(
     )
     log(f"wrote {out}: {out.stat().st_size:,} bytes")
     if as_json:
-        print_json({"file": str(out), "maps": [one._asdict() for one in found]})
+        print_json({"file": str(out), "maps": [score._asdict() for score in found]})
         return
-    rows = [(one.map_name, one.rows, f"{one.learned:.3f}", f"{one.constant:.3f}") for one in found]
+    rows = [
+        (score.map_name, score.rows, f"{score.learned:.3f}", f"{score.constant:.3f}")
+        for score in found
+    ]
     columns = ("map", "accelerations", "off by, m/s2", "if speeds were kept")
     print_table("root mean square error", columns, rows)
 
 
 def _quality_rows(found: list[TrafficQuality]) -> list[list[str]]:
     return [
-        [column.replace("_", " "), *(_quality_cell(one, column) for one in found)]
+        [column.replace("_", " "), *(_quality_cell(quality, column) for quality in found)]
         for column in _COLUMNS
-        if any(column in one.values for one in found)
+        if any(column in quality.values for quality in found)
     ]
 
 

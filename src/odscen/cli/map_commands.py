@@ -150,7 +150,7 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
     entries, broken = Workspace.open(workspace).catalogue()
     rows = [{**_map_row(entry), "outdated": is_outdated(entry)} for entry in entries]
     if as_json:
-        print_json({"maps": rows, "broken": [asdict(one) for one in broken]})
+        print_json({"maps": rows, "broken": [asdict(broken_map) for broken_map in broken]})
     elif not rows and not broken:
         log("No maps yet. Add one with: odscen maps add FILE.xodr")
     else:
@@ -176,8 +176,8 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
     for row in rows:
         if row["outdated"]:
             log(f"outdated: {row['name']}: an earlier odscen has built it; it is rebuilt when used")
-    for one in broken:
-        log(f"broken: {one.name}: {one.problem}")
+    for broken_map in broken:
+        log(f"broken: {broken_map.name}: {broken_map.problem}")
 
 
 @app.command()
@@ -350,11 +350,16 @@ def _worst_findings(fidelity: Fidelity) -> Iterator[tuple[str, float, float, str
     ):
         for gap in sorted(gaps, key=lambda found: -found.metres)[:_WORST]:
             yield what, gap.x, gap.y, f"{gap.metres:.1f} m of lane {gap.lane}"
-    for one in fidelity.missing[:_WORST]:
-        yield "relation missing", one.x, one.y, f"lane {one.source} to {one.target}"
-    for one in fidelity.invented[:_WORST]:
-        text = f"lane {one.source} to {one.target}, SUMO lanes {one.sumo}"
-        yield "relation invented", one.x, one.y, text
+    for relation in fidelity.missing[:_WORST]:
+        yield (
+            "relation missing",
+            relation.x,
+            relation.y,
+            f"lane {relation.source} to {relation.target}",
+        )
+    for relation in fidelity.invented[:_WORST]:
+        text = f"lane {relation.source} to {relation.target}, SUMO lanes {relation.sumo}"
+        yield "relation invented", relation.x, relation.y, text
     for lost in sorted(fidelity.lost_crosswalks, key=lambda found: found.share)[:_WORST]:
         text = f"road {lost.road}, object {lost.object_id}, {100 * lost.share:.0f} % overlapped"
         yield "crosswalk lost", lost.x, lost.y, text
@@ -376,7 +381,9 @@ def _map_row(entry: MapEntry) -> dict[str, Any]:
 
 
 def _unfaithful(name: str, missed: list[dict[str, Any]]) -> str:
-    limits = "; ".join(f"{one['name']} {one['value']:g}, limit {one['limit']:g}" for one in missed)
+    limits = "; ".join(
+        f"{verdict['name']} {verdict['value']:g}, limit {verdict['limit']:g}" for verdict in missed
+    )
     return (
         f"{name}: warning: its SUMO network does not follow the map within the limits ({limits}); "
         f"odscen maps verify {name} says where"

@@ -148,14 +148,14 @@ def _print_comparison(found: MapComparison) -> None:
     for network in found.networks:
         if network.refused:
             log(f"{network.converter}: {network.refused}")
-    columns = ("measure", *(one.converter for one in made))
+    columns = ("measure", *(network.converter for network in made))
     print_table(found.name, columns, _comparison_rows(made))
     if found.capacity:
         rows = [
             (
                 f"{row.level:g}",
                 what,
-                *(round(getattr(row.networks[one.converter], what), 1) for one in made),
+                *(round(getattr(row.networks[network.converter], what), 1) for network in made),
             )
             for row in found.capacity
             for what in ("planned", "arrived", "delay", "teleported", "collided")
@@ -166,12 +166,12 @@ def _print_comparison(found: MapComparison) -> None:
 
 def _comparison_rows(made: list[ConvertedMap]) -> list[tuple[str, ...]]:
     """Rows of the table of fidelity and sizes."""
-    verdicts = [one.fidelity.verdicts for one in made if one.fidelity is not None]
+    verdicts = [network.fidelity.verdicts for network in made if network.fidelity is not None]
     rows = [
         (of_all[0].name, *(f"{v.value:.4g}{'' if v.ok else ' !'}" for v in of_all))
         for of_all in zip(*verdicts, strict=True)
     ]
-    infos = [one.entry.info for one in made if one.entry is not None]
+    infos = [network.entry.info for network in made if network.entry is not None]
     rows += [
         (f"{key} in SUMO", *(str(info["sumo"][key]) for info in infos))
         for key in ("edges", "lanes", "junctions", "crossings", "tl_logics")

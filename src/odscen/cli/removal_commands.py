@@ -116,8 +116,8 @@ def restore(
 
     basket = Wastebasket(Workspace.open(workspace))
     rows = []
-    for one in [basket.item(item).id for item in items]:
-        item = basket.restore(one)
+    for item_id in [basket.item(item).id for item in items]:
+        item = basket.restore(item_id)
         rows.append(_wastebasket_row(item))
         log(f"Restored {item.kind} {item.name}")
     if as_json:
@@ -141,12 +141,14 @@ def empty(
     basket = Wastebasket(Workspace.open(workspace))
     chosen = [basket.item(item) for item in items] if items else basket.items()
     if chosen:
-        _ask_before_removal(f"Delete {', '.join(one.name for one in chosen)} for good?", yes=yes)
-    for one in chosen:
-        basket.delete(one.id)
-        log(f"Deleted {one.kind} {one.name}")
+        _ask_before_removal(
+            f"Delete {', '.join(removed.name for removed in chosen)} for good?", yes=yes
+        )
+    for removed in chosen:
+        basket.delete(removed.id)
+        log(f"Deleted {removed.kind} {removed.name}")
     if as_json:
-        print_json({"deleted": [_wastebasket_row(one) for one in chosen]})
+        print_json({"deleted": [_wastebasket_row(removed) for removed in chosen]})
 
 
 def _ask_before_removal(question: str, *, yes: bool) -> None:

@@ -71,12 +71,12 @@ def new(
 def _list_templates(*, as_json: bool) -> None:
     from odscen.scenario.templates.template_registry import TEMPLATES
 
-    for one in TEMPLATES.values():
-        log(f"{one.name}: {one.summary} Needs {one.needs}.")
-        for number in one.parameters:
+    for template in TEMPLATES.values():
+        log(f"{template.name}: {template.summary} Needs {template.needs}.")
+        for number in template.parameters:
             log(f"    {_describe_number(number)}")
     if as_json:
-        print_json({"templates": [_template_fields(one) for one in TEMPLATES.values()]})
+        print_json({"templates": [_template_fields(template) for template in TEMPLATES.values()]})
 
 
 def _describe_number(number: TemplateParameter) -> str:

@@ -298,7 +298,7 @@ class DaskExecutor:
 
     def _count_outcomes(self, found: list[Outcome]) -> None:
         self._runs += len(found)
-        self._spent += sum(float(one.row.get("seconds", 0.0)) for one in found)
+        self._spent += sum(float(outcome.row.get("seconds", 0.0)) for outcome in found)
 
 
 def _make_client(scheduler: str | None) -> Client:

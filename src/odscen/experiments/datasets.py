@@ -372,9 +372,9 @@ def _describe_making(plan: DatasetPlan) -> str:
     study = plan.study
     seeds = f"{len(study.seeds)} seeds ({study.seeds[0]} to {study.seeds[-1]}) of each scenario"
     sampled = [
-        f"- {one.count} sampled scenarios on each map of {', '.join(one.maps)}, seeds from "
-        f"{one.seed} on"
-        for one in study.sample
+        f"- {sampling.count} sampled scenarios on each map of {', '.join(sampling.maps)}, "
+        f"seeds from {sampling.seed} on"
+        for sampling in study.sample
     ]
     files = [f"- scenarios {', '.join(study.scenarios)}"] if study.scenarios else []
     variants = [f"- variants {', '.join(study.variant_names)}"] if study.variant else []
@@ -515,7 +515,9 @@ def _finish_dataset(
     staged = out / STAGED_FOLDER
     if not (out / CARD_FILE).is_file():
         for split in plan.splits:
-            runs = [folder_name(one) for one in table.filter(pl.col("split") == split)["run"]]
+            runs = [
+                folder_name(run_name) for run_name in table.filter(pl.col("split") == split)["run"]
+            ]
             for form in plan.formats:
                 folder = out / split / form
                 shutil.rmtree(folder, ignore_errors=True)

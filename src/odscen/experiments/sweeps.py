@@ -504,7 +504,7 @@ def sweep(
                 file = out / "cases" / f"{run.name}{SUFFIX}"
                 options = {"version": settings.openscenario}
                 written = export(workspace, file, out / "cases", to="openscenario", options=options)
-                seal_files(out, [f"cases/{one.name}" for one in written])
+                seal_files(out, [f"cases/{source.name}" for source in written])
         return write_table(out, scenario, plan, rows=runs.rows(cases), limits=runs.limits)
 
 

@@ -160,11 +160,11 @@ def hold_against(
         tolerances, _share_false_alarms(compared, tolerances, detect), detect, better_fails
     )
     changes = []
-    for one in compared:
-        tolerance = tolerances.of(one.key)
-        if baseline.by_scatter and (one.key.kind, one.key.figure) not in tolerances.given:
-            tolerance = limits.by_scatter(one, tolerance)
-        change = _judge_change(one, tolerance, tolerances, by_scatter=baseline.by_scatter)
+    for figure in compared:
+        tolerance = tolerances.of(figure.key)
+        if baseline.by_scatter and (figure.key.kind, figure.key.figure) not in tolerances.given:
+            tolerance = limits.by_scatter(figure, tolerance)
+        change = _judge_change(figure, tolerance, tolerances, by_scatter=baseline.by_scatter)
         if change is not None:
             if better_fails and change.effect is Effect.BETTER:
                 change = replace(change, effect=Effect.FAILS)
@@ -205,11 +205,11 @@ def _compare_seeds(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Co
             new = {seed: value or 0.0 for seed, value in new.items()}
         compared.append(_Compared(key, old, new, 1.0))
     passed = {
-        one.key: tuple(_mean_count(side) for side in (one.old, one.new))
-        for one in compared
-        if one.key.figure == "vehicles"
+        figure.key: tuple(_mean_count(side) for side in (figure.old, figure.new))
+        for figure in compared
+        if figure.key.figure == "vehicles"
     }
-    return [one._replace(weight=_count_vehicles(one.key, passed)) for one in compared]
+    return [figure._replace(weight=_count_vehicles(figure.key, passed)) for figure in compared]
 
 
 def _share_false_alarms(
@@ -217,11 +217,11 @@ def _share_false_alarms(
 ) -> Level:
     """Share out false alarms among the figures that can fail by scatter."""
     run = places = 0
-    for one in compared:
-        if (one.key.kind, one.key.figure) in tolerances.given or one.key.kind == "actor":
+    for figure in compared:
+        if (figure.key.kind, figure.key.figure) in tolerances.given or figure.key.kind == "actor":
             continue
-        run += one.key.kind == "run" and not (detect is not None and one.key == detect.key)
-        places += one.key.kind != "run" and one.weight >= FEWEST
+        run += figure.key.kind == "run" and not (detect is not None and figure.key == detect.key)
+        places += figure.key.kind != "run" and figure.weight >= FEWEST
     return Level.shared(run=run, places=places, watched=detect is not None)
 
 

@@ -297,10 +297,10 @@ def _export_run(
     from odscen.app.exchange.exports import export_run
 
     found = {}
-    for one in formats:
+    for form in formats:
         with scratch_folder() as folder:
-            files = export_run(workspace, result.folder, folder, to=one)
-            found[one] = {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
+            files = export_run(workspace, result.folder, folder, to=form)
+            found[form] = {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
     return found
 
 

@@ -97,16 +97,16 @@ def format_of_file(file: str) -> Format:
     InputError
         If none has its ending, or several.
     """
-    readable = [one for one in list_formats().values() if one.read is not None]
+    readable = [form for form in list_formats().values() if form.read is not None]
     endings = {
-        one.id: max((len(end) for end in one.suffixes if file.lower().endswith(end)), default=0)
-        for one in readable
+        form.id: max((len(end) for end in form.suffixes if file.lower().endswith(end)), default=0)
+        for form in readable
     }
     longest = max(endings.values())
-    fitting = [one for one in readable if endings[one.id] == longest]
+    fitting = [form for form in readable if endings[form.id] == longest]
     if longest and len(fitting) == 1:
         return fitting[0]
-    named = ", ".join(f"{one.id} ({', '.join(one.suffixes)})" for one in fitting)
+    named = ", ".join(f"{form.id} ({', '.join(form.suffixes)})" for form in fitting)
     raise InputError(
         f"its ending is of several formats; name one of them: {named}"
         if longest

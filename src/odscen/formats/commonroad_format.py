@@ -168,7 +168,7 @@ def _write_lanelets(
                 _write_bound("leftBound", lane.left),
                 _write_bound("rightBound", lane.right),
                 *(f'<predecessor ref="{ids.lanes + entry}"/>' for entry in lane.entries),
-                *(f'<successor ref="{ids.lanes + one}"/>' for one in lane.exits),
+                *(f'<successor ref="{ids.lanes + number}"/>' for number in lane.exits),
                 _write_adjacent("adjacentLeft", lane, lane.left_lane, ids, beyond=lane.keeps_right),
                 _write_adjacent(
                     "adjacentRight", lane, lane.right_lane, ids, beyond=not lane.keeps_right
@@ -177,7 +177,7 @@ def _write_lanelets(
                 f"<laneletType>{_lanelet_type(lane)}</laneletType>",
                 "<userOneWay>vehicle</userOneWay>",
                 "" if sign is None else f'<trafficSignRef ref="{sign}"/>',
-                *(f'<trafficLightRef ref="{one}"/>' for one in own),
+                *(f'<trafficLightRef ref="{number}"/>' for number in own),
                 "</lanelet>",
             ]
         )

@@ -168,7 +168,9 @@ def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) ->
     given = {
         "seed": scenario.seed > 0,
         "roi": set(scenario.roi) != every,
-        "drivers": [one.model_dump(exclude_unset=True) for one in scenario.drivers.sets]
+        "drivers": [
+            driver_set.model_dump(exclude_unset=True) for driver_set in scenario.drivers.sets
+        ]
         not in ([], [STEADY_DRIVER]),
         "simulation": scenario.simulation != usual,
         "variant": scenario.variant is not None,

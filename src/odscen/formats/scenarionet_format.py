@@ -155,7 +155,7 @@ def _describe_lights(recording: RunRecording) -> dict[str, Any]:
             "type": "TRAFFIC_LIGHT",
             "lane": name,
             "stop_point": stop,
-            "state": {"object_state": [_STATES[one] for one in signals.color[row].tolist()]},
+            "state": {"object_state": [_STATES[color] for color in signals.color[row].tolist()]},
             "metadata": {
                 "type": "TRAFFIC_LIGHT",
                 "object_id": name,
@@ -239,8 +239,10 @@ def _count_objects(recording: RunRecording) -> dict[str, Any]:
         "num_objects_each_type": {kind: kinds.count(kind) for kind in sorted(set(kinds))},
         "num_moving_objects": sum(moving),
         "num_moving_objects_each_type": {
-            one: sum(here and kind == one for kind, here in zip(kinds, moving, strict=True))
-            for one in sorted(set(kinds))
+            object_type: sum(
+                here and kind == object_type for kind, here in zip(kinds, moving, strict=True)
+            )
+            for object_type in sorted(set(kinds))
         },
         "num_traffic_lights": len(recording.signals.lane),
         "num_map_features": sum(

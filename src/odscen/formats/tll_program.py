@@ -175,7 +175,9 @@ class _Taking:
             if yellow is not None and yellow != known:
                 group["yellow"] = yellow
             covered = {
-                n for one in group["movements"] for n in find_movements(one, self._light.movements)
+                n
+                for movement in group["movements"]
+                for n in find_movements(movement, self._light.movements)
             }
             if covered != set(links):
                 raise InputError(
@@ -383,7 +385,7 @@ def _fit_row(
     wanted: float,
 ) -> bool:
     """Change a row so that a group ends as it does in the file; whether that was needed."""
-    needs = {one: program.intergreen(name, one) for one in beginning}
+    needs = {follower: program.intergreen(name, follower) for follower in beginning}
     longest = max(needs.values(), default=0.0)
     if longest == wanted or (not longest and program.groups[name].yellow == wanted):
         return False
@@ -394,6 +396,8 @@ def _fit_row(
             if seconds > wanted:
                 rows[name, one] = wanted
     else:
-        meeting = [one for one in beginning if program.needed(name, one)[0]] or list(beginning)
+        meeting = [follower for follower in beginning if program.needed(name, follower)[0]] or list(
+            beginning
+        )
         rows[name, meeting[0]] = wanted
     return True

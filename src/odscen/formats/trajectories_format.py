@@ -150,10 +150,10 @@ def _headings_of_motion(rows: Sequence[tuple[float, ...]]) -> list[float]:
         if math.hypot(dx, dy) >= _MOVED:
             found[before] = math.atan2(dy, dx)
             before = index
-    first = next((one for one in found if one is not None), 0.0)
+    first = next((heading for heading in found if heading is not None), 0.0)
     last, headings = first, []
-    for one in found:
-        last = last if one is None else one
+    for heading in found:
+        last = last if heading is None else heading
         headings.append(last)
     return headings
 

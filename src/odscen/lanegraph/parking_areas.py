@@ -117,7 +117,7 @@ def map_parking(
     unreached = 0
     for outline in spaces:
         places = list(_places_of(outline))
-        found = [one for place in places if (one := beside.lane_of(place)) is not None]
+        found = [parking for place in places if (parking := beside.lane_of(place)) is not None]
         reached += found
         unreached += max(len(places), 1) - len(found)
     for outline in strips:
@@ -296,12 +296,12 @@ def _group_places(lanes: LaneGraph, reached: Sequence[_Reached]) -> Iterator[Par
     )
     group: list[_Reached] = []
     number = 0
-    for one in ordered:
-        if group and not _belong_together(lanes, group, one):
+    for reached_place in ordered:
+        if group and not _belong_together(lanes, group, reached_place):
             number += 1
             yield _make_area(number, group)
             group = []
-        group.append(one)
+        group.append(reached_place)
     if group:
         yield _make_area(number + 1, group)
 

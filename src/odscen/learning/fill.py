@@ -462,7 +462,9 @@ class _FillCheck:
         away = np.hypot(graph.x - graph.x[node], graph.y - graph.y[node])
         near = np.flatnonzero(self._request.allowed[category] & (away <= MOST_MOVED))
         ordered = near[np.lexsort((near, away[near]))].tolist()
-        return next((one for one in ordered if not self._is_taken(one, category)), None)
+        return next(
+            (node_near for node_near in ordered if not self._is_taken(node_near, category)), None
+        )
 
     def _is_taken(self, node: int, category: Category) -> bool:
         return not self._crowd.is_free(self._body_box(node, category))

@@ -246,7 +246,7 @@ def scene_features(lanes: LaneGraph, site: Site, scene: TrafficScene) -> Vehicle
 
 def together(rows: Sequence[VehicleRows]) -> VehicleRows:
     """Rows of several scenes as one."""
-    return VehicleRows(*(np.concatenate(one) for one in zip(*rows, strict=True)))
+    return VehicleRows(*(np.concatenate(arrays) for arrays in zip(*rows, strict=True)))
 
 
 def frechet_distance(reference: FloatArray, other: FloatArray) -> float:
@@ -368,7 +368,7 @@ def interval(
     found = []
     for _ in range(draws):
         chosen = rng.integers(len(members), size=len(members))
-        found.append(measure([place for one in chosen for place in members[one]]))
+        found.append(measure([place for drawn in chosen for place in members[drawn]]))
     low, high = np.nanquantile(found, [(1 - level) / 2, (1 + level) / 2]).tolist()
     return float(low), float(high)
 

@@ -132,7 +132,7 @@ def _place(link: RoadLink | None) -> tuple[str, str]:
 
 def _fitted(road: Road, length: float) -> Road:
     """The road with a length, its plan view cut there or led straight on to there."""
-    geometry = [one for one in road.geometry if one.s < length]
+    geometry = [geometry for geometry in road.geometry if geometry.s < length]
     last = geometry[-1]
     if last.s + last.length > length:
         geometry[-1] = _shortened(last, length - last.s)

@@ -193,10 +193,10 @@ def _read_light(data: dict[str, object]) -> LightProgram:
     light = json.loads(json.dumps(data), object_hook=_lists_to_tuples)
     groups = tuple(ShownGroup(**group) for group in light.pop("groups"))
     plans = tuple(
-        ShownPlan(**{**plan, "phases": tuple(ProgramPhase(*one) for one in plan["phases"])})
+        ShownPlan(**{**plan, "phases": tuple(ProgramPhase(*part) for part in plan["phases"])})
         for plan in light.pop("plans")
     )
-    detectors = tuple(ShownDetector(**one) for one in light.pop("detectors"))
+    detectors = tuple(ShownDetector(**part) for part in light.pop("detectors"))
     return LightProgram(**light, groups=groups, plans=plans, detectors=detectors)
 
 

@@ -105,7 +105,10 @@ class Runs:
             )
         with self._lock:
             self._refuse_more()
-            if wish.carla and any(one.carla and one.ended is None for one in self._active.values()):
+            if wish.carla and any(
+                active_run.carla and active_run.ended is None
+                for active_run in self._active.values()
+            ):
                 raise ConflictError(
                     "CARLA shows another run already; stop that one, or wait for its end"
                 )
@@ -308,21 +311,25 @@ class Runs:
     def close(self) -> None:
         """Stop everything that is going on; what does not stop in time is ended."""
         with self._lock:
-            going = [one for one in self._active.values() if one.ended is None]
+            going = [
+                run_under_way
+                for run_under_way in self._active.values()
+                if run_under_way.ended is None
+            ]
         self._pool.shutdown(wait=False, cancel_futures=True)
-        for one in going:
-            if one.long:  # can go on when there is a server again
-                one.live.kill()
-            one.live.command(Command("stop"))
-        for one in going:
+        for run_under_way in going:
+            if run_under_way.long:  # can go on when there is a server again
+                run_under_way.live.kill()
+            run_under_way.live.command(Command("stop"))
+        for run_under_way in going:
             try:
-                one.future.exception(timeout=PATIENCE)
+                run_under_way.future.exception(timeout=PATIENCE)
             except TimeoutError:
-                one.live.kill()
+                run_under_way.live.kill()
         with self._lock:
             known = list(self._active.values())
-        for one in known:
-            one.forget()
+        for run_under_way in known:
+            run_under_way.forget()
 
     def _run_to_end(
         self, active: Active, simulate: Callable[[], tuple[RunState, str | None]]
@@ -371,7 +378,7 @@ class Runs:
         return _end_of(resume(self._workspace, folder, live=active.live), active)
 
     def _refuse_more(self) -> None:
-        if sum(one.ended is None for one in self._active.values()) >= MOST:
+        if sum(active_run.ended is None for active_run in self._active.values()) >= MOST:
             raise ConflictError(f"{MOST} runs are under way; stop one, or wait for the end of one")
 
     def _mirror_run(

@@ -88,9 +88,9 @@ def add_error_handlers(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     def invalid(_request: Request, error: RequestValidationError) -> Response:
         problems = []
-        for one in error.errors():
-            place = ".".join(str(step) for step in one["loc"])
-            problems.append(f"{place}: {one['msg']}")
+        for problem in error.errors():
+            place = ".".join(str(step) for step in problem["loc"])
+            problems.append(f"{place}: {problem['msg']}")
         return error_response(422, "InvalidRequest", problems[0], problems)
 
     @app.exception_handler(HTTPException)

@@ -192,7 +192,9 @@ class LiveView:
         if len(incidents) > self._incidents:
             new = incidents[self._incidents :]
             self._incidents += len(new)
-            await self._send_message(LiveIncidents(events=[IncidentInfo(**one) for one in new]))
+            await self._send_message(
+                LiveIncidents(events=[IncidentInfo(**incident) for incident in new])
+            )
 
     async def _report_detectors(self) -> None:
         now, said = self._run.live.detectors, self._detectors

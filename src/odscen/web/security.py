@@ -113,7 +113,10 @@ class Guard:
         if cookie is not None:
             shown.append(cookie.value)
         token = (self._token or "").encode()
-        return any(hmac.compare_digest(one.encode("utf-8", "replace"), token) for one in shown)
+        return any(
+            hmac.compare_digest(shown_token.encode("utf-8", "replace"), token)
+            for shown_token in shown
+        )
 
     async def _limit_body(
         self, headers: Headers, scope: Scope, receive: Receive, send: Send

@@ -179,7 +179,7 @@ def add_input(
     """
     if name is None:
         taken = {part.id for _, part in scenario.demand.parts}
-        name = next(one for n in count(1) if (one := f"input-{n}") not in taken)
+        name = next(input_id for n in count(1) if (input_id := f"input-{n}") not in taken)
     graph = map_of(workspace, scenario).sumo.graph
     return edits.set_input(scenario, graph, inflow=name, **fields)
 

@@ -98,7 +98,7 @@ def read_sent_scenario(
         )
         for file in files
     ]
-    stories = [one for one in named if not _is_map(one.name)]
+    stories = [sent for sent in named if not _is_map(sent.name)]
     if not stories:
         raise InputError(f"no {chosen.title} file ({' or '.join(chosen.suffixes[:1])}) was sent")
     if len(named) > _MOST_FILES:
@@ -160,14 +160,14 @@ def _settle_map(
         raise InputError(
             "it names no map (RoadNetwork/LogicFile): send one map together with it", file=file
         )
-    for one in maps:
-        if bare_map_name(one.name).lower() == bare.lower():
-            return _known_or_added(workspace, one, progress)
+    for sent_map in maps:
+        if bare_map_name(sent_map.name).lower() == bare.lower():
+            return _known_or_added(workspace, sent_map, progress)
     names = workspace.map_names()
     for name in (bare, name_from_file(Path(f"{bare}.xodr"))):
         if name in names:
             return workspace.map(name), False
-    sent = ", ".join(one.name for one in maps)
+    sent = ", ".join(sent_map.name for sent_map in maps)
     others = f" What was sent is {sent}." if sent else ""
     raise InputError(
         f"it plays on the map {bare + '.xodr'!r}, which is neither among the files nor in the "

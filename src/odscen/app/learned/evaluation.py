@@ -132,7 +132,7 @@ def evaluate_model(
         Of the bootstrap for the intervals.
     """
     towns = {shard.town for shard in shards}
-    known = [one for one in others if one.town not in towns]
+    known = [place for place in others if place.town not in towns]
     count = known if baselines else []
     statistics = binned_statistics(examples_of(workspace, count)) if count else None
     generator = ReferenceGenerator(model)
@@ -142,7 +142,7 @@ def evaluate_model(
 
     def by_bins(on: WholeMap, request: FillRequest, rng: np.random.Generator) -> Fill:
         assert statistics is not None
-        lengths = np.array([request.bodies[one].length for one in VEHICLES])
+        lengths = np.array([request.bodies[category].length for category in VEHICLES])
         site, allowed = on.learned.site, on.learned.allowed
         found = place_binned(
             statistics, site, request.lights, allowed,
@@ -196,7 +196,9 @@ def evaluate_scenarios(
         compared = _ComparedMap(on, scenes_of(workspace, mine), workspace)
         own = [scenario for scenario in scenarios if scenario.map.name == name]
         lights = lights_at_start(on.loaded.sumo)
-        scenes, off = zip(*(scene_of_scenario(on, one, lights) for one in own), strict=True)
+        scenes, off = zip(
+            *(scene_of_scenario(on, scenario, lights) for scenario in own), strict=True
+        )
         made = _MadeTraffic(list(scenes), float(np.mean(off)), own)
         found += [compared.floor(mine), compared.quality(folder.name, made, run=run)]
     return found

@@ -84,7 +84,7 @@ def learn_driving(
         if told is not None:
             told(f"{name}: {sum(len(x) for x, _ in recorded[name]):,} seen")
     kept = [name for name in maps if town_of(name) not in hold_out]
-    rows = [one for name in kept for one in recorded[name] if len(one[0])]
+    rows = [arrays for name in kept for arrays in recorded[name] if len(arrays[0])]
     if not rows:
         raise InputError(
             "nothing is left to learn from: no maps, or all are held out", element="hold-out"
@@ -96,7 +96,7 @@ def learn_driving(
     measured = [name for name in maps if name not in kept] or kept
     found = []
     for name in measured:
-        x, acceleration = (np.concatenate([one[k] for one in recorded[name]]) for k in (0, 1))
+        x, acceleration = (np.concatenate([arrays[k] for arrays in recorded[name]]) for k in (0, 1))
         guess = softmax(network(x)) @ BINS
         found.append(
             DrivingError(

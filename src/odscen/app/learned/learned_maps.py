@@ -72,7 +72,7 @@ def whole_map(entry: MapEntry) -> WholeMap:
     region = Region.of(graph, connected_segments(graph))
     places = wanted_crew(region, SamplingConfig(), loaded.usable, fill=0.5).road_places
     none = np.zeros(len(graph.lanes.x), dtype=np.bool_)
-    allowed = np.stack([places.allowed.get(one, none) for one in VEHICLES])
+    allowed = np.stack([places.allowed.get(category, none) for category in VEHICLES])
     learned = LearnedMap(site_of(graph.lanes, graph.walks), allowed, graph.lanes.spacing)
     return WholeMap(loaded, region, places, learned)
 

@@ -279,7 +279,11 @@ def _judge_run(
     """Why a run is left out, or its snapshots."""
     if run.exit_code == 3:
         return f"the run has failed: {run.known.get('error')}", ()
-    bad = [one["words"] for one in run.usability.get("reasons", ()) if one["kind"] == "gridlock"]
+    bad = [
+        reason["words"]
+        for reason in run.usability.get("reasons", ())
+        if reason["kind"] == "gridlock"
+    ]
     if bad:
         return f"gridlocked: {bad[0]}", ()
     if run.counts["teleported"] > 0.02 * max(run.counts["inserted"], 1):
@@ -336,7 +340,7 @@ def _build_node_tree(loaded: LoadedMap) -> Any:
 
 def _stack_poses(of: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Places in which headings count as metres, ``(N, 4)``."""
-    x, y, hdg = (np.asarray(one, dtype=np.float64) for one in (of.x, of.y, of.hdg))
+    x, y, hdg = (np.asarray(column, dtype=np.float64) for column in (of.x, of.y, of.hdg))
     return np.column_stack([x, y, _HEADING * np.cos(hdg), _HEADING * np.sin(hdg)])
 
 
@@ -353,8 +357,8 @@ def _make_snapshot(rows: pl.DataFrame, time: float, tree: Any, lights: LightView
     points = _stack_poses(_PlacedBodies(near["x"], near["y"], near["hdg"]))
     far, node = tree.query(points) if len(points) else (np.empty(0), np.empty(0, dtype=np.int64))
     good = far < OFF_NODE
-    names = [str(one) for one in Category]
-    category = np.array([names.index(one) for one in near["category"]], dtype=np.int64)
+    names = [str(category) for category in Category]
+    category = np.array([names.index(category) for category in near["category"]], dtype=np.int64)
     braking = braking_of(rows, time, near["id"].to_list())
     speed = near["speed"].to_numpy().astype(np.float64)
     return Snapshot(node[good].astype(np.int64), category[good], speed[good], braking[good], lights)
@@ -376,7 +380,7 @@ def braking_of(rows: pl.DataFrame, time: float, ids: Sequence[str]) -> Any:
         .agg(pl.col("braking").max())
     )
     found = dict(zip(strongest["id"].to_list(), strongest["braking"].to_list(), strict=True))
-    values = [found.get(one) for one in ids]
+    values = [found.get(vehicle) for vehicle in ids]
     return np.array(
         [np.nan if value is None else max(value, 0.0) for value in values], dtype=np.float64
     )

@@ -71,7 +71,9 @@ def _repair_files(
 ) -> RepairStep:
     with run_lock(run):
         try:
-            done = [_rebuild_file(workspace, run, one) for one in _in_order(damaged)]
+            done = [
+                _rebuild_file(workspace, run, damaged_file) for damaged_file in _in_order(damaged)
+            ]
             if left := _list_damage(run):
                 raise InputError(f"still: {listed(left)}")
         except (OdscenError, ValueError, KeyError) as error:
@@ -84,11 +86,15 @@ def _repair_files(
 
 def _in_order(damaged: Sequence[DamagedFile]) -> list[DamagedFile]:
     """The list of checksums first, as others are compared with it; the report last."""
-    if any(one.file == SUMS_FILE for one in damaged):
-        return [one for one in damaged if one.file == SUMS_FILE]
-    figures = [one for one in damaged if _is_figures(one.file)][:1]  # all are written at once
-    others = [one for one in damaged if not _is_figures(one.file)]
-    return sorted([*others, *figures], key=lambda one: one.file == layout.REPORT_FILE)
+    if any(damaged_file.file == SUMS_FILE for damaged_file in damaged):
+        return [damaged_file for damaged_file in damaged if damaged_file.file == SUMS_FILE]
+    figures = [damaged_file for damaged_file in damaged if _is_figures(damaged_file.file)][
+        :1
+    ]  # all are written at once
+    others = [damaged_file for damaged_file in damaged if not _is_figures(damaged_file.file)]
+    return sorted(
+        [*others, *figures], key=lambda damaged_file: damaged_file.file == layout.REPORT_FILE
+    )
 
 
 def _rebuild_file(workspace: Workspace, run: Path, damaged_file: DamagedFile) -> str:

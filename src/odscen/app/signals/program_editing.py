@@ -62,7 +62,7 @@ def stretch_cycle(
     (number,) = chosen_lights(loaded, (junction,))
     shown = realized_lights(scenario, loaded.sumo, until=_DAY)[number].shown
     if plan is not None:
-        own = [one for one in shown.plans if one.id == plan]
+        own = [day_plan for day_plan in shown.plans if day_plan.id == plan]
         if not own:
             raise NotFoundError("plan of the day", plan, [plan.id for plan in shown.plans])
         shown = replace(shown, plans=tuple(own))
@@ -102,7 +102,9 @@ def take_over_program(workspace: Workspace, scenario: Scenario | Path, junction:
     # With fixed-time control every stage comes, and lasts its green.
     fixed = old.model_copy(update={"control": "fixed", "bus_priority": False, "detectors": ()})
     plain = with_timings(scenario, [fixed])
-    shown, was = (realized_lights(one, loaded.sumo)[number].shown for one in (plain, scenario))
+    shown, was = (
+        realized_lights(document, loaded.sumo)[number].shown for document in (plain, scenario)
+    )
     new = with_timings(scenario, [_own_program(shown, was, old)])
     refuse_errors(signal_problems(new.signals, loaded.lights))
     return new

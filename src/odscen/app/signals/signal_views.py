@@ -60,14 +60,14 @@ def chosen_lights(
         If one of the names is of no light.
     """
     known = tuple(lights)
-    named = {name: one for one in known for name in (one.id, *one.junctions)}
+    named = {name: light for light in known for name in (light.id, *light.junctions)}
     for junction in junctions:
         if junction not in named:
             raise NotFoundError(
-                "traffic light in junction", junction, [one.junctions[0] for one in known]
+                "traffic light in junction", junction, [light.junctions[0] for light in known]
             )
     chosen = {named[junction].id for junction in junctions}
-    return tuple(one for one in known if not chosen or one.id in chosen)
+    return tuple(light for light in known if not chosen or light.id in chosen)
 
 
 def signal_sheets(
@@ -180,6 +180,6 @@ def detector_lanes(loaded: LoadedMap, junction: str) -> tuple[DetectorLane, ...]
     for light, view in zip(loaded.sumo.lights, loaded.lights, strict=True):
         if junction in view.names:
             for n, line in lane_lines(light, loaded.sumo, DETECTABLE).items():
-                one = view.movements[n]
-                found.append(DetectorLane(one.lanes[0], one.approach, line))
+                movement = view.movements[n]
+                found.append(DetectorLane(movement.lanes[0], movement.approach, line))
     return tuple(found)

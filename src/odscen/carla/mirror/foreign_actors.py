@@ -98,7 +98,7 @@ class ForeignActors:
         now = float(snapshot.timestamp.elapsed_seconds)
         passed = now - self._time if self._time is not None else 0.0
         users, places = [], {}
-        for actor in sorted(there, key=lambda one: one.id):
+        for actor in sorted(there, key=lambda actor: actor.id):
             known = self._known[actor.id]
             if known is not None:
                 user, place = self._describe_user(actor, known, passed)

@@ -115,7 +115,9 @@ class WalkingGround:
         known = [self._cells.get(cell) for cell in self._cells_of_places(x, y, near, here.kind)]
         rise = np.where(here.kind == self._now.kind[rows], self._now.rise[rows], np.nan)
         rise = np.where(np.isnan(rise), self._usual_heights(here.kind), rise)
-        rise = np.where([one is None for one in known], rise, np.array(known, dtype=np.float64))
+        rise = np.where(
+            [height is None for height in known], rise, np.array(known, dtype=np.float64)
+        )
         stand = self._now.then(rows, np.stack([x, y, here.z, rise]), here.kind)
         self._last, self._now = self._now, stand
         z = step.z.copy()

@@ -103,8 +103,8 @@ def native_actors(scenario: Scenario, graph: MapGraph, plan: Plan) -> tuple[Nati
         if len(nodes) > 1:
             make = _plan_walker if user.person else _plan_driver
             kind = kind_of(user, scenario.drivers, scenario.seed)
-            one = make(row, user, planned, graph, nodes)
-            actors.append(replace(one, gap=_following_distance(kind, user.category)))
+            planned_actor = make(row, user, planned, graph, nodes)
+            actors.append(replace(planned_actor, gap=_following_distance(kind, user.category)))
     return tuple(actors)
 
 

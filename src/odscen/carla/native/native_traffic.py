@@ -157,9 +157,9 @@ class Traffic:
         self._server.tick()
         snapshot = self._server.world.get_snapshot()
         self._start_controllers()
-        for one in new:
-            happened.events.append(self._departure_event(one, snapshot, time))
-            self._hand_over(one)
+        for driven in new:
+            happened.events.append(self._departure_event(driven, snapshot, time))
+            self._hand_over(driven)
         self._follow_actors(snapshot, time + delta, happened)
         return happened
 
@@ -191,15 +191,15 @@ class Traffic:
 
         To end it here is to wait for its thread, which may have missed the call that ends it.
         """
-        for one in self._underway.values():
-            self._let_go(one)
+        for driven in self._underway.values():
+            self._let_go(driven)
         self._destroy_actors(list(self._underway.values()))
         self._underway.clear()
 
     # ------------------------------------------------------------------------------- coming
     def _spawn_due(self, time: float) -> list[_Underway]:
         new = [_Underway(actor, number, time) for actor, number in self._queue.spawn_due(time)]
-        self._underway |= {one.plan.row: one for one in new}
+        self._underway |= {driven.plan.row: driven for driven in new}
         return new
 
     def _departure_event(self, underway: _Underway, snapshot: Any, time: float) -> Event:
@@ -256,33 +256,33 @@ class Traffic:
 
     def _start_controllers(self) -> None:
         """Start the controllers that were made before the last tick."""
-        for one in self._starting:
-            if one.plan.row in self._underway:
-                one.controller = self._server.world.get_actor(one.guide)
-                one.controller.start()
-                one.controller.go_to_location(self._carla_location(one.plan.route[-1]))
-                one.controller.set_max_speed(float(one.plan.speed[0]))
+        for driven in self._starting:
+            if driven.plan.row in self._underway:
+                driven.controller = self._server.world.get_actor(driven.guide)
+                driven.controller.start()
+                driven.controller.go_to_location(self._carla_location(driven.plan.route[-1]))
+                driven.controller.set_max_speed(float(driven.plan.speed[0]))
         self._starting.clear()
 
     # ------------------------------------------------------------------------------- under way
     def _follow_actors(self, snapshot: Any, time: float, happened: Happened) -> None:
         gone = []
-        for one in self._underway.values():
-            state = snapshot.find(one.number)
+        for driven in self._underway.values():
+            state = snapshot.find(driven.number)
             if state is None:
-                if self._report_vanished(one, time, happened):
-                    gone.append(one)
+                if self._report_vanished(driven, time, happened):
+                    gone.append(driven)
                 continue
-            left = self._advance_on_route(one, _pose_of_state(state), happened)
+            left = self._advance_on_route(driven, _pose_of_state(state), happened)
             if left <= ARRIVED:
-                gone.append(one)
-                happened.events.append(_arrival_event(one, time))
-            elif not one.plan.person:
-                self._set_speed(one)
-                self._change_lane(one)
-        for one in gone:
-            del self._underway[one.plan.row]
-            self._let_go(one)
+                gone.append(driven)
+                happened.events.append(_arrival_event(driven, time))
+            elif not driven.plan.person:
+                self._set_speed(driven)
+                self._change_lane(driven)
+        for driven in gone:
+            del self._underway[driven.plan.row]
+            self._let_go(driven)
         self._destroy_actors(gone)
 
     def _advance_on_route(self, underway: _Underway, pose: XodrPose, happened: Happened) -> float:
@@ -332,19 +332,19 @@ class Traffic:
         """Without a navigation mesh: every pedestrian walks to the next point of its route."""
         commands = []
         carla, snapshot = self._server.package, self._server.world.get_snapshot()
-        for one in self._underway.values():
-            if not one.plan.person or one.guide is not None:
+        for driven in self._underway.values():
+            if not driven.plan.person or driven.guide is not None:
                 continue
-            state = snapshot.find(one.number)
+            state = snapshot.find(driven.number)
             if state is None:
                 continue
             pose = _pose_of_state(state)
-            target = one.plan.route[min(one.at + 1, len(one.plan.route) - 1)]
+            target = driven.plan.route[min(driven.at + 1, len(driven.plan.route) - 1)]
             dx, dy = float(target[0] - pose.x), float(target[1] - pose.y)
             norm = math.hypot(dx, dy) or 1.0
-            speed = float(one.plan.speed[one.at])
+            speed = float(driven.plan.speed[driven.at])
             control = carla.WalkerControl(carla.Vector3D(dx / norm, -dy / norm, 0.0), speed, False)
-            commands.append(carla.command.ApplyWalkerControl(one.number, control))
+            commands.append(carla.command.ApplyWalkerControl(driven.number, control))
         self._server.send(commands)
 
     # ------------------------------------------------------------------------------- leaving
@@ -359,8 +359,8 @@ class Traffic:
                 underway.handle.set_autopilot(False, self._port)
 
     def _destroy_actors(self, gone: Sequence[_Underway]) -> None:
-        controllers = [one.guide for one in gone if one.guide is not None]
-        self._server.destroy([*controllers, *(one.number for one in gone)])
+        controllers = [driven.guide for driven in gone if driven.guide is not None]
+        self._server.destroy([*controllers, *(driven.number for driven in gone)])
 
     def _carla_location(self, point: np.ndarray) -> Any:
         x, y, z = (float(value) for value in point)

@@ -321,7 +321,7 @@ class BodyChecks:
         return [
             place
             for place in places
-            if all(math.hypot(place.x - one.x, place.y - one.y) > _ROOM for one in at)
+            if all(math.hypot(place.x - taken.x, place.y - taken.y) > _ROOM for taken in at)
         ]
 
 

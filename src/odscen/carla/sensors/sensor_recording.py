@@ -174,5 +174,8 @@ def _copy_measurement(data: Any) -> tuple[Picture | np.ndarray, tuple[object, ..
     if hasattr(data, "horizontal_angle"):
         points = np.frombuffer(bytes(data.raw_data), dtype=np.float32).reshape(-1, 4)
         return points.copy(), row
-    seen = [(one.velocity, one.azimuth, one.altitude, one.depth) for one in data]
+    seen = [
+        (detection.velocity, detection.azimuth, detection.altitude, detection.depth)
+        for detection in data
+    ]
     return np.array(seen, dtype=np.float32).reshape(-1, 4), row

@@ -164,8 +164,14 @@ class Server(BorrowedServer):
         """Those of some blueprints whose doors can be opened, as they say themselves."""
         wanted, name = set(names), "has_dynamic_doors"
         with self._expect_answer():
-            known = [one for one in self._library if one.id in wanted and one.has_attribute(name)]
-            return frozenset(one.id for one in known if one.get_attribute(name).as_bool())
+            known = [
+                blueprint
+                for blueprint in self._library
+                if blueprint.id in wanted and blueprint.has_attribute(name)
+            ]
+            return frozenset(
+                blueprint.id for blueprint in known if blueprint.get_attribute(name).as_bool()
+            )
 
     def shape(self, actor: int) -> Shape:
         """Bounding box of an actor."""

@@ -120,7 +120,7 @@ def release_number(words: str) -> str | None:
 def release_of(words: str) -> ReleaseAdapter:
     """Adapter for what a package calls itself; of an unknown one, as the newest that was tried."""
     number = release_number(words) or words
-    known = next((one for one in RELEASES if one.number == number), None)
+    known = next((release for release in RELEASES if release.number == number), None)
     if known is not None:
         return known
     return ReleaseAdapter(number, warning=_NEVER_TRIED.format(number, _AS_TRIED))

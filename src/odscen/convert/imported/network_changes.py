@@ -108,11 +108,11 @@ def _compare_connections(before: Fidelity, after: Fidelity) -> Iterator[NetworkC
         ("connection back", after.missing, before.missing),
         ("connection new", before.invented, after.invented),
     ):
-        known = {_connection_ends(one) for one in was}
-        for one in now:
-            if _connection_ends(one) not in known:
-                element = f"lane {one.source} to lane {one.target}"
-                yield NetworkChange(what, element, f"at {one.x:.1f}, {one.y:.1f}")
+        known = {_connection_ends(connection) for connection in was}
+        for connection in now:
+            if _connection_ends(connection) not in known:
+                element = f"lane {connection.source} to lane {connection.target}"
+                yield NetworkChange(what, element, f"at {connection.x:.1f}, {connection.y:.1f}")
 
 
 def _connection_ends(lane_relation: LaneRelation) -> tuple[str, str]:

@@ -103,7 +103,11 @@ def vehicle_classes(lane: Lane, s: float) -> frozenset[str]:
     base = allowed(kind)
     if not lane.access or not base:
         return base
-    records = [one for one in access_at(lane, s) if has_class(one) and one.restriction != "none"]
+    records = [
+        record
+        for record in access_at(lane, s)
+        if has_class(record) and record.restriction != "none"
+    ]
     granted = [
         _BY_RESTRICTION[record.restriction.lower()] for record in records if record.rule == "allow"
     ]

@@ -183,7 +183,7 @@ def _list_shortcomings(result: Run) -> list[str]:
     ] + [
         missed_words(row)
         for row in missed_rows(result.summary)
-        if any(one["expectation"] == "criteria" for one in result.summary["expectations"])
+        if any(verdict["expectation"] == "criteria" for verdict in result.summary["expectations"])
     ]
 
 

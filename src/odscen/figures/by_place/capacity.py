@@ -294,7 +294,7 @@ def _link_capacities(
     nothing = np.zeros((0, 2))
     found = []
     for via, by_begin in shown.items():
-        foes = [entries.get(one, nothing)[:, 1] for one in before[via]]
+        foes = [entries.get(lane, nothing)[:, 1] for lane in before[via]]
         opposing = np.sort(np.concatenate(foes)) if foes else np.zeros(0)
         turns = [
             (begin, time, until, through_gaps(opposing, time, until, most=flow_of[via]))

@@ -92,7 +92,7 @@ def _lane_groups(places: LanePlaces, facts: NetFacts) -> LaneGroups:
     ).sort("junction", "via")
     named = _name_groups(inner.select("junction", "source", "movement").rows())
     ways = inner.with_columns(
-        lane_group=pl.Series([named[one] for one in inner["source"]], dtype=text)
+        lane_group=pl.Series([named[lane] for lane in inner["source"]], dtype=text)
     ).select("junction", "via", "source", "movement", "lane_group")
     net = _Net(places, facts)
     reach, groups = [], []

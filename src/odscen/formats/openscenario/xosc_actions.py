@@ -81,11 +81,11 @@ class Actions:
     def before(self, part: Any, actor: str) -> Iterator[Any]:
         """Yield actions of rules of an actor that stand before an action, in their order."""
         for rule in self.rules:
-            for one in (part for item in rule.then for part in item.parts):
-                if getattr(one, one.kind) is part:
+            for earlier in (part for item in rule.then for part in item.parts):
+                if getattr(earlier, earlier.kind) is part:
                     return
                 if rule.actor == actor:
-                    yield one
+                    yield earlier
 
 
 def _write_speed(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
@@ -155,7 +155,9 @@ def _cut_in(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]
 
 
 def _write_offset(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
-    asked = [one.offset.to for one in made.before(part, actor) if one.offset is not None]
+    asked = [
+        earlier.offset.to for earlier in made.before(part, actor) if earlier.offset is not None
+    ]
     moves = abs(part.to - (asked[-1] if asked else made.actors[actor].lateral_offset))
     if not moves and not made.dialect.for_scenario_runner:  # no acceleration tells how long
         own = xml("RelativeTargetLane", entityRef=actor, value=0)

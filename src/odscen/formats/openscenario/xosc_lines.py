@@ -179,18 +179,18 @@ def _start_of_path(made: Making, part: Any, actor: str) -> GroundPose | None:
         (rule for rule in made.rules for item in rule.then for p in item.parts if p.path is part),
         None,
     )
-    for one in made.before(part, actor):
+    for earlier in made.before(part, actor):
         back = made.places.centre_ahead(own)
         level = made.places.start(own).z
-        if one.appear is not None and one.appear.at is not None:
-            x, y, hdg = one.appear.at
+        if earlier.appear is not None and earlier.appear.at is not None:
+            x, y, hdg = earlier.appear.at
             spot, moves = GroundPose(x, y, level, hdg).back(back), False
-        elif one.replay is not None:
-            _, x, y, hdg = one.replay.rows[-1]
+        elif earlier.replay is not None:
+            _, x, y, hdg = earlier.replay.rows[-1]
             spot, moves = GroundPose(x, y, level, hdg).back(back), False
-        elif one.speed is not None:
-            moves = moves or one.speed.to > 0.0
-        elif one.kind not in _STAYS:
+        elif earlier.speed is not None:
+            moves = moves or earlier.speed.to > 0.0
+        elif earlier.kind not in _STAYS:
             moves = True
     at_once = (
         rule is not None

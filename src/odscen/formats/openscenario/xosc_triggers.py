@@ -75,7 +75,7 @@ class Triggers:
         """
         groups = _condition_groups(condition, f"{where}.when", negated=False, delay=0.0)
         for place in dict.fromkeys(
-            one.place for row in groups for one in row if one.equal is not None
+            leaf.place for row in groups for leaf in row if leaf.equal is not None
         ):
             self.notes.approximated.append((place, f"equal, which here is within {EQUAL:g}"))
         if len(groups) > MOST_GROUPS:

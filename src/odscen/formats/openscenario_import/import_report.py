@@ -73,13 +73,13 @@ class ImportReport:
 
     def ignore(self, element: _Element, reason: str) -> None:
         """Ignore an element with all in it, for one reason."""
-        for one in element.iter("*"):
-            self.mark(one, "ignored", reason)
+        for inner in element.iter("*"):
+            self.mark(inner, "ignored", reason)
 
     def take(self, element: _Element) -> None:
         """Take an element with all in it."""
-        for one in element.iter("*"):
-            self.mark(one, "taken")
+        for inner in element.iter("*"):
+            self.mark(inner, "taken")
 
     def wrong(self, element: _Element, problem: str) -> InputError:
         """Error about an element of a file, with its place."""

@@ -118,7 +118,7 @@ def with_formulas(node: Any, reached: set[Source], *, key: str = "") -> Any:
     if isinstance(node, dict):
         return {name: with_formulas(one, reached, key=name) for name, one in node.items()}
     if isinstance(node, list | tuple):
-        return [with_formulas(one, reached, key=key) for one in node]
+        return [with_formulas(inner, reached, key=key) for inner in node]
     if not isinstance(node, TracedNumber):
         return node
     if len(node.formula) > LONGEST or key in _NEVER_FORMULAS:

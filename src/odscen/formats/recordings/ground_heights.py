@@ -35,7 +35,7 @@ def ground_heights(
     graph, places = sumo_map.graph, sumo_map.lane_places
     xy = np.column_stack([rows["x"].to_numpy(), rows["y"].to_numpy()])
     nodes = np.concatenate(
-        [np.column_stack([one.x, one.y, one.z]) for one in (graph.lanes, graph.walks)]
+        [np.column_stack([part.x, part.y, part.z]) for part in (graph.lanes, graph.walks)]
     )
     if not len(nodes):
         return np.zeros(len(xy))
@@ -47,9 +47,9 @@ def ground_heights(
     lane = np.array([row_of.get(str(name), -1) for name in names], dtype=np.int64)[which]
     half = np.array([0.5 * lengths[str(name)] for name in rows["id"]])
     pos = rows["pos"].cast(float).fill_null(np.nan).to_numpy() - half
-    for one in np.unique(lane[lane >= 0]).tolist():
-        own = np.flatnonzero(places.lane == one)
-        at = np.flatnonzero((lane == one) & np.isfinite(pos))
+    for part in np.unique(lane[lane >= 0]).tolist():
+        own = np.flatnonzero(places.lane == part)
+        at = np.flatnonzero((lane == part) & np.isfinite(pos))
         if len(own) and len(at):
             own = own[np.argsort(places.pos[own], kind="stable")]
             heights[at] = np.interp(pos[at], places.pos[own], graph.lanes.z[own])

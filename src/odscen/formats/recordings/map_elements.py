@@ -74,7 +74,7 @@ def _sample_polylines(
     share = ranges(np.zeros(len(n), dtype=np.int64), n) / (n - 1)[of]
     s = s0[of] * (1.0 - share) + s1[of] * share
     found = [table.lane_points(rows[of], s, at=at) for at in (0.5, 0.0, 1.0)]
-    lines = [np.stack([one.x, one.y, one.z], axis=1) for one in found]
+    lines = [np.stack([points.x, points.y, points.z], axis=1) for points in found]
     return _Polylines(offsets(n), *lines)
 
 
@@ -134,7 +134,7 @@ def _lane_links(graph: LaneGraph) -> tuple[list[tuple[int, ...]], list[tuple[int
     for before, after in pairs:
         exits[before].append(after)
         entries[after].append(before)
-    return [tuple(sorted(entry)) for entry in entries], [tuple(one) for one in exits]
+    return [tuple(sorted(entry)) for entry in entries], [tuple(rows) for rows in exits]
 
 
 def _usual_neighbour(lanes: IntArray | np.ndarray[tuple[int], np.dtype[np.int32]]) -> int:
@@ -182,7 +182,7 @@ def _marked_stretches(
     table: RoadTable, road: RoadId, index: int, section: LaneSection
 ) -> Iterator[_MarkedStretch]:
     for number, lane in section.lanes.items():
-        beside = number or next((one for one in (-1, 1) if one in section.lanes), 0)
+        beside = number or next((side for side in (-1, 1) if side in section.lanes), 0)
         if not beside:
             continue
         row = table.lane_index[LaneKey(road, index, beside)]

@@ -53,7 +53,11 @@ def lane_signals(
         if letters is None:
             continue
         color = _colors_of_link(letters, link)
-        turn = next(one for one in sumo_map.lights if one.id == light).links[link].turn
+        turn = (
+            next(sumo_light for sumo_light in sumo_map.lights if sumo_light.id == light)
+            .links[link]
+            .turn
+        )
         known = found.get((approach, lane))
         # Two links over one lane: who may go on either of them has green.
         found[approach, lane] = (turn, color if known is None else np.maximum(known[1], color))

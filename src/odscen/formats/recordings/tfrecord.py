@@ -63,7 +63,7 @@ def crc32c(data: bytes) -> int:
     register begins with ones is the same as the first four bytes being inverted; zeros before that
     change nothing.
     """
-    head = bytes(255 - one for one in data[:4].ljust(4, b"\0"))
+    head = bytes(255 - byte for byte in data[:4].ljust(4, b"\0"))
     if len(data) < 4:
         return _crc_of_short(data)
     rows = -(-len(data) // _ROW)
@@ -107,4 +107,4 @@ def _moved_by_a_row() -> list[list[int]]:
     table = _make_crc_table()
     for _ in range(_ROW):
         register = table[register & 255] ^ (register >> 8)
-    return [[int(one) for one in row] for row in register]
+    return [[int(bit) for bit in row] for row in register]

@@ -93,12 +93,12 @@ def tracks_of(source: ExportSource, recorded: RecordedRun, times: FloatArray) ->
         length=np.array([user.length for user in users]),
         width=np.array([user.width for user in users]),
         height=np.array([_body_height(source, user) for user in users]),
-        valid=np.stack([one.valid for one in found]),
-        x=np.stack([one.x for one in found]),
-        y=np.stack([one.y for one in found]),
-        z=np.stack([one.z for one in found]),
-        hdg=np.stack([one.hdg for one in found]),
-        speed=np.stack([one.speed for one in found]),
+        valid=np.stack([track.valid for track in found]),
+        x=np.stack([track.x for track in found]),
+        y=np.stack([track.y for track in found]),
+        z=np.stack([track.z for track in found]),
+        hdg=np.stack([track.hdg for track in found]),
+        speed=np.stack([track.speed for track in found]),
     )
 
 

@@ -478,7 +478,7 @@ def traffic_columns(site: Site, states: GapStates, nodes: IntArray) -> FloatArra
             np.minimum(states.queue[there], 8.0) / 8.0,
             np.clip(leader, 0.0, None) / 15.0 * np.exp(-gap / 40.0),
         ]
-        columns += [np.where(beside >= 0, one, 0.0) for one in seen]
+        columns += [np.where(beside >= 0, column, 0.0) for column in seen]
     return np.column_stack(columns).astype(np.float64)
 
 

@@ -172,7 +172,9 @@ def measure_problems(
 def _find_repeated_ids(scenario: Scenario) -> Iterator[Problem]:
     """Yield ids that two measures have, or a measure and an actor: events name both alike."""
     others = [*scenario.actors, *scenario.flows, *(part for _, part in scenario.demand.parts)]
-    taken = Counter([*(one.id for one in others), *(measure.id for measure in scenario.measures)])
+    taken = Counter(
+        [*(measure.id for measure in others), *(measure.id for measure in scenario.measures)]
+    )
     for index, measure in enumerate(scenario.measures):
         if taken[measure.id] > 1:
             message = f"id {measure.id!r} is taken {taken[measure.id]} times; give each its own"

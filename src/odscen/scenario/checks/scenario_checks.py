@@ -101,7 +101,7 @@ def start_overlaps(
     found = 0
     for index, others in _find_overlapping(scenario, region, assets):
         actor = scenario.actors[index]
-        for other in (scenario.actors[one] for one in others[: MOST_OF_KIND - found]):
+        for other in (scenario.actors[row] for row in others[: MOST_OF_KIND - found]):
             yield error(
                 "bodies_overlap",
                 f"actors[{index}].spawn",

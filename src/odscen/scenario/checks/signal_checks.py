@@ -65,7 +65,7 @@ def program_problems(
 
 def _name_problems(timing: JunctionTiming, light: Light, where: str) -> Iterator[Problem]:
     for kind in ("groups", "stages", "detectors", "plans"):
-        ids = [one.id for one in getattr(timing, kind)]
+        ids = [part.id for part in getattr(timing, kind)]
         for name in sorted(name for name, count in Counter(ids).items() if count > 1):
             message = f"id {name!r} is taken twice; give one of them another"
             yield error("duplicate_id", f"{where}.{kind}", message)

@@ -212,7 +212,7 @@ def _compare_balances(
     for name, kind in zip(graph.segments.ids, graph.segments.kinds, strict=True):
         if kind != "junction":
             continue
-        entries = [(one, str(name)) for one in sorted(before.get(name, ()))]
+        entries = [(neighbour, str(name)) for neighbour in sorted(before.get(name, ()))]
         exits = [(str(name), onward) for onward in sorted(onwards.get(name, ()))]
         if not entries or not exits or not all(pair in counted for pair in (*entries, *exits)):
             continue

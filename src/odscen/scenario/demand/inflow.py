@@ -81,7 +81,7 @@ def _find_entries(region: Region) -> tuple[Entry, ...]:
         Entry(
             str(ids[segment]),
             "forward" if forward else "backward",
-            tuple(sorted(found[segment, forward], key=lambda one: -abs(one.lane))),
+            tuple(sorted(found[segment, forward], key=lambda entry_lane: -abs(entry_lane.lane))),
         )
         for segment, forward in sorted(found, key=lambda key: (key[0], not key[1]))
     )

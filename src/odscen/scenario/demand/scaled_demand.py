@@ -40,7 +40,9 @@ def scaled(demand: Demand, factor: float, *, only: str | None = None) -> Demand:
     matrices = (
         _with_trips(matrix, factor) if wanted(matrix) else matrix for matrix in demand.matrices
     )
-    background = (_with_amount(one, factor) if wanted(one) else one for one in demand.background)
+    background = (
+        _with_amount(part, factor) if wanted(part) else part for part in demand.background
+    )
     return demand.model_copy(update={"matrices": tuple(matrices), "background": tuple(background)})
 
 
@@ -96,7 +98,7 @@ def excerpt(scenario: Scenario) -> Scenario:
     begin, end = busiest_hour(scenario)
     begin = max(begin - BEFORE, 0.0)
     matrices = (_cut_part(scenario, matrix, begin, end) for matrix in demand.matrices)
-    background = (_cut_part(scenario, one, begin, end) for one in demand.background)
+    background = (_cut_part(scenario, part, begin, end) for part in demand.background)
     length = end - begin + CALM
     return scenario.model_copy(
         update={
@@ -105,7 +107,7 @@ def excerpt(scenario: Scenario) -> Scenario:
                 update={
                     "clock": (demand.clock + begin) % DAY,
                     "matrices": tuple(matrix for matrix in matrices if matrix is not None),
-                    "background": tuple(one for one in background if one is not None),
+                    "background": tuple(part for part in background if part is not None),
                 }
             ),
         }

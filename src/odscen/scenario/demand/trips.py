@@ -391,7 +391,7 @@ def _draw_trips(
     starts = np.full(count, -1, dtype=np.int32)
     goals = np.full(count, -1, dtype=np.int32)
     for category in set(categories):
-        mine = np.array([one is category for one in categories], dtype=np.bool_)
+        mine = np.array([drawn is category for drawn in categories], dtype=np.bool_)
         reach = ground.reachable_ends(category, *between)
         if len(reach.starts):
             picked = (at_start[mine] * len(reach.starts)).astype(np.intp)

@@ -134,7 +134,7 @@ def schema() -> dict[str, Any]:
 def _formulas_too(node: Any) -> Any:
     """Let a formula be given wherever a number may."""
     if isinstance(node, list):
-        return [_formulas_too(one) for one in node]
+        return [_formulas_too(inner) for inner in node]
     if not isinstance(node, dict):
         return node
     if node.get("type") in ("number", "integer"):
@@ -210,7 +210,7 @@ def _lay_out_lights(value: object) -> str:
         for part in light.values():
             if isinstance(part, list) and part and isinstance(part[0], dict | list):
                 whole = json.dumps(part, ensure_ascii=False)
-                split = ",\n        ".join(json.dumps(one, ensure_ascii=False) for one in part)
+                split = ",\n        ".join(json.dumps(item, ensure_ascii=False) for item in part)
                 text = text.replace(whole, f"[\n        {split}\n      ]", 1)
         lights.append(text)
     return "[\n      " + ",\n      ".join(lights) + "\n    ]"

@@ -220,13 +220,13 @@ def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario
     kinds = ("zones", "profiles", "inputs", "matrices", "counts", "background")
     for kind in kinds:
         ones = getattr(scenario.demand, kind)
-        left = tuple(one for one in ones if one.id != part)
+        left = tuple(known_part for known_part in ones if known_part.id != part)
         if len(left) < len(ones):
             return _check_demand(_change_demand(scenario, **{kind: left}), graph)
     raise NotFoundError(
         "part of the demand",
         part,
-        [one.id for kind in kinds for one in getattr(scenario.demand, kind)],
+        [known_part.id for kind in kinds for known_part in getattr(scenario.demand, kind)],
     )
 
 
@@ -289,16 +289,16 @@ def _change_or_make_part(
     model: type[_Part], ones: tuple[_Part, ...], name: str, fields: dict[str, Any]
 ) -> _Part:
     """Part of that name with some fields changed, or a new one."""
-    old = next((one for one in ones if one.id == name), None)
+    old = next((known_part for known_part in ones if known_part.id == name), None)
     kept = {} if old is None else {field: getattr(old, field) for field in model.model_fields}
     return validated(model, {**kept, **fields, "id": name})
 
 
 def _put_part(ones: tuple[_Part, ...], part: _Part) -> tuple[_Part, ...]:
     """Put a part in the place of that with its name, or at the end."""
-    if all(one.id != part.id for one in ones):
+    if all(known_part.id != part.id for known_part in ones):
         return (*ones, part)
-    return tuple(part if one.id == part.id else one for one in ones)
+    return tuple(part if known_part.id == part.id else known_part for known_part in ones)
 
 
 def _change_demand(scenario: Scenario, **changes: Any) -> Scenario:
@@ -383,7 +383,7 @@ def remove_transit(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenari
     """
     for kind in ("lines", "stops"):
         ones = getattr(scenario.transit, kind)
-        left = tuple(one for one in ones if one.id != part)
+        left = tuple(known_part for known_part in ones if known_part.id != part)
         if len(left) < len(ones):
             return _checked_transit(scenario, graph, kind, left)
     what = "stop or line"
@@ -395,9 +395,12 @@ def _with_transit_part(
     ones: tuple[_One, ...], model: type[_One], name: str, fields: Any
 ) -> list[_One]:
     """Change the one of that name, or add it at the end."""
-    if all(one.id != name for one in ones):
+    if all(known_part.id != name for known_part in ones):
         return [*ones, validated(model, {**fields, "id": name})]
-    return [changed_part(one, fields) if one.id == name else one for one in ones]
+    return [
+        changed_part(known_part, fields) if known_part.id == name else known_part
+        for known_part in ones
+    ]
 
 
 def _checked_transit(

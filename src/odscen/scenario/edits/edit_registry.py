@@ -137,7 +137,7 @@ def index_of(ones: tuple[PlacedOne, ...], name: str) -> int:
     NotFoundError
         If there is none.
     """
-    ids = [one.id for one in ones]
+    ids = [placed.id for placed in ones]
     if name not in ids:
         raise NotFoundError("actor or flow", name, ids)
     return ids.index(name)
@@ -145,7 +145,7 @@ def index_of(ones: tuple[PlacedOne, ...], name: str) -> int:
 
 def free_id(scenario: Scenario, stem: str) -> str:
     """First of ``stem-1``, ``stem-2``, ... that no actor or flow has."""
-    taken = {one.id for one in all_placed(scenario)}
+    taken = {placed.id for placed in all_placed(scenario)}
     return next(name for k in count(1) if (name := f"{stem}-{k}") not in taken)
 
 

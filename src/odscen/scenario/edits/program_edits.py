@@ -194,14 +194,20 @@ def without_group(timing: JunctionTiming, light: Light, name: str, into: str) ->
         If there is no such group.
     """
     groups = {group.id: group for group in timing.groups}
-    for one in (name, into):
-        if one not in groups:
+    for group_name in (name, into):
+        if group_name not in groups:
             raise NotFoundError(
-                f"signal group of the light of junction {timing.junction!r}", one, list(groups)
+                f"signal group of the light of junction {timing.junction!r}",
+                group_name,
+                list(groups),
             )
     if name == into:
         raise InputError(f"the movements of group {name!r} have to join another group")
-    members = {n for one in (name, into) for n in designed_group(groups[one], light).movements}
+    members = {
+        n
+        for group_name in (name, into)
+        for n in designed_group(groups[group_name], light).movements
+    }
     return with_group(timing, light, into, {"movements": shortest_names(members, light.movements)})
 
 

@@ -114,7 +114,7 @@ def shrink_roi(
             f"without segment {segment!r} the region of interest would be in several pieces"
         )
     region = Region.of(graph, [segment])
-    users = [one for one in all_placed(scenario) if _uses_region(region, one)]
+    users = [placed for placed in all_placed(scenario) if _uses_region(region, placed)]
     if users and not with_actors:
         names = ", ".join(repr(user.id) for user in users)
         raise ScenarioError(
@@ -145,9 +145,11 @@ def _uses_region(region: Region, actor: Actor | Flow) -> bool:
 def _clear_from_region(region: Region, ones: tuple[PlacedOne, ...]) -> tuple[PlacedOne, ...]:
     """Those that do not start in the region, without goals and places to pass in it."""
     return tuple(
-        changed_part(one, _fields_without_region(region, one)) if _uses_region(region, one) else one
-        for one in ones
-        if not _node_inside(region, one.spawn)
+        changed_part(placed, _fields_without_region(region, placed))
+        if _uses_region(region, placed)
+        else placed
+        for placed in ones
+        if not _node_inside(region, placed.spawn)
     )
 
 

@@ -176,7 +176,7 @@ def _column_arrays(
 ) -> dict[str, Array]:
     found: dict[str, Array] = {}
     for name, kind in columns.items():
-        values = [getattr(one, name) for one in ones]
+        values = [getattr(placed, name) for placed in ones]
         given = [np.nan if value is None else value for value in values]
         found[f"{table}_{name}"] = np.array(given, dtype=_KINDS[kind])
     return found

@@ -200,10 +200,10 @@ class _ArrayReading:
         found = self._read_columns("actor", ACTOR_COLUMNS, self._written_of("actor", size))
         for row, fields in enumerate(found):
             fields.update(ends[row])
-            if passed := [one for one in via[row].tolist() if one != NO_NODE]:
+            if passed := [node for node in via[row].tolist() if node != NO_NODE]:
                 walk = walks[row]
                 fields["via"] = [
-                    self._name_of_node("actor_via", row, one, walk=walk) for one in passed
+                    self._name_of_node("actor_via", row, node, walk=walk) for node in passed
                 ]
             if styles[row] != OTHER_STYLE:
                 fields["style"] = DRIVING_STYLES[styles[row]]
@@ -225,7 +225,11 @@ class _ArrayReading:
                 for category, share in zip(CATEGORIES, mixes[row].tolist(), strict=True)
                 if share != 0
             }
-            first = [one for one in order if one in shares] if isinstance(order, list) else []
+            first = (
+                [category for category in order if category in shares]
+                if isinstance(order, list)
+                else []
+            )
             fields["mix"] = {name: shares[name] for name in [*first, *shares]}
             fields["id"] = ids[row]
         return _with_ids(found, "flow")
@@ -233,7 +237,7 @@ class _ArrayReading:
     def _written_of(self, table: str, size: int) -> list[dict[str, Any]]:
         """What the document has of each row without a column; a new row has nothing."""
         held = self._document.get(f"{table}s", [])
-        if not (isinstance(held, list) and all(isinstance(one, dict) for one in held)):
+        if not (isinstance(held, list) and all(isinstance(item, dict) for item in held)):
             raise _array_error("document", f"its {table}s are not a list of objects")
         rows = self._read_indices(f"{table}_row", size, len(held), but=-1)
         return [dict(held[row]) if row >= 0 else {} for row in rows]

@@ -202,8 +202,8 @@ def choose_map(maps: MapFilter, statistics: Mapping[str, Mapping[str, Any]], *, 
 
 def passes_by_name(maps: MapFilter, name: str) -> bool:
     """Whether a map of that name may be drawn, if its statistics allow it, too."""
-    return any(fnmatchcase(name, one) for one in maps.names) and not any(
-        fnmatchcase(name, one) for one in maps.exclude
+    return any(fnmatchcase(name, pattern) for pattern in maps.names) and not any(
+        fnmatchcase(name, pattern) for pattern in maps.exclude
     )
 
 

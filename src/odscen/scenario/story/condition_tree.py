@@ -31,7 +31,7 @@ class Flips(NamedTuple):
 
     def holds(self, instant: float) -> bool:
         """Whether it is true at an instant."""
-        return self.was ^ (sum(one <= instant for one in self.at) % 2 == 1)
+        return self.was ^ (sum(flip <= instant for flip in self.at) % 2 == 1)
 
     @property
     def last(self) -> bool:
@@ -44,25 +44,25 @@ class Flips(NamedTuple):
 
     def shifted(self, seconds: float) -> Flips:
         """The same, so much later."""
-        return Flips(self.was, tuple(one + seconds for one in self.at))
+        return Flips(self.was, tuple(flip + seconds for flip in self.at))
 
     def after(self, begin: float) -> Flips:
         """The same without the instants before ``begin``."""
-        early = sum(one < begin for one in self.at)
+        early = sum(flip < begin for flip in self.at)
         return Flips(self.was ^ (early % 2 == 1), self.at[early:])
 
     def risings(self, lasting: float) -> Flips:
         """What is true for so many seconds from each instant at which this comes true."""
         changes: list[float] = []
         now = self.was
-        for one in self.at:
+        for flip in self.at:
             now = not now
             if not now:
                 continue
-            if changes and one <= changes[-1]:
-                changes[-1] = one + lasting
+            if changes and flip <= changes[-1]:
+                changes[-1] = flip + lasting
             else:
-                changes += [one, one + lasting]
+                changes += [flip, flip + lasting]
         return Flips(False, tuple(changes))
 
     def first(self, begin: float, end: float) -> float | None:
@@ -73,7 +73,7 @@ class Flips(NamedTuple):
             return begin if self.was else None
         if self.holds(begin):
             return begin
-        return next((one for one in self.at if begin < one < end and self.holds(one)), None)
+        return next((flip for flip in self.at if begin < flip < end and self.holds(flip)), None)
 
     def first_rise(self, begin: float, end: float, *, after: float) -> float | None:
         """First instant from ``begin`` on, ``after`` one and before ``end``, of coming true."""
@@ -93,7 +93,7 @@ def together(parts: Sequence[Flips], *, every: bool) -> Flips:
         return Flips(was)
     meet = all if every else any
     changes, now = [], was
-    for instant in sorted({one for part in parts for one in part.at}):
+    for instant in sorted({flip for part in parts for flip in part.at}):
         if (holds := meet(part.holds(instant) for part in parts)) != now:
             now = holds
             changes.append(instant)
@@ -171,8 +171,8 @@ class ConditionTree:
 
     def state(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """What leaves and what is delayed have to remember, by place in the tree, for JSON."""
-        leaves = {one.key: list(one.before) for one in self._leaves if one.before is not None}
-        late = {one.key: [one.past.was, list(one.past.at)] for one in self._late if one.past}
+        leaves = {leaf.key: list(leaf.before) for leaf in self._leaves if leaf.before is not None}
+        late = {leaf.key: [leaf.past.was, list(leaf.past.at)] for leaf in self._late if leaf.past}
         return leaves, late
 
     def restore(self, leaves: Mapping[str, Any], late: Mapping[str, Any]) -> None:
@@ -306,7 +306,7 @@ class _Combined:
 
     def look(self, view: RoadView) -> Flips:
         """When it holds; all parts are read, as each remembers its readings."""
-        return together([one.look(view) for one in self._below], every=self._every)
+        return together([below.look(view) for below in self._below], every=self._every)
 
 
 class _Late:
@@ -322,7 +322,7 @@ class _Late:
         """When it holds."""
         flips, time = self._below.look(view), view.time
         past = self.past or Flips(flips.was)
-        whole = Flips(past.was, (*(one for one in past.at if one < time), *flips.at))
+        whole = Flips(past.was, (*(flip for flip in past.at if flip < time), *flips.at))
         self.now = whole.after(time - self._delay - 2.0 * self._step)
         if self._rising:
             whole = whole.risings(self._step)

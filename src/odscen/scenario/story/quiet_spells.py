@@ -106,7 +106,7 @@ def quiet_seconds(teller: _Teller, actor: str, view: RoadView) -> float:
         return max(0.0, seconds)
     if not below:
         return 0.0
-    parts = [quiet_seconds(one, actor, view) for one in below]
+    parts = [quiet_seconds(inner, actor, view) for inner in below]
     return max(parts) if every else min(parts)
 
 
@@ -170,23 +170,23 @@ def _quiet_until_time(part: AfterTime, _: str, view: RoadView) -> float:
 def _quiet_until_speed(part: OwnBounded, actor: str, view: RoadView) -> float:
     if part.above is None:  # whoever collides stands at once
         return 0.0
-    one = view.actor(part.of or actor)
-    if one is None:
+    actor_view = view.actor(part.of or actor)
+    if actor_view is None:
         return _quiet_while_absent(view, part.of or actor)
-    if one.person:
+    if actor_view.person:
         return 0.0
-    if part.above - one.speed <= CLOSE:
+    if part.above - actor_view.speed <= CLOSE:
         return 0.0
-    return (part.above - one.speed) / one.gain if one.gain > 0.0 else LONGEST
+    return (part.above - actor_view.speed) / actor_view.gain if actor_view.gain > 0.0 else LONGEST
 
 
 def _quiet_until_travelled(part: OwnBounded, actor: str, view: RoadView) -> float:
     if part.above is None:
         return 0.0
-    one = view.actor(part.of or actor)
-    if one is None:
+    actor_view = view.actor(part.of or actor)
+    if actor_view is None:
         return _quiet_while_absent(view, part.of or actor)
-    return _seconds_to_cover(part.above - one.travelled, *_speed_and_gain(one))
+    return _seconds_to_cover(part.above - actor_view.travelled, *_speed_and_gain(actor_view))
 
 
 def _quiet_while_absent(view: RoadView, *actors: str) -> float:
@@ -229,11 +229,11 @@ def _quiet_until_distance(part: DistanceBounded, actor: str, view: RoadView) -> 
 
 
 def _to_point(actor: str, point: Point, bound: float, view: RoadView) -> float:
-    one = view.actor(actor)
-    if one is None:
+    actor_view = view.actor(actor)
+    if actor_view is None:
         return _quiet_while_absent(view, actor)
-    away = math.dist((one.x, one.y), point) - _farthest_reach(one) - bound
-    return _seconds_to_cover(away, *_speed_and_gain(one))
+    away = math.dist((actor_view.x, actor_view.y), point) - _farthest_reach(actor_view) - bound
+    return _seconds_to_cover(away, *_speed_and_gain(actor_view))
 
 
 _TELL: dict[str, Callable[[Any, str, RoadView], float]] = {

@@ -168,7 +168,7 @@ class StoryEngine:
             },
             "quiet": self._quiet.state(),
             "rules": {
-                name: {**asdict(state), "running": [one.state() for one in state.running]}
+                name: {**asdict(state), "running": [action.state() for action in state.running]}
                 for name, state in self._states.items()
             },
             "channels": {name: one.state() for name, one in self._channels.items()},
@@ -181,7 +181,7 @@ class StoryEngine:
             tree.restore(state["trees"]["leaves"], state["trees"]["past"])
         self._quiet.restore(state.get("quiet", {}), self._rules)
         for name, kept in state["rules"].items():
-            running = [Running.from_state(one) for one in kept["running"]]
+            running = [Running.from_state(saved) for saved in kept["running"]]
             self._states[name] = RuleState(**{**kept, "running": running})
         self._busy = {name for name, one in self._states.items() if one.item is not None}
         self._channels = {name: Channel.from_state(one) for name, one in state["channels"].items()}
@@ -198,14 +198,14 @@ class StoryEngine:
             return
         for name, rule in self._rules.items():
             if running := self._states[name].running:
-                for one in list(running):
-                    self._update_action(view, rule, one, view.time)
+                for action in list(running):
+                    self._update_action(view, rule, action, view.time)
 
     def _end_gone_actor(self, view: RoadView, actor: str) -> None:
         """End what an actor does that has left the road."""
         for name, rule in self._rules.items():
             if rule.actor == actor and self._states[name].item is not None:
-                vanished = any(one.vanish for one in rule.then)
+                vanished = any(item.vanish for item in rule.then)
                 if not vanished:
                     self._say_event(view.time, FAILED, rule, "it has left the road")
                 self._end_rule(rule, view.time)
@@ -231,7 +231,7 @@ class StoryEngine:
         for name, rule in self._rules.items():
             state = self._states[name]
             if state.item is not None:
-                due = max(min((one.end for one in state.running), default=now), now)
+                due = max(min((action.end for action in state.running), default=now), now)
                 instant = due if due < end else None
             elif state.fired < rule.times and time >= until.get(name, time):
                 instant = self._next_firing(rule, state, view, now, end)
@@ -265,9 +265,9 @@ class StoryEngine:
         if state.item is None:
             self._fire_rule(view, now, rule)
             return
-        for one in [one for one in state.running if one.end <= now]:
-            state.running.remove(one)
-            self._finish_action(view, now, rule, one)
+        for ended in [ended for ended in state.running if ended.end <= now]:
+            state.running.remove(ended)
+            self._finish_action(view, now, rule, ended)
         if not state.running:
             self._next_item(view, now, rule)
 
@@ -376,7 +376,7 @@ class StoryEngine:
         if name == by.id:
             return
         before = len(state.running)
-        state.running = [one for one in state.running if one.number != int(number)]
+        state.running = [action for action in state.running if action.number != int(number)]
         if len(state.running) < before:
             rule = self._rules[name]
             self._say_event(now, OVERRIDDEN, rule, f"rule {by.id!r} acts instead")

@@ -380,7 +380,7 @@ def plan_from_data(data: Mapping[str, Any]) -> SweepPlan:
     if unknown:
         raise InputError(f"a sweep has no {unknown[0]!r}; it has vary, method, samples and seed")
     vary = data.get("vary", [])
-    if not isinstance(vary, list) or not all(isinstance(one, dict) for one in vary):
+    if not isinstance(vary, list) or not all(isinstance(axis, dict) for axis in vary):
         raise InputError("vary must be a list of ranges, sets and tables")
     samples = data.get("samples")
     method = data.get("method", "grid" if samples is None else "sobol")
@@ -405,7 +405,7 @@ def _read_axis(data: Mapping[str, Any], place: str) -> Range | Table:
             None if steps is None else _require_real(steps, f"{place}.steps"),
         )
     if keys == {"parameter", "values"} and isinstance(data["values"], list):
-        rows = tuple((_require_real(one, f"{place}.values"),) for one in data["values"])
+        rows = tuple((_require_real(number, f"{place}.values"),) for number in data["values"])
         return _make_table((str(data["parameter"]),), rows, place)
     if keys == {"parameters", "table"} and isinstance(data["table"], list):
         if not isinstance(data["parameters"], list):
@@ -427,7 +427,7 @@ def _read_row(row: object, names: tuple[str, ...], place: str) -> tuple[float, .
         raise InputError(
             f"{place}.table: row {row!r:.60} does not have a value of each of {', '.join(names)}"
         )
-    return tuple(_require_real(one, f"{place}.table") for one in row)
+    return tuple(_require_real(number, f"{place}.table") for number in row)
 
 
 def _make_table(names: tuple[str, ...], rows: tuple[tuple[float, ...], ...], place: str) -> Table:

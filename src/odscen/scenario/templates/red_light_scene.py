@@ -170,7 +170,11 @@ def _nodes_behind(site: TemplateSite, node: int, out: str) -> list[int]:
     there = int(lanes.lanes.first_node[rows[0]])
     beyond = min(there + int(20.0 / lanes.spacing), int(lanes.lanes.first_node[rows[0] + 1]) - 1)
     path = router.path(node, beyond).tolist()
-    return [int(one) for one in path[1:]] if len(path) < int(100.0 / lanes.spacing) else []
+    return (
+        [int(node_behind) for node_behind in path[1:]]
+        if len(path) < int(100.0 / lanes.spacing)
+        else []
+    )
 
 
 def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, int]:

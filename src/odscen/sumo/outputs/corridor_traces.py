@@ -131,8 +131,8 @@ def _place_records(
     xy = np.column_stack([lanes.x, lanes.y])[nodes] + np.array(sumo_map.net_offset)
     at, lane = rows.select("vehicle_x", "vehicle_y").to_numpy(), rows["lane"].to_numpy()
     away, near = np.empty(len(at)), np.empty(len(at), dtype=np.int64)
-    for one in np.unique(lane).tolist():
-        here, own = np.flatnonzero(lane == one), np.flatnonzero(places.lane[nodes] == one)
+    for number in np.unique(lane).tolist():
+        here, own = np.flatnonzero(lane == number), np.flatnonzero(places.lane[nodes] == number)
         away[here], found = nearest(at[here], xy[own])
         near[here] = own[found]
     ahead = at - xy[near]

@@ -31,7 +31,7 @@ class Diversions:
         self._closed = plan.closed
         self._offset = plan.net_offset
         self._last = plan.until
-        moments = {one.begin for one in plan.closed} | {one.end for one in plan.closed}
+        moments = {period.begin for period in plan.closed} | {period.end for period in plan.closed}
         moments |= {measure.begin for measure in plan.measures} | {
             measure.end for measure in plan.measures
         }
@@ -95,8 +95,8 @@ class Diversions:
 
     def _update_closed(self, end: float) -> None:
         """Know what is closed in the step that ends at ``end``."""
-        active = [one for one in self._closed if one.begin < end and one.end >= end]
-        self._pairs = {one.vclass: frozenset(one.pairs) for one in active}
+        active = [period for period in self._closed if period.begin < end and period.end >= end]
+        self._pairs = {period.vclass: frozenset(period.pairs) for period in active}
         self._inside = set()
 
     def _departing_between(self, begin: float, end: float) -> list[str]:

@@ -239,9 +239,9 @@ def encode(message: Message | Command | EgoPose | Outside | MoreRules) -> str:
     )
 
 
-def _shallow_fields(one: Any) -> dict[str, Any]:
+def _shallow_fields(record: Any) -> dict[str, Any]:
     """What ``asdict`` gives, one level; it would copy each text."""
-    return {field.name: getattr(one, field.name) for field in fields(one)}
+    return {field.name: getattr(record, field.name) for field in fields(record)}
 
 
 def decode(line: str | bytes) -> Message | Command | EgoPose | Outside | MoreRules | None:

@@ -159,7 +159,7 @@ def _run_slice(
         send(done)
         return End(0)
     following = watch.steering.hand_over() if isinstance(watch, Watch) else []
-    return End(0, [encode(one) for one in following])
+    return End(0, [encode(command) for command in following])
 
 
 def _describe_error(error: Exception) -> str:

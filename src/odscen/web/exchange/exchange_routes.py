@@ -109,13 +109,13 @@ def formats() -> list[FormatInfo]:
     """All foreign formats, those of installed packages included."""
     return [
         FormatInfo(
-            id=one.id,
-            title=one.title,
-            description=one.description or one.label,
-            of=list(one.of),
-            suffixes=list(one.suffixes),
-            reads=one.read is not None,
-            writes=one.write is not None,
+            id=form.id,
+            title=form.title,
+            description=form.description or form.label,
+            of=list(form.of),
+            suffixes=list(form.suffixes),
+            reads=form.read is not None,
+            writes=form.write is not None,
             options=[
                 FormatOptionInfo(
                     name=option.name,
@@ -123,10 +123,10 @@ def formats() -> list[FormatInfo]:
                     values=list(option.values),
                     default=option.default,
                 )
-                for option in one.options
+                for option in form.options
             ],
         )
-        for one in list_formats().values()
+        for form in list_formats().values()
     ]
 
 
@@ -155,7 +155,7 @@ def import_files(
             shared.drafts.keep(draft.name, _PLAN, read.plan)
         return JobResult(draft.name)
 
-    subject = f"the import of {', '.join(sorted(one.name for one in sent))}"
+    subject = f"the import of {', '.join(sorted(sent_file.name for sent_file in sent))}"
     return JobStarted(job=shared.jobs.start(work, subject=subject))
 
 

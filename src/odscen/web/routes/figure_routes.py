@@ -49,8 +49,10 @@ class ActorMeasureInfo(Answer):
 def actor_measures() -> list[ActorMeasureInfo]:
     """All measures of single actors, in the order in which they are offered."""
     return [
-        ActorMeasureInfo(name=one.name, unit=one.unit, label=one.label, definition=one.definition)
-        for one in ACTOR_MEASURES
+        ActorMeasureInfo(
+            name=measure.name, unit=measure.unit, label=measure.label, definition=measure.definition
+        )
+        for measure in ACTOR_MEASURES
     ]
 
 

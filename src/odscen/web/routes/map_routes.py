@@ -280,7 +280,9 @@ def _list_catalogue(shared: Shared) -> Iterator[MapInfo | BrokenMapInfo]:
             yield _map_info(entry)
         except (AttributeError, KeyError, TypeError, ValueError):
             yield _rebuild_or_report(shared, entry)
-    yield from (BrokenMapInfo(name=one.name, problem=one.problem) for one in broken)
+    yield from (
+        BrokenMapInfo(name=broken_map.name, problem=broken_map.problem) for broken_map in broken
+    )
 
 
 def _rebuild_or_report(shared: Shared, entry: MapEntry) -> MapInfo | BrokenMapInfo:

@@ -168,9 +168,9 @@ def egos(run: str, shared: Shared) -> RunEgos:
     """What became of the vehicles under test of a finished run."""
     path = _finished_file(shared, run, layout.ACTORS_FILE)
     with _name_run_in_errors(path.parent):
-        found = [one for one in actors_from_json(_read_text(path)) if one.ego]
+        found = [ego for ego in actors_from_json(_read_text(path)) if ego.ego]
     names = EgoOutcome.model_fields
-    return RunEgos(egos=[EgoOutcome(**{n: getattr(one, n) for n in names}) for one in found])
+    return RunEgos(egos=[EgoOutcome(**{n: getattr(ego, n) for n in names}) for ego in found])
 
 
 @router.get("/{run}/curves")

@@ -114,11 +114,11 @@ def list_templates() -> list[TemplateInfo]:
     """All templates, in the order in which they are offered."""
     return [
         TemplateInfo(
-            name=one.name,
-            title=one.title,
-            summary=one.summary,
-            source=one.source,
-            needs=one.needs,
+            name=template.name,
+            title=template.title,
+            summary=template.summary,
+            source=template.source,
+            needs=template.needs,
             numbers=[
                 TemplateNumber(
                     name=number.name,
@@ -128,10 +128,10 @@ def list_templates() -> list[TemplateInfo]:
                     unit=number.unit,
                     meaning=number.meaning,
                 )
-                for number in one.parameters
+                for number in template.parameters
             ],
         )
-        for one in TEMPLATES.values()
+        for template in TEMPLATES.values()
     ]
 
 

@@ -154,7 +154,7 @@ class Studies:
             if (folder / STUDY_FILE).is_file() and not folder.name.startswith("."):
                 with suppress(InputError, OSError):  # of another version, or just removed
                     found.append(self.info(folder.name))
-        return sorted(found, key=lambda one: (one.changed, one.study))
+        return sorted(found, key=lambda row: (row.changed, row.study))
 
     def folder(self, name: str) -> Path:
         """Folder of a study; :class:`NotFoundError` if there is none of that name."""

@@ -75,7 +75,7 @@ def results(study: str, shared: Shared, figure: str | None = None) -> StudyResul
     """One figure of a study: means with their intervals, differences, and the runs' own values."""
     folder = shared.studies.folder(study)
     names = figures_had(folder)
-    shown = figure or next((one for one in SHOWN_FIGURES if one in names), names[0])
+    shown = figure or next((figure for figure in SHOWN_FIGURES if figure in names), names[0])
     groups, differences = study_groups(folder, [shown])
     return StudyResults(
         figures=[_figure_info(name) for name in names],

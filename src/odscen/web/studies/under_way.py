@@ -103,11 +103,11 @@ class OneAtATime:
 
     def close(self) -> None:
         """Stop what is under way; it can be resumed."""
-        for one in self._known.values():
-            one.stop.set()
+        for work in self._known.values():
+            work.stop.set()
         self._pool.shutdown(wait=False, cancel_futures=True)
         end = time.monotonic() + _END
-        while time.monotonic() < end and not all(one.over for one in self._known.values()):
+        while time.monotonic() < end and not all(work.over for work in self._known.values()):
             time.sleep(0.02)
 
 

@@ -189,8 +189,8 @@ class Sweeps:
             if (folder / SWEEP_FILE).is_file() and not folder.name.startswith("."):
                 with suppress(InputError, OSError):  # not a name of ours, or just removed
                     found.append(self.info(folder.name))
-        wanted = [one for one in found if scenario is None or one.scenario == _name_stem(scenario)]
-        return sorted(wanted, key=lambda one: (one.changed, one.sweep))
+        wanted = [row for row in found if scenario is None or row.scenario == _name_stem(scenario)]
+        return sorted(wanted, key=lambda row: (row.changed, row.sweep))
 
     def table(self, name: str) -> tuple[Sweep, Scenario, dict[str, Any]]:
         """Table of a sweep as far as it is, its scenario, and how it is judged."""

@@ -67,7 +67,7 @@ class SweepWish(RequestBody):
     @property
     def plan(self) -> dict[str, Any]:
         """The plan as data."""
-        vary = [one.data for one in self.vary]
+        vary = [axis.data for axis in self.vary]
         return {
             "vary": vary, "method": self.method, "samples": self.samples, "seed": self.sample_seed,
         }  # fmt: skip

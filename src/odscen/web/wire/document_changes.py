@@ -70,7 +70,7 @@ def changes_between(before: Scenario, after: Scenario) -> list[DocumentChange]:
         if not (isinstance(old, tuple) and isinstance(new, tuple)):
             # As the document writes it: a part alone may be written otherwise.
             pair = (before, after)
-            old, new = (one.model_dump(mode="json", include={name})[name] for one in pair)
+            old, new = (document.model_dump(mode="json", include={name})[name] for document in pair)
         found += _list_changes(old, new, f"/{name}")
     return found
 
@@ -146,7 +146,7 @@ def _replace_change(value: Any, path: str) -> DocumentChange:
 def _json_value(value: Any) -> Any:
     if isinstance(value, BaseModel):
         return value.model_dump(mode="json")
-    return [_json_value(one) for one in value] if isinstance(value, list | tuple) else value
+    return [_json_value(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _escape_key(key: str) -> str:

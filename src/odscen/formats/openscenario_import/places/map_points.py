@@ -67,7 +67,7 @@ class MovingFrame:
         """
         name = self._report.word(kind, "entityRef")
         if kind.tag != "RelativeObjectPosition":
-            if any(self._report.number(kind, one, 0.0) for one in _HERE):
+            if any(self._report.number(kind, key, 0.0) for key in _HERE):
                 raise RefusedError(
                     kind, f"a place relative to {name!r}, which moves: it is known in the run only"
                 )
@@ -77,7 +77,7 @@ class MovingFrame:
         if turn is not None and turn.get("type", "absolute") == "absolute":
             raise RefusedError(turn, f"a direction of the map at {name!r}, which moves")
         self._names.add(name)
-        dx, dy = (self._report.number(kind, one, 0.0) for one in ("dx", "dy"))
+        dx, dy = (self._report.number(kind, key, 0.0) for key in ("dx", "dy"))
         return self._origin.moved(dx, self._side * dy)
 
     def itself(self) -> MapPoint:

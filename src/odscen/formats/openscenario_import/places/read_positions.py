@@ -152,7 +152,7 @@ class PositionReader:
             return None
         these = self.graph.walks if walks else self.graph.lanes
         node = None if walks else index
-        x, y, hdg = (float(one[index]) for one in (these.x, these.y, these.hdg))
+        x, y, hdg = (float(column[index]) for column in (these.x, these.y, these.hdg))
         return MapPoint(x, y, hdg, node)
 
     def name_at(self, point: MapPoint) -> str | None:

@@ -47,7 +47,7 @@ def with_parameters(
     made: dict[str, Made] = {}
     for name, one in declared.items():
         made[name] = _read_parameter(report, one, frozenset(made))
-    used = frozenset().union(*(names_in(report.formulas[one]) for one in reached))
+    used = frozenset().union(*(names_in(report.formulas[place]) for place in reached))
     kept = _with_needed(made, used)
     document["parameters"] = {name: one for name, one in made.items() if name in kept}
     for name, element in declared.items():
@@ -61,7 +61,7 @@ def _with_needed(made: Mapping[str, Made], used: frozenset[str]) -> frozenset[st
     left = used & made.keys()
     while left:
         found |= left
-        texts = [str(one) for name in left for one in made[name].values()]
+        texts = [str(formula) for name in left for formula in made[name].values()]
         left = frozenset().union(*map(names_in, texts)) & (made.keys() - found)
     return found
 

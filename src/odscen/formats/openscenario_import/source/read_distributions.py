@@ -129,8 +129,8 @@ class _DistributionReader:
         if name in self.known:
             return True
         words = "no number of the scenario comes from it: it keeps its declared value"
-        for one in element.iter("*"):
-            self.report.mark(one, "approximated", words)
+        for inner in element.iter("*"):
+            self.report.mark(inner, "approximated", words)
         return False
 
     def drawn(self, group: _Element) -> list[Range | Table]:
@@ -186,7 +186,7 @@ def _draw_normal(
 ) -> FloatArray:
     from scipy.stats import truncnorm
 
-    mean, variance = (read.report.number(kind, one) for one in ("expectedValue", "variance"))
+    mean, variance = (read.report.number(kind, key) for key in ("expectedValue", "variance"))
     low, high = read.limits(kind)
     if variance < 0:
         raise read.report.wrong(kind, f"the variance {variance:g} is negative")
@@ -222,7 +222,7 @@ def _draw_histogram(
 ) -> FloatArray:
     bins = list(read.report.children(kind, "Bin", "HistogramBin"))
     chosen = generator.choice(len(bins), count, p=_read_shares(read, kind, bins))
-    limits = np.array([read.limits(one) for one in bins])
+    limits = np.array([read.limits(bin_element) for bin_element in bins])
     if not np.isfinite(limits).all():
         raise read.report.wrong(kind, "a bin has no Range")
     low, high = limits[chosen].T

@@ -107,16 +107,21 @@ class TreeResolver:
         found = dict(values)
         for group in element.iterchildren("ParameterDeclarations", "VariableDeclarations"):
             self._report.mark(group, "taken")
-            for one in group.iterchildren("ParameterDeclaration", "VariableDeclaration"):
-                self._put_values(one, found)
-                name, text = one.get("name", "").lstrip("$"), str(one.get("value", ""))
-                formula = self._report.formulas.get((one, "value"))
-                if named and one.tag == "ParameterDeclaration" and is_parameter(name, text):
+            for declaration in group.iterchildren("ParameterDeclaration", "VariableDeclaration"):
+                self._put_values(declaration, found)
+                name, text = (
+                    declaration.get("name", "").lstrip("$"),
+                    str(declaration.get("value", "")),
+                )
+                formula = self._report.formulas.get((declaration, "value"))
+                if named and declaration.tag == "ParameterDeclaration" and is_parameter(name, text):
                     formula = f"${name}"
-                    self.parameters[name] = one
+                    self.parameters[name] = declaration
                 elif formula is None:
-                    self._report.mark(one, "approximated", "its value is put in where it is named")
-                self._report.mark(one, "taken")
+                    self._report.mark(
+                        declaration, "approximated", "its value is put in where it is named"
+                    )
+                self._report.mark(declaration, "taken")
                 found[name] = text if formula is None else TracedText.of(text, formula)
         return found
 
@@ -133,7 +138,9 @@ class TreeResolver:
     ) -> None:
         """Note which parameters an attribute comes from, and by which formula if it has one."""
         named = [values.get(name) for name in _NAME.findall(text)]
-        used = [names_in(one.formula) for one in named if isinstance(one, TracedText)]
+        used = [
+            names_in(text_part.formula) for text_part in named if isinstance(text_part, TracedText)
+        ]
         if not used:
             return
         self._report.uses[element, key] = frozenset().union(*used)
@@ -177,12 +184,12 @@ class TreeResolver:
             return
         self._report.add(copy, found[1])
         for group in copy.iterchildren("ParameterDeclarations"):
-            for one in group:
-                if one.get("name") in given:
-                    text = given[str(one.get("name"))]
-                    one.set("value", str(text))
+            for constraint in group:
+                if constraint.get("name") in given:
+                    text = given[str(constraint.get("name"))]
+                    constraint.set("value", str(text))
                     if isinstance(text, TracedText):
-                        self._report.formulas[one, "value"] = text.formula
+                        self._report.formulas[constraint, "value"] = text.formula
         # An entry should declare all that it names; esmini's use parameters of the file too.
         self._resolve_inside(copy, values, depth=depth + 1)
         parent = element.getparent()
@@ -209,11 +216,14 @@ class TreeResolver:
         found = {}
         for group in element.iterchildren("ParameterAssignments"):
             self._report.mark(group, "taken")
-            for one in group.iterchildren("ParameterAssignment"):
-                self._put_values(one, values)
-                self._report.mark(one, "taken")
-                text, formula = str(one.get("value", "")), self._report.formulas.get((one, "value"))
-                name = one.get("parameterRef", "").lstrip("$")
+            for assignment in group.iterchildren("ParameterAssignment"):
+                self._put_values(assignment, values)
+                self._report.mark(assignment, "taken")
+                text, formula = (
+                    str(assignment.get("value", "")),
+                    self._report.formulas.get((assignment, "value")),
+                )
+                name = assignment.get("parameterRef", "").lstrip("$")
                 found[name] = text if formula is None else TracedText.of(text, formula)
         return found
 

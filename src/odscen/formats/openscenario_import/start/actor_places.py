@@ -82,7 +82,7 @@ class ActorPlaces:
 
         A vehicle that stands across its lane starts along it.
         """
-        spawn, there = (self._positions.of_node(one) for one in (made["spawn"], goal))
+        spawn, there = (self._positions.of_node(node) for node in (made["spawn"], goal))
         if spawn is None or there is None or spawn.node is None or there.node is None:
             return goal
         if bool(Router(self._positions.graph).reachable(spawn.node)[there.node]):
@@ -123,7 +123,7 @@ class ActorPlaces:
         """
         lanes = self._positions.graph.lanes
         hdg, speed = float(lanes.hdg[self._positions.node_near(centre)]), made["initial_speed"]
-        then = sorted(then, key=lambda one: "path" in one)  # as fast as the speed is by then
+        then = sorted(then, key=lambda action: "path" in action)  # as fast as the speed is by then
         across = bool(left) or math.cos(centre.hdg - hdg) < _ALONG
         if "path" in then[-1] and across:
             made["lateral_offset"] = 0.0

@@ -79,7 +79,9 @@ class AppearanceReader:
 
     def _begin_of_trajectory(self, kind: _Element) -> MapPoint:
         self.report.mark(kind, "approximated", "the actor starts on it")
-        first, second, *_ = (one.at for one in read_trajectory(self.report, self.positions, kind))
+        first, second, *_ = (
+            point.at for point in read_trajectory(self.report, self.positions, kind)
+        )
         return first._replace(hdg=math.atan2(second.y - first.y, second.x - first.x))
 
     @staticmethod

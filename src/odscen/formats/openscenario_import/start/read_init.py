@@ -160,7 +160,7 @@ class InitReader:
                     report.mark(error.element, "refused", error.reason)
                 continue
             if entity.own is None:  # others of ours may depart later from one place
-                self._places.leave_room(entity, made, {str(one["spawn"]) for one in found})
+                self._places.leave_room(entity, made, {str(actor["spawn"]) for actor in found})
             found.append(made)
             self.placed.add(entity.id)
         for name in [n for n, one in self._entities.items() if one.id not in self.placed]:
@@ -184,10 +184,10 @@ class InitReader:
                     self._places.walker(centre) if walks else self._places.vehicle(entity, centre)
                 )
                 made |= {key: found[key] for key in found if key != "goal"}
-        speeds = [one["speed"]["to"] for one in then if "speed" in one]
+        speeds = [action["speed"]["to"] for action in then if "speed" in action]
         if speeds and abs(speeds[-1] - (made.get("initial_speed") or 0.0)) > _SAME_SPEED:
             made["initial_speed"] = speeds[-1]
-        goals = [one["goal"]["to"] for one in then if "goal" in one]
+        goals = [action["goal"]["to"] for action in then if "goal" in action]
         wanted = nodes.of_node(made.get("goal") or "")
         there = nodes.of_node(goals[-1]) if goals else None
         if wanted and wanted.node is not None and there and there.away(wanted) > _SAME_PLACE:
@@ -199,7 +199,7 @@ class InitReader:
     ) -> dict[str, Any]:
         centre = start.moved(entity.ahead)
         then = self._then.get(entity.id, [])
-        changes = [one["speed"] for one in then if "speed" in one]
+        changes = [action["speed"] for action in then if "speed" in action]
         speed = changes[-1]["to"] if changes else 0.0
         # What takes time begins from a standstill, which entities are at before the first action.
         first = speed if all(change.get("shape") == "step" for change in changes) else 0.0
@@ -212,9 +212,9 @@ class InitReader:
         else:
             left = self._places.aside(entity, centre)
             made |= self._places.vehicle(entity, centre) | {"style": STEADY, "initial_speed": first}
-            goals = [one["goal"]["to"] for one in then if "goal" in one]
+            goals = [action["goal"]["to"] for action in then if "goal" in action]
             made |= {"goal": self._places.reached(entity, made, goals[-1])} if goals else {}
-            then = [one for one in then if "goal" not in one]
+            then = [action for action in then if "goal" not in action]
             if not changes:
                 then.append({"speed": {"to": 0.0, "shape": "step"}})
             then = self._places.at_first(centre, left, then, made)

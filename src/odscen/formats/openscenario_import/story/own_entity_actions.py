@@ -33,7 +33,7 @@ def own_entity_action(
         start = start.moved(0.0, float(own.get("lateral_offset", 0.0)))
         if at.away(start) < _SAME and abs(at.hdg - start.hdg) < _SAME:
             return {"appear": {}}
-    return {"appear": {"at": [round(one, 4) for one in (at.x, at.y, at.hdg)]}}
+    return {"appear": {"at": [round(value, 4) for value in (at.x, at.y, at.hdg)]}}
 
 
 def with_speed(then: list[Made], entity: ReadEntity) -> list[Made]:

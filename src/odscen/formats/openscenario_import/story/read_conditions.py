@@ -245,7 +245,7 @@ def _stays_true(made: Made) -> bool:
     """Whether a condition holds for good once it does."""
     (kind,) = (key for key in made if key not in ("edge", "delay"))
     if kind in ("all", "any"):
-        return "edge" not in made and all(_stays_true(one) for one in made[kind])
+        return "edge" not in made and all(_stays_true(inner) for inner in made[kind])
     return kind in ("time", "rule")
 
 

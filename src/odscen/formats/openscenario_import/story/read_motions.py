@@ -79,12 +79,14 @@ def followed(conditions: ConditionReader, kind: _Element, entity: ReadEntity) ->
         found = read_trajectory(report, positions, kind)
     base = frame.base(kind, entities)
     if base is not None:
-        found = [one._replace(at=one.at._replace(x=one.at.x - entities[base].ahead))
-                 for one in found]  # fmt: skip
+        found = [point._replace(at=point.at._replace(x=point.at.x - entities[base].ahead))
+                 for point in found]  # fmt: skip
         if base == own and math.cos(found[0].at.hdg) < 0.0:
             raise RefusedError(kind, "a trajectory that begins backwards: actors do not reverse")
     vertices = [
-        (one.time, round(at.x, 4), round(at.y, 4)) for one in found for at in (one.at.moved(front),)
+        (point.time, round(at.x, 4), round(at.y, 4))
+        for point in found
+        for at in (point.at.moved(front),)
     ]
     report.mark(kind, "approximated", "followed by the front, from where the actor is")
     relative = {} if base is None else {"relative_to": entities[base].id}

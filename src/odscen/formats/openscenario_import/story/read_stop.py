@@ -40,7 +40,7 @@ def read_stop(report: ImportReport, board: _Element, story: StoryReader) -> floa
             _take_stop_time(report, times, board)
             found.append(min(seconds))
             report.mark(group, "approximated", "the run ends by time alone")
-    if found := [one for one in found if one > 0]:
+    if found := [time for time in found if time > 0]:
         return min(found)
     duration = _USUAL_DURATION + latest
     if stop is not None:
@@ -53,7 +53,7 @@ def _stop_condition(
     report: ImportReport, group: _Element, conditions: ConditionReader
 ) -> Made | None:
     """Condition on which the run ends, if that can happen and is known."""
-    if any(one.get("name", "").startswith(_CRITERION) for one in group):
+    if any(condition.get("name", "").startswith(_CRITERION) for condition in group):
         return None
     try:
         when = conditions.group(group)

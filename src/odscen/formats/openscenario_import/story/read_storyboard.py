@@ -72,8 +72,8 @@ class StoryReader:
                 self._read_act(act)
         while self._waiting:  # for elements that come later in the file
             again, self._waiting = self._waiting, []
-            for one in again:
-                self._read_event(*one)
+            for later_event in again:
+                self._read_event(*later_event)
             if len(self._waiting) == len(again):
                 self._last.append(True)
 
@@ -264,9 +264,9 @@ class StoryReader:
             return
         made = self.actions.conditions.signals.action(about)
         above = about.getparent()
-        for one in () if above is None else (above, above.getparent()):
-            if one is not None:
-                self.report.mark(one, "taken")
+        for element in () if above is None else (above, above.getparent()):
+            if element is not None:
+                self.report.mark(element, "taken")
         self._add_rule(event, next(iter(self.entities.values())).id, when, [made], times)
 
     def _read_then(self, event: _Element, entity: ReadEntity) -> list[Made]:
@@ -280,7 +280,7 @@ class StoryReader:
                 found += self._read_global_action(content, entity)
             elif self.actions is not None:
                 found += self.actions.actions(content, entity)
-        if len(found) > 1 and any(FOLLOWING in one for one in found):
+        if len(found) > 1 and any(FOLLOWING in action for action in found):
             raise RefusedError(event, "a speed profile beside other actions of its event")
         if len(found) == 1 and "replay" in found[0] and entity.id in self.later:
             return [{FOLLOWING: self._appear_actions(entity, found[0]["replay"]["rows"][0][1:])}]
@@ -311,9 +311,9 @@ class StoryReader:
         entity = self.entities.get(about.get("entityRef", ""))
         if entity is None:
             raise RefusedError(about, f"entity {about.get('entityRef')!r} is not among the actors")
-        for one in (about.getparent(), about, *about):
-            if one is not None:
-                self.report.mark(one, "taken")
+        for element in (about.getparent(), about, *about):
+            if element is not None:
+                self.report.mark(element, "taken")
         position = about.find("AddEntityAction/Position")
         if position is None:
             self._add_rule(event, entity.id, when, [{"vanish": {}}], times)
@@ -355,7 +355,7 @@ class StoryReader:
         if rest and ("appear" in first[0] or "replay" in first[0]):
             groups = [[*first, *(rest if len(rest) == 1 else [{"together": rest}])]]
         else:
-            groups = [[one] for one in then]
+            groups = [[action] for action in then]
         for group in groups:
             name = plain_id(f"init-{actor}", self._ids)
             self.rules.append({"id": name, "actor": actor, "when": ALWAYS, "then": group})

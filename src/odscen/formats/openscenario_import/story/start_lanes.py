@@ -36,7 +36,7 @@ def start_lane(conditions: ConditionReader, element: _Element, actor: str) -> tu
         raise RefusedError(element, f"a lane that counts from {actor!r}, which has no place")
     lanes = positions.graph.lanes
     near = positions.node_near(start)
-    row, own = (int(lanes.lane[near if one is None else one]) for one in (start.node, near))
+    row, own = (int(lanes.lane[near if node is None else node]) for node in (start.node, near))
     key = lanes.lanes.keys[row]
     return key.road, key.lane, 1 if bool(lanes.lanes.forward[own]) else -1
 

@@ -95,9 +95,9 @@ def read_environment(
         element = action.find("Environment")
         if element is None:
             continue  # a catalog that is missing: said already
-        for one in (action.getparent(), action, element):
-            if one is not None:
-                report.mark(one, "taken")
+        for holder in (action.getparent(), action, element):
+            if holder is not None:
+                report.mark(holder, "taken")
         try:
             found = _read_weather(report, element, weather, driven=driven, own=own)
         except InputError as error:

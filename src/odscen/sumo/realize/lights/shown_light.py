@@ -97,9 +97,9 @@ class ShownLight:
         link = self._light.links[n]
         onto = next(
             (
-                one.via
-                for one in self._net.links_from.get(link.source, ())
-                if one.target == link.target
+                onward.via
+                for onward in self._net.links_from.get(link.source, ())
+                if onward.target == link.target
             ),
             None,
         )

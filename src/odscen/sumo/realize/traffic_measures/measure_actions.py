@@ -150,19 +150,20 @@ def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> M
     found = MeasuredLanes(sumo_map)
     closings = [
         ClosedLanes(
-            one.id,
-            one.begin,
-            end_of(one, until),
-            found.closed_by(closed_places(one)),
-            frozenset(KINDS[category].vclass for category in banned_by(one)),
+            measure.id,
+            measure.begin,
+            end_of(measure, until),
+            found.closed_by(closed_places(measure)),
+            frozenset(KINDS[category].vclass for category in banned_by(measure)),
         )
-        for one in active
-        if isinstance(one, RoadClosure | Roadworks | ChangedPermission) and closed_places(one)
+        for measure in active
+        if isinstance(measure, RoadClosure | Roadworks | ChangedPermission)
+        and closed_places(measure)
     ]
     lines = [*_rerouter_lines(closings, found), *_speed_sign_lines(active, found, until)]
     xml = "\n".join(["<additional>", *lines, "</additional>", ""]) if lines else None
     planned = sorted(
-        (_plan_measure(one, found, sumo_map, until) for one in active), key=_begin_and_id
+        (_plan_measure(measure, found, sumo_map, until) for measure in active), key=_begin_and_id
     )
     return MeasureActions(
         xml,

@@ -224,7 +224,7 @@ class BehaviourRun:
             pos = float(asked.real["pos"][row])
             self._road.put_on_lane(name, str(self._sight.scene.lane_id[lane]), pos)
         elif kind == DrivingKind.POSE:
-            x, y, hdg = (float(asked.real[one][row]) for one in ("x", "y", "hdg"))
+            x, y, hdg = (float(asked.real[column][row]) for column in ("x", "y", "hdg"))
             half = 0.5 * float(self._sight.scene.vehicle_length[vehicle])
             x += half * math.cos(hdg) + self._plan.net_offset[0]
             y += half * math.sin(hdg) + self._plan.net_offset[1]

@@ -71,7 +71,11 @@ class DrivenVehicles:
         count = self._count()
         if count != self._present[0] or any(number() for number in self._happened):
             place = self._place
-            names = [one for one in self._ids() if one in known and abs(place(one)[0]) < _NOWHERE]
+            names = [
+                vehicle
+                for vehicle in self._ids()
+                if vehicle in known and abs(place(vehicle)[0]) < _NOWHERE
+            ]
             self._present = count, names
         return self._present[1]
 

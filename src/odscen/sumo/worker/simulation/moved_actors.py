@@ -367,4 +367,4 @@ class MovedActors:
     def collisions(self) -> set[frozenset[str]]:
         """Pairs that SUMO itself has seen collide in the last step."""
         found = self._sumo.simulation.getCollisions()
-        return {frozenset((one.collider, one.victim)) for one in found}
+        return {frozenset((collision.collider, collision.victim)) for collision in found}

@@ -59,13 +59,13 @@ class StoryHands:
 
     def obey(self, road: MovedActors, asked: Sequence[Wanted], time: float) -> None:
         """Do what rules have asked for in this step."""
-        for one in asked:
-            if isinstance(one, WantedActor):
-                self._put_on_road(road, one, time)
-            elif isinstance(one, WantedEnd):
+        for wish in asked:
+            if isinstance(wish, WantedActor):
+                self._put_on_road(road, wish, time)
+            elif isinstance(wish, WantedEnd):
                 self.over = True
             else:
-                self._switch_light(road, one, time)
+                self._switch_light(road, wish, time)
 
     def departures(self, road: MovedActors) -> None:
         """Give those who have appeared the speed with which SUMO would not have let them depart."""

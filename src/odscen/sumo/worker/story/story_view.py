@@ -117,7 +117,9 @@ class StoryView:
 
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""
-        return tuple(one for one in map(self.actor, self._actors) if one is not None)
+        return tuple(
+            actor_view for actor_view in map(self.actor, self._actors) if actor_view is not None
+        )
 
     def leapt(self, name: str) -> bool:
         """Whether an actor who was read a step before has been put aside since."""
