@@ -19,7 +19,7 @@ from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.scenario_document import MapReference, Scenario, Simulation
 from odscen.scenario.placing.bodies import box_at, overlap
 from odscen.scenario.placing.region import Region, Usable
-from odscen.scenario.sampling.sampler import wanted_crew
+from odscen.scenario.sampling.sampler import wanted_users
 from tests.graphs import fork, ring, two_lane_road
 
 GRAPHS = {"fork": fork(), "road": two_lane_road(300.0), "ring": ring()}
@@ -28,7 +28,7 @@ ROAD = GRAPHS["road"]
 
 def filled(graph: MapGraph, **columns: Any) -> CheckedFill:
     region = Region.of(graph, graph.segments.ids)
-    crew = wanted_crew(region, SamplingConfig(), Usable(), fill=0.5)
+    crew = wanted_users(region, SamplingConfig(), Usable(), fill=0.5)
     request = FillRequest(
         graph,
         region.lanes,

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Actor
     from odscen.scenario.edits.actor_edits import NamedPlacer
     from odscen.scenario.placing.region import Region
-    from odscen.scenario.sampling.sampler import Crew
+    from odscen.scenario.sampling.sampler import WantedUsers
 
 GROUP = "odscen.generators"
 """Of entry points."""
@@ -97,7 +97,7 @@ def open_generator(door: GeneratorDoor) -> Generator:
         raise InputError(f"it cannot be made: {error!r}", element=name) from error
     if not callable(getattr(made, "fill", None)):
         raise InputError("it has no method `fill(graph, request, rng)`", element=name)
-    return _Guarded(made, name)
+    return _GuardedGenerator(made, name)
 
 
 def installed_generators() -> tuple[OfferedModel, ...]:
@@ -113,7 +113,7 @@ def placer_of(loaded: LoadedMap) -> NamedPlacer:
 
     def place_by(
         name: str, options: Mapping[str, OptionValue], seed: int
-    ) -> Callable[[Region, Crew], tuple[Actor, ...]]:
+    ) -> Callable[[Region, WantedUsers], tuple[Actor, ...]]:
         from odscen.sumo.realize.signals_ahead import lights_at_start
 
         known = _list_installed()
@@ -145,7 +145,7 @@ class Placer:
 
     def for_scenario(
         self, bodies: Mapping[Category, Body], seed: int, *, lights: LightView | None = None
-    ) -> Callable[[Region, Crew], tuple[Actor, ...]]:
+    ) -> Callable[[Region, WantedUsers], tuple[Actor, ...]]:
         """Make the function that asks for a fill of a region, and makes actors of what is good.
 
         It raises :class:`InputError` if nothing of a fill is.
@@ -156,7 +156,7 @@ class Placer:
             What the lights of the map show at the beginning, if it has any.
         """
 
-        def place(region: Region, crew: Crew) -> tuple[Actor, ...]:
+        def place(region: Region, crew: WantedUsers) -> tuple[Actor, ...]:
             request = FillRequest(
                 graph=region.graph,
                 roads=region.lanes,
@@ -183,7 +183,7 @@ class Placer:
 
 
 @dataclass(frozen=True)
-class _Guarded:
+class _GuardedGenerator:
     """Code from outside whose errors end in a message that names it."""
 
     generator: Generator

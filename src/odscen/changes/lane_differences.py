@@ -36,7 +36,7 @@ class RoadPair:
     stretches: tuple[PairedStretch, ...]
 
 
-class _Found(NamedTuple):
+class _PieceDifference(NamedTuple):
     """A difference on a piece of a road, before pieces that say the same are joined."""
 
     what: ChangedThing
@@ -50,7 +50,7 @@ class _Found(NamedTuple):
 
 def lane_differences(pair: RoadPair) -> Iterator[MapChange]:
     """Differences of the lanes of a road, from the centre line outwards, along s."""
-    found: list[_Found] = []
+    found: list[_PieceDifference] = []
     for stretch in pair.stretches:
         found += _lanes_of(stretch)
         for old, new in stretch.pairs:
@@ -63,12 +63,14 @@ def lane_differences(pair: RoadPair) -> Iterator[MapChange]:
         yield _lane_change(pair, join_piece)
 
 
-def _lanes_of(stretch: PairedStretch) -> Iterator[_Found]:
+def _lanes_of(stretch: PairedStretch) -> Iterator[_PieceDifference]:
     for old, new in stretch.pairs:
         if new is None and old is not None:
-            yield _Found("lane", old.id, (old.type, None), stretch.s0, stretch.s1)
+            yield _PieceDifference("lane", old.id, (old.type, None), stretch.s0, stretch.s1)
         elif old is None and new is not None:
-            yield _Found("lane", new.id, (None, new.type), stretch.s0, stretch.s1, added=True)
+            yield _PieceDifference(
+                "lane", new.id, (None, new.type), stretch.s0, stretch.s1, added=True
+            )
 
 
 # ------------------------------------------------------------------------- what holds from s on
@@ -115,7 +117,7 @@ _PROPERTIES: tuple[tuple[ChangedThing, Callable[[Lane, float], str]], ...] = (
 )
 
 
-def _compare_properties(old: Lane, new: Lane, stretch: PairedStretch) -> Iterator[_Found]:
+def _compare_properties(old: Lane, new: Lane, stretch: PairedStretch) -> Iterator[_PieceDifference]:
     if old == new:
         return
     starts = (
@@ -131,13 +133,13 @@ def _compare_properties(old: Lane, new: Lane, stretch: PairedStretch) -> Iterato
         for what, value in _PROPERTIES:
             values = value(old, 0.5 * (s0 + s1)), value(new, 0.5 * (s0 + s1))
             if values[0] != values[1]:
-                yield _Found(what, old.id, values, s0, s1)
+                yield _PieceDifference(what, old.id, values, s0, s1)
 
 
 # ------------------------------------------------------------------------- widths and limits
 def _compare_widths(
     pair: RoadPair, stretch: PairedStretch, lanes: tuple[Lane, Lane]
-) -> Iterator[_Found]:
+) -> Iterator[_PieceDifference]:
     """Pieces on which the widths differ, with those at the place where they differ most."""
     if lanes[0].widths == lanes[1].widths and lanes[0].borders == lanes[1].borders == ():
         return
@@ -158,16 +160,16 @@ def _compare_widths(
             values = f"{metres(float(old[worst]))} m", f"{metres(float(new[worst]))} m"
             s0, s1 = stretch.s0 + low, stretch.s0 + high
             size = float(apart[worst])
-            yield _Found("width", lanes[0].id, values, s0, s1, size=size)
+            yield _PieceDifference("width", lanes[0].id, values, s0, s1, size=size)
 
 
 def _widths_at(table: RoadTable, key: LaneKey, s: FloatArray) -> FloatArray:
     return table.lane_width(np.full(s.size, table.lane_index[key]), s)
 
 
-def _compare_limits(pair: RoadPair) -> list[_Found]:
+def _compare_limits(pair: RoadPair) -> list[_PieceDifference]:
     """Limits as they act, of lanes for motor vehicles: one of the road where all change alike."""
-    found: list[_Found] = []
+    found: list[_PieceDifference] = []
     for stretch in pair.stretches:
         lanes = [
             (old, new)
@@ -201,7 +203,7 @@ def _limits_of(
     stretch: PairedStretch,
     lanes: Sequence[tuple[Lane, Lane]],
     between: tuple[float, float],
-) -> list[_Found]:
+) -> list[_PieceDifference]:
     middle = np.array([0.5 * (between[0] + between[1])])
     values = []
     for both in lanes:
@@ -216,8 +218,8 @@ def _limits_of(
         values.append((both[0].id, (_describe_limit(old), _describe_limit(new))))
     changed = [(lane, said) for lane, said in values if said[0] != said[1]]
     if changed and len(changed) == len(values) and len({said for _, said in changed}) == 1:
-        return [_Found("limit", None, changed[0][1], *between)]
-    return [_Found("limit", lane, said, *between) for lane, said in changed]
+        return [_PieceDifference("limit", None, changed[0][1], *between)]
+    return [_PieceDifference("limit", lane, said, *between) for lane, said in changed]
 
 
 def _describe_limit(value: float) -> str:
@@ -227,12 +229,12 @@ def _describe_limit(value: float) -> str:
 
 
 # ------------------------------------------------------------------------- one line each
-def _join_pieces(found: Iterable[_Found]) -> list[_Found]:
+def _join_pieces(found: Iterable[_PieceDifference]) -> list[_PieceDifference]:
     """Pieces of a lane that follow each other and say the same, as one.
 
     Widths are one from end to end, with the values where they differ most.
     """
-    kept: list[_Found] = []
+    kept: list[_PieceDifference] = []
     open_pieces: dict[tuple[Any, ...], int] = {}
     for one in found:
         said = None if one.what == "width" else one.values
@@ -247,7 +249,7 @@ def _join_pieces(found: Iterable[_Found]) -> list[_Found]:
     return kept
 
 
-def _lane_change(pair: RoadPair, found: _Found) -> MapChange:
+def _lane_change(pair: RoadPair, found: _PieceDifference) -> MapChange:
     road = pair.after.id if found.added else pair.before.id
     of = of_road(road) if found.lane is None else of_lane(road, found.lane)
     kind: ChangeKind = "changed"

@@ -208,14 +208,14 @@ def search(
         said = _describe_search(plan, search_settings, settings)
         begin_folder(out, {SEARCH_FILE: said}, scenario, what="search")
         executor = LocalExecutor(workspace, processes, check)
-        looking = _Looking(workspace, scenario, plan, out, cases, executor, done)
+        looking = _SearchState(workspace, scenario, plan, out, cases, executor, done)
         while (left := search_settings.runs - len(looking.rows)) > 0:
             places = proposer.ask(min(search_settings.batch, left))
             proposer.tell(looking.run(places))
         return looking.found()
 
 
-class _Looking:
+class _SearchState:
     """Cases that have been run so far."""
 
     def __init__(

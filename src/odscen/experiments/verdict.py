@@ -178,7 +178,7 @@ def hold_against(
     return BaselineVerdict(of("run"), of("segment", "junction"), of("actor"))
 
 
-class _Compared(NamedTuple):
+class _ComparedFigure(NamedTuple):
     """A figure on both sides, by seed, and how many vehicles it rests on."""
 
     key: FigureKey
@@ -187,7 +187,7 @@ class _Compared(NamedTuple):
     weight: float
 
 
-def _compare_seeds(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Compared]:
+def _compare_seeds(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_ComparedFigure]:
     """Figures of the seeds that both have; by scatter also of other seeds, if those differ."""
     common = [seed for seed in baseline.seeds if seed in runs]
     others = baseline.by_scatter and set(runs) != set(baseline.seeds)
@@ -203,7 +203,7 @@ def _compare_seeds(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Co
         if key.place and key.figure == "vehicles":  # a place that no vehicle passes has no row
             old = {seed: value or 0.0 for seed, value in old.items()}
             new = {seed: value or 0.0 for seed, value in new.items()}
-        compared.append(_Compared(key, old, new, 1.0))
+        compared.append(_ComparedFigure(key, old, new, 1.0))
     passed = {
         figure.key: tuple(_mean_count(side) for side in (figure.old, figure.new))
         for figure in compared
@@ -213,7 +213,7 @@ def _compare_seeds(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Co
 
 
 def _share_false_alarms(
-    compared: Sequence[_Compared], tolerances: Tolerances, detect: Detection | None
+    compared: Sequence[_ComparedFigure], tolerances: Tolerances, detect: Detection | None
 ) -> Level:
     """Share out false alarms among the figures that can fail by scatter."""
     run = places = 0
@@ -233,7 +233,7 @@ class _Limits(NamedTuple):
     detect: Detection | None
     better_fails: bool
 
-    def by_scatter(self, compared: _Compared, usual: Tolerance) -> Tolerance:
+    def by_scatter(self, compared: _ComparedFigure, usual: Tolerance) -> Tolerance:
         """What chance explains, where that is more than the least that matters."""
         watched = (
             self.detect if self.detect is not None and compared.key == self.detect.key else None
@@ -261,7 +261,7 @@ def _mean_known(values: Mapping[int, float | None]) -> float:
 
 
 def _judge_change(
-    compared: _Compared, tolerance: Tolerance, tolerances: Tolerances, *, by_scatter: bool
+    compared: _ComparedFigure, tolerance: Tolerance, tolerances: Tolerances, *, by_scatter: bool
 ) -> Change | None:
     key, entry = compared.key, tolerances.entry(compared.key)
     difference = compare_figure(compared.old, compared.new)

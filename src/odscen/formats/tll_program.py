@@ -74,10 +74,10 @@ def taken_timing(
             )
     if plans[-1].program.params.get(STAGES_PARAM) == MAP_STAGES:
         return called_timing(light, plans[-1].program, loops or {}), ()
-    return _Taking(light, plans, loops or {}).timing()
+    return _ProgramTaker(light, plans, loops or {}).timing()
 
 
-class _Taking:
+class _ProgramTaker:
     def __init__(
         self,
         light: Light,

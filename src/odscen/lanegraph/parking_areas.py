@@ -88,7 +88,7 @@ class MapParking(NamedTuple):
 NO_PARKING = MapParking()
 
 
-class _Reached(NamedTuple):
+class _ReachedPlace(NamedTuple):
     """A place with the node beside it, and whether it is to the left of the lane."""
 
     node: int
@@ -112,8 +112,8 @@ def map_parking(
     """
     if not spaces and not strips:
         return NO_PARKING
-    beside = _Beside(lanes)
-    reached: list[_Reached] = []
+    beside = _LaneFinder(lanes)
+    reached: list[_ReachedPlace] = []
     unreached = 0
     for outline in spaces:
         places = list(_places_of(outline))
@@ -156,7 +156,7 @@ def _places_of(outline: FloatArray) -> Iterator[ParkingPlace]:
             yield ParkingPlace(x, y, hdg, pitch, width)
 
 
-class _Beside:
+class _LaneFinder:
     """Finds the lanes beside places."""
 
     def __init__(self, lanes: LaneGraph) -> None:
@@ -172,7 +172,7 @@ class _Beside:
         self._xy = np.stack([lanes.x, lanes.y], axis=1)
         self._tree = cKDTree(self._xy[self._nodes]) if len(self._nodes) else None
 
-    def lane_of(self, place: ParkingPlace) -> _Reached | None:
+    def lane_of(self, place: ParkingPlace) -> _ReachedPlace | None:
         """Nearest lane within reach, one that the place is not on if there is such a lane."""
         if self._tree is None:
             return None
@@ -193,16 +193,16 @@ class _Beside:
         best = int(order[0])
         return self._turn_to_entry(int(nodes[best]), place, bool(across[best] > 0.0))
 
-    def _turn_to_entry(self, node: int, place: ParkingPlace, left: bool) -> _Reached:
+    def _turn_to_entry(self, node: int, place: ParkingPlace, left: bool) -> _ReachedPlace:
         """Turn a place so that cars enter it forwards."""
         hdg = float(self._lanes.hdg[node])
         inwards = hdg + (math.pi / 2.0 if left else -math.pi / 2.0)
         aside = math.cos(place.hdg - inwards)
         forwards = aside if abs(aside) > 0.3 else math.cos(place.hdg - hdg)
         turned = place.hdg if forwards >= 0.0 else place.hdg + math.pi
-        return _Reached(node, left, place._replace(hdg=math.remainder(turned, 2.0 * math.pi)))
+        return _ReachedPlace(node, left, place._replace(hdg=math.remainder(turned, 2.0 * math.pi)))
 
-    def cut(self, outline: FloatArray) -> Iterator[_Reached]:
+    def cut(self, outline: FloatArray) -> Iterator[_ReachedPlace]:
         """Yield the places on a parking lane, along the nearest lane beside it."""
         import shapely
 
@@ -252,7 +252,7 @@ class _Beside:
 
     def _row_places(
         self, nodes: Int32Array, left: bool, near: FloatArray, far: FloatArray
-    ) -> Iterator[_Reached]:
+    ) -> Iterator[_ReachedPlace]:
         """Places of stretches of consecutive nodes."""
         order = np.argsort(nodes)
         nodes, near, far = nodes[order], near[order], far[order]
@@ -272,7 +272,7 @@ class _Beside:
     def _place_beside(
         self, node: int, left: bool, ahead: float, aside: float, across: bool, width: float,
         pitch: float,
-    ) -> _Reached:  # fmt: skip
+    ) -> _ReachedPlace:  # fmt: skip
         hdg = float(self._lanes.hdg[node])
         turn = hdg + (math.pi / 2.0 if left else -math.pi / 2.0)
         x = float(self._lanes.x[node]) + ahead * math.cos(hdg) + aside * math.cos(turn)
@@ -280,10 +280,10 @@ class _Beside:
         place = ParkingPlace(x, y, turn, width, pitch)
         if not across:
             place = ParkingPlace(x, y, hdg, pitch, width)
-        return _Reached(node, left, place._replace(hdg=math.remainder(place.hdg, 2 * math.pi)))
+        return _ReachedPlace(node, left, place._replace(hdg=math.remainder(place.hdg, 2 * math.pi)))
 
 
-def _group_places(lanes: LaneGraph, reached: Sequence[_Reached]) -> Iterator[ParkingArea]:
+def _group_places(lanes: LaneGraph, reached: Sequence[_ReachedPlace]) -> Iterator[ParkingArea]:
     """Yield areas of places on the same lane and side, near each other."""
     ordered = sorted(
         reached,
@@ -294,7 +294,7 @@ def _group_places(lanes: LaneGraph, reached: Sequence[_Reached]) -> Iterator[Par
             reached.place,
         ),
     )
-    group: list[_Reached] = []
+    group: list[_ReachedPlace] = []
     number = 0
     for reached_place in ordered:
         if group and not _belong_together(lanes, group, reached_place):
@@ -306,7 +306,9 @@ def _group_places(lanes: LaneGraph, reached: Sequence[_Reached]) -> Iterator[Par
         yield _make_area(number + 1, group)
 
 
-def _belong_together(lanes: LaneGraph, group: Sequence[_Reached], reached: _Reached) -> bool:
+def _belong_together(
+    lanes: LaneGraph, group: Sequence[_ReachedPlace], reached: _ReachedPlace
+) -> bool:
     first, last = group[0], group[-1]
     if lanes.lane[first.node] != lanes.lane[reached.node] or first.left != reached.left:
         return False
@@ -318,6 +320,6 @@ def _belong_together(lanes: LaneGraph, group: Sequence[_Reached], reached: _Reac
     return bool(gap <= AREA_GAP and length <= AREA_LENGTH)
 
 
-def _make_area(number: int, group: Sequence[_Reached]) -> ParkingArea:
+def _make_area(number: int, group: Sequence[_ReachedPlace]) -> ParkingArea:
     nodes, places = (tuple(getattr(reached, key) for reached in group) for key in ("node", "place"))
     return ParkingArea(f"P{number}", nodes, places)

@@ -50,7 +50,7 @@ def safe_speeds(
         At most the speeds that are wanted, m/s.
     """
     on = dict(zip(nodes, range(len(nodes)), strict=True))
-    onwards = _Onwards(lanes)
+    onwards = _LaneLeads(lanes)
     ahead = [
         onwards.first(node, on, within=SIGHT) if speed > 0.0 else []
         for node, speed in zip(nodes, speeds, strict=True)
@@ -75,7 +75,7 @@ def safe_speed(gap: float | FloatArray, ahead: float | FloatArray) -> Any:
     return np.maximum(root - lost, 0.0)
 
 
-class _Onwards:
+class _LaneLeads:
     """Where lanes lead, node by node."""
 
     def __init__(self, lanes: LaneGraph) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from odscen.carla.served.served_run import probe
 
 if TYPE_CHECKING:
-    from odscen.carla.served.served_run import Found
+    from odscen.carla.served.served_run import ServerCheck
     from odscen.carla.server.client import Address
 
 FRESH = 10.0
@@ -22,11 +22,11 @@ class CarlaServer:
     def __init__(self, address: Address) -> None:
         self.address = address
         self._lock = threading.Lock()
-        self._found: Found | None = None
+        self._found: ServerCheck | None = None
         self._listened = False
         self._when = 0.0
 
-    def look(self) -> Found:
+    def look(self) -> ServerCheck:
         """See whether it is there; may take some seconds when it has just come."""
         with self._lock:
             stale = time.monotonic() - self._when > FRESH

@@ -25,20 +25,20 @@ UNCHANGED: Responses = {304: {"description": "What the client has is right."}}
 """What a packed answer may be instead, for the schema."""
 
 
-class Packed(NamedTuple):
+class PackedAnswer(NamedTuple):
     """Bytes, compressed, and a tag that changes with them."""
 
     content: bytes
     tag: str
 
 
-def pack(content: bytes) -> Packed:
+def pack(content: bytes) -> PackedAnswer:
     """Compress; the tag is a hash of the content."""
     tag = f'"{hashlib.sha256(content).hexdigest()[:24]}"'
-    return Packed(gzip.compress(content, 5, mtime=0), tag)
+    return PackedAnswer(gzip.compress(content, 5, mtime=0), tag)
 
 
-def answer(request: Request, packed: Packed) -> Response:
+def answer(request: Request, packed: PackedAnswer) -> Response:
     """Send it, or only say that what the browser has is still right."""
     headers = {"ETag": packed.tag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
     if request.headers.get("if-none-match") == packed.tag:
@@ -52,13 +52,13 @@ def answer(request: Request, packed: Packed) -> Response:
 
 
 @lru_cache(maxsize=8)
-def packed_drawing(entry: MapEntry) -> Packed:
+def packed_drawing(entry: MapEntry) -> PackedAnswer:
     """``drawing.json`` of a map."""
     return pack(entry.read("drawing"))
 
 
 @lru_cache(maxsize=8)
-def packed_graph(entry: MapEntry) -> Packed:
+def packed_graph(entry: MapEntry) -> PackedAnswer:
     """Columns of a map's graphs."""
     return pack(orjson.dumps(graph_columns(entry), option=orjson.OPT_SERIALIZE_NUMPY))
 

@@ -12,7 +12,7 @@ from odscen.carla.mirror.nearby import HYSTERESIS, Nearby
 from odscen.carla.server.batch import BRAKE, FOG, LEFT, LIFTS, LOW_BEAM, POSITION, RIGHT, Batch
 from odscen.carla.server.blueprints import Shape, choose_blueprints
 from odscen.carla.server.environment import vehicle_lights
-from odscen.convert.lane_table.light_heads import Heads
+from odscen.convert.lane_table.light_heads import SignalHeads
 from odscen.convert.lane_table.table import SumoLight
 from odscen.records.run_plan import Plan, PlannedActor
 from odscen.simulators.assets import shipped_assets
@@ -194,14 +194,14 @@ def test_models_of_the_plan_are_kept_and_others_chosen_by_size_the_same_way_each
 
 def test_a_signal_over_several_links_shows_green_if_any_of_them_may_go() -> None:
     light = SumoLight("J1", (), (), 0.0, (("7",), ("7", "8"), (), ("9",)))
-    heads = Heads([light])
+    heads = SignalHeads([light])
     assert heads.signals == {"7", "8", "9"}
     assert heads.states({"J1": "rGGy"}) == {"7": "Green", "8": "Green", "9": "Yellow"}
     assert heads.states({"J1": "ryru"}) == {"7": "Yellow", "8": "Yellow", "9": "Yellow"}
 
 
 def test_letters_of_a_light_are_made_from_what_its_signals_show() -> None:
-    heads = Heads([SumoLight("t", (), (), 0.0, (("a",), ("a", "b"), ("c",), ()))])
+    heads = SignalHeads([SumoLight("t", (), (), 0.0, (("a",), ("a", "b"), ("c",), ()))])
     assert heads.letters({"a": "Red", "b": "Green"}) == {"t": "rG--"}
     assert heads.letters({"a": "Yellow", "b": "Red", "c": "Off"}) == {"t": "yyo-"}
     assert heads.letters({}) == {}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from odscen.base.errors import CarlaError, InputError
-from odscen.carla.server.batch import ActorPlace, Batch, Move, Shine, Spawn, Velocity
+from odscen.carla.server.batch import ActorPlace, Batch, Move, Spawn, SwitchLights, Velocity
 from odscen.carla.server.carla_server import Server
 from odscen.carla.server.client import Address, connect
 from odscen.carla.server.server_map import ensure_map, same_map
@@ -91,7 +91,7 @@ def test_a_tick_is_two_calls_however_many_actors_there_are() -> None:
         made = server.apply(Batch(spawn=tuple(car(10.0 * number) for number in range(30))))
         at = ActorPlace(0.0, 0.0, 0.0, 0.0, 90.0)
         moves = [Move(int(actor), at, STILL, 0.0, False) for actor in made]
-        shines = [Shine(int(actor), 8) for actor in made]
+        shines = [SwitchLights(int(actor), 8) for actor in made]
         for few in (1, 30):
             stand_in.reset_calls()
             server.apply(Batch(move=tuple(moves[:few]), shine=tuple(shines[:few])))

@@ -25,12 +25,12 @@ from odscen.learning.reference.traffic_model import (
 from odscen.learning.traffic_snapshots import LightView, SignalAhead, no_lights
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.placing.region import Region, Usable
-from odscen.scenario.sampling.sampler import wanted_crew
+from odscen.scenario.sampling.sampler import wanted_users
 from tests.graphs import fork, two_lane_road
 
 GRAPH = two_lane_road(1000.0)
 REGION = Region.of(GRAPH, GRAPH.segments.ids)
-CREW = wanted_crew(REGION, SamplingConfig(), Usable(), fill=0.2)
+CREW = wanted_users(REGION, SamplingConfig(), Usable(), fill=0.2)
 
 
 def request(vehicles: int, lights: LightView | None = None) -> FillRequest:
@@ -83,7 +83,7 @@ def test_the_same_random_numbers_give_the_same_fill() -> None:
 def test_more_are_stopped_before_a_red_light_of_a_junction_than_before_a_green_one() -> None:
     graph = fork()
     region = Region.of(graph, graph.segments.ids)
-    crew = wanted_crew(region, SamplingConfig(), Usable(), fill=0.2)
+    crew = wanted_users(region, SamplingConfig(), Usable(), fill=0.2)
     allowed = {**crew.road_places.allowed, **crew.walk_places.allowed}
     approach = graph.lanes.lane[0]
 

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
 from odscen.scenario import edits
 from odscen.scenario.checks.scenario_checks import check
-from odscen.scenario.demand.count_stations import Passing, contradictions, geh
+from odscen.scenario.demand.count_stations import StationFinder, contradictions, geh
 from odscen.scenario.demand.day_profiles import BUILT_IN, DAY, Curve, curve
 from odscen.scenario.demand.demand_tables import (
     MOST_ROWS,
@@ -176,7 +176,7 @@ def test_geh_is_that_of_the_textbook() -> None:
 
 
 def test_a_route_passes_flows_turns_and_segments() -> None:
-    passing = Passing(GRAPH, ["r1>j9>r2", "r2", "r1>j9", "r1>j9>r3", "nowhere"])
+    passing = StationFinder(GRAPH, ["r1>j9>r2", "r2", "r1>j9", "r1>j9>r3", "nowhere"])
     row = {name: index for index, name in enumerate(GRAPH.segments.ids)}
     passed = passing.of([row["r1"], row["j9"], row["r2"]])
     assert [(passing.places[place], step) for place, step in passed] == [

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from odscen.scenario.story.road_view import Stood, leapt
+from odscen.scenario.story.road_view import LastPose, leapt
 from odscen.scenario.story.story_engine import StoryEngine, StoryEvent
 from tests.scenario.story.straight_road import CAR, Road, rule, started
 
@@ -150,7 +150,7 @@ def test_who_follows_a_bend_does_not_leap_and_who_changes_lanes_does() -> None:
     assert not leapt(CAR, bend)
     aside = replace(bend, x=bend.x - 3.2 * math.sin(turn), y=bend.y + 3.2 * math.cos(turn))
     assert leapt(CAR, aside)
-    assert leapt(Stood(0.0, 0.0, math.pi), replace(CAR, x=-7.0, y=3.2, hdg=-math.pi))
+    assert leapt(LastPose(0.0, 0.0, math.pi), replace(CAR, x=-7.0, y=3.2, hdg=-math.pi))
 
 
 def test_who_stays_on_a_bound_is_met_there_whatever_was_before() -> None:

@@ -14,20 +14,20 @@ from odscen.sumo.runner.forked_worker import expect_runs
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.runner.worker_process import run_worker
 from odscen.sumo.worker import jams
-from odscen.sumo.worker.simulation.observed import Ahead
+from odscen.sumo.worker.simulation.observed import ViewAhead
 from tests.sumo.conftest import TYPES, Prepare
 
-FREE = Ahead(True, "M", True, None, people=False)
+FREE = ViewAhead(True, "M", True, None, people=False)
 
 
 class Street:
     """What each vehicle has ahead."""
 
-    def __init__(self, **ahead: Ahead) -> None:
+    def __init__(self, **ahead: ViewAhead) -> None:
         self._ahead = ahead
         self.asked: list[str] = []
 
-    def ahead(self, name: str) -> Ahead | None:
+    def ahead(self, name: str) -> ViewAhead | None:
         self.asked.append(name)
         return self._ahead.get(name)
 
@@ -43,7 +43,7 @@ class Street:
         (FREE, StopReason.UNKNOWN),
     ],
 )
-def test_a_queue_stands_for_the_reason_of_its_head(head: Ahead, reason: str) -> None:
+def test_a_queue_stands_for_the_reason_of_its_head(head: ViewAhead, reason: str) -> None:
     red = FREE._replace(light="r", open=False)
     street = Street(a=FREE._replace(leader="b"), b=red._replace(leader="c"), c=head)
     assert jams.explain(street, "a") == (reason, "c")  # type: ignore[arg-type]
@@ -61,7 +61,7 @@ def test_queues_with_a_common_head_ask_for_each_vehicle_once() -> None:
     street = Street(
         a=FREE._replace(leader="c"), b=FREE._replace(leader="c"), c=FREE._replace(leader="d"), d=red
     )
-    known: dict[str, Ahead | None] = {}
+    known: dict[str, ViewAhead | None] = {}
     found = [jams.explain(street, one, known) for one in ("a", "b")]  # type: ignore[arg-type]
     assert found == [(StopReason.RED, "d"), (StopReason.RED, "d")]
     assert street.asked == ["a", "c", "d", "b"]

@@ -16,7 +16,7 @@ from odscen.learning.reference.model_training import Example, LearnedMap
 from odscen.learning.reference.site_features import site_of
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.placing.region import Region
-from odscen.scenario.sampling.sampler import wanted_crew
+from odscen.scenario.sampling.sampler import wanted_users
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -70,7 +70,7 @@ def whole_map(entry: MapEntry) -> WholeMap:
     loaded = load_map(entry)
     graph = loaded.sumo.graph
     region = Region.of(graph, connected_segments(graph))
-    places = wanted_crew(region, SamplingConfig(), loaded.usable, fill=0.5).road_places
+    places = wanted_users(region, SamplingConfig(), loaded.usable, fill=0.5).road_places
     none = np.zeros(len(graph.lanes.x), dtype=np.bool_)
     allowed = np.stack([places.allowed.get(category, none) for category in VEHICLES])
     learned = LearnedMap(site_of(graph.lanes, graph.walks), allowed, graph.lanes.spacing)

@@ -26,8 +26,8 @@ from odscen.carla.server.batch import (
     ActorPlace,
     Batch,
     Move,
-    Shine,
     Spawn,
+    SwitchLights,
     Velocity,
 )
 from odscen.carla.server.blueprints import Shape
@@ -214,7 +214,7 @@ class Mirror:
                 moves.append(Move(actor, at, velocity, speed, walks))
                 if not walks and self._flags.get(row) != own:
                     self._flags[row] = own
-                    shines.append(Shine(actor, own))
+                    shines.append(SwitchLights(actor, own))
             elif whole and self._may_try(row):
                 self._flags[row] = own
                 asked.append(row)

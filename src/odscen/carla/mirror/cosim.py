@@ -17,7 +17,7 @@ from odscen.carla.server.carla_server import Server
 from odscen.carla.server.client import Address
 from odscen.carla.server.interruption import interrupts
 from odscen.carla.server.server_map import ensure_map
-from odscen.convert.lane_table.light_heads import Heads
+from odscen.convert.lane_table.light_heads import SignalHeads
 from odscen.convert.lane_table.table_json import table_from_json
 from odscen.runs.new_run import refuse_finished_run
 from odscen.runs.reporter import SILENT
@@ -137,7 +137,7 @@ class CarlaMirror(Simulator[MirroredRun]):
             show = StepShow(
                 server,
                 mirrored,
-                Heads(on.sumo.lights),
+                SignalHeads(on.sumo.lights),
                 clock,
                 report,
                 interrupted,

@@ -38,7 +38,7 @@ class ForeignRoles(NamedTuple):
         return self.names is None or role_name in self.names
 
 
-class _Known(NamedTuple):
+class _KnownActor(NamedTuple):
     type_id: str
     role_name: str
     kind: str
@@ -77,7 +77,9 @@ class ForeignActors:
         self._offset = net_offset
         self._assets = assets
         self._roles = roles
-        self._known: dict[int, _Known | None] = {left_out: None} if left_out is not None else {}
+        self._known: dict[int, _KnownActor | None] = (
+            {left_out: None} if left_out is not None else {}
+        )
         self._last: dict[int, tuple[float, float]] = {}
         self._time: float | None = None
 
@@ -115,7 +117,7 @@ class ForeignActors:
                 continue
             if self._roles.has(role):
                 kind = self._kind_of(actor)
-                self._known[actor.id] = _Known(
+                self._known[actor.id] = _KnownActor(
                     actor.type_id, role, kind, self._server.shape(actor.id)
                 )
                 self.seen[actor.id] = actor.type_id, role
@@ -126,7 +128,7 @@ class ForeignActors:
         return KINDS[Category(category)].vclass
 
     def _describe_user(
-        self, actor: Any, known: _Known, passed: float
+        self, actor: Any, known: _KnownActor, passed: float
     ) -> tuple[ForeignUser, tuple[float, float]]:
         at, velocity = actor.get_transform(), actor.get_velocity()
         where, turn = at.location, at.rotation

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from odscen.carla.mirror.step_clock import StepClock
     from odscen.carla.server.batch import ActorPlace, Batch
     from odscen.carla.server.carla_server import Server
-    from odscen.convert.lane_table.light_heads import Heads
+    from odscen.convert.lane_table.light_heads import SignalHeads
     from odscen.sumo.runner.in_step import Step
     from odscen.sumo.worker.protocol import EgoPose
 
@@ -45,7 +45,7 @@ class StepShow:
         self,
         server: Server,
         mirrored: MirroredPlan,
-        heads: Heads,
+        heads: SignalHeads,
         clock: StepClock,
         report: CosimReport,
         interrupted: threading.Event,

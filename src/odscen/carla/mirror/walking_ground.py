@@ -42,7 +42,7 @@ _Cell = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Stand:
+class _WalkerGround:
     """Where those on foot are after a step, by row of the plan; NaN where one is not there.
 
     ``z`` is the map's height, ``rise`` what the server's ground is higher there.
@@ -93,7 +93,7 @@ class WalkingGround:
         self._blind: dict[_Cell, float] = {}
         self._asked = np.full(len(walks), -np.inf)
         self._time = 0.0
-        self._last = self._now = _Stand.nobody(len(walks))
+        self._last = self._now = _WalkerGround.nobody(len(walks))
 
     def under(self, step: Step) -> Step:
         """The same step, pedestrians on the server's ground; it is the next one of :meth:`between`.
@@ -107,7 +107,7 @@ class WalkingGround:
         on_foot = np.flatnonzero(self._walks[step.index])
         rows = step.index[on_foot]
         if not len(on_foot):
-            self._last, self._now = self._now, _Stand.nobody(len(self._walks))
+            self._last, self._now = self._now, _WalkerGround.nobody(len(self._walks))
             return step
         x, y, near = step.x[on_foot], step.y[on_foot], step.z[on_foot]
         self._ask_ahead(step, on_foot, passed)

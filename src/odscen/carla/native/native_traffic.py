@@ -44,7 +44,7 @@ COLUMNS = 7
 
 
 @dataclass(slots=True, eq=False)
-class _Underway:
+class _DrivenActor:
     """A road user on the road: its actor on the server, and how far along its route it is."""
 
     plan: NativeActor
@@ -60,7 +60,7 @@ class _Underway:
 
 
 @dataclass(frozen=True, slots=True)
-class Happened:
+class TickOutcome:
     """What one tick has brought: events, and notes in words about single actors."""
 
     events: list[Event] = field(default_factory=list)
@@ -103,8 +103,8 @@ class Traffic:
     ) -> None:
         self._server = server
         self._queue = SpawnQueue(server, actors, blueprints)
-        self._underway: dict[int, _Underway] = {}
-        self._starting: list[_Underway] = []
+        self._underway: dict[int, _DrivenActor] = {}
+        self._starting: list[_DrivenActor] = []
         self._physics = physics
         self._seen: dict[int, XodrPose] = {}
         self.road_ends: list[float] = []
@@ -149,9 +149,9 @@ class Traffic:
         """How often the one who was refused most often was tried."""
         return self._queue.most_tries
 
-    def step(self, time: float, delta: float) -> Happened:
+    def step(self, time: float, delta: float) -> TickOutcome:
         """Make the tick that begins at ``time``, seconds."""
-        happened = Happened()
+        happened = TickOutcome()
         new = self._spawn_due(time)
         self._lead_walkers()
         self._server.tick()
@@ -197,12 +197,12 @@ class Traffic:
         self._underway.clear()
 
     # ------------------------------------------------------------------------------- coming
-    def _spawn_due(self, time: float) -> list[_Underway]:
-        new = [_Underway(actor, number, time) for actor, number in self._queue.spawn_due(time)]
+    def _spawn_due(self, time: float) -> list[_DrivenActor]:
+        new = [_DrivenActor(actor, number, time) for actor, number in self._queue.spawn_due(time)]
         self._underway |= {driven.plan.row: driven for driven in new}
         return new
 
-    def _departure_event(self, underway: _Underway, snapshot: Any, time: float) -> Event:
+    def _departure_event(self, underway: _DrivenActor, snapshot: Any, time: float) -> Event:
         state = snapshot.find(underway.number)
         if state is None:
             return Event(time, EventKind.DEPARTED, underway.plan.id)
@@ -218,7 +218,7 @@ class Traffic:
             error=error,
         )
 
-    def _hand_over(self, underway: _Underway) -> None:
+    def _hand_over(self, underway: _DrivenActor) -> None:
         """Give a road user that has just come to CARLA's drivers or walkers."""
         underway.handle = self._server.world.get_actor(underway.number)
         plan = underway.plan
@@ -240,7 +240,7 @@ class Traffic:
             manager.set_path(car, [self._carla_location(point) for point in plan.path])
         self._set_speed(underway)
 
-    def _give_controller(self, underway: _Underway) -> None:
+    def _give_controller(self, underway: _DrivenActor) -> None:
         """Let CARLA's walker AI find the route; on its own mesh, which is not the scenario's.
 
         A controller can be started when a tick has shown it: the next one, which is made anyway.
@@ -265,7 +265,7 @@ class Traffic:
         self._starting.clear()
 
     # ------------------------------------------------------------------------------- under way
-    def _follow_actors(self, snapshot: Any, time: float, happened: Happened) -> None:
+    def _follow_actors(self, snapshot: Any, time: float, happened: TickOutcome) -> None:
         gone = []
         for driven in self._underway.values():
             state = snapshot.find(driven.number)
@@ -285,7 +285,9 @@ class Traffic:
             self._let_go(driven)
         self._destroy_actors(gone)
 
-    def _advance_on_route(self, underway: _Underway, pose: XodrPose, happened: Happened) -> float:
+    def _advance_on_route(
+        self, underway: _DrivenActor, pose: XodrPose, happened: TickOutcome
+    ) -> float:
         """Move on to the nearest point of the route; metres from here to the goal, straight."""
         route = underway.plan.route
         ahead = route[underway.at : underway.at + _SEARCH, :2] - (float(pose.x), float(pose.y))
@@ -299,7 +301,7 @@ class Traffic:
             )
         return math.hypot(route[-1, 0] - float(pose.x), route[-1, 1] - float(pose.y))
 
-    def _report_vanished(self, underway: _Underway, time: float, happened: Happened) -> bool:
+    def _report_vanished(self, underway: _DrivenActor, time: float, happened: TickOutcome) -> bool:
         """Report the outcome of one that the server has no longer; false if it is yet to come."""
         if time - underway.since < 2 * RETRY_SECONDS and underway.at == 0:
             return False
@@ -313,13 +315,13 @@ class Traffic:
         )
         return True
 
-    def _set_speed(self, underway: _Underway) -> None:
+    def _set_speed(self, underway: _DrivenActor) -> None:
         wanted = float(underway.plan.speed[underway.at])
         if wanted != underway.speed:
             underway.speed = wanted
             self._manager.set_desired_speed(underway.handle, wanted * 3.6)
 
-    def _change_lane(self, underway: _Underway) -> None:
+    def _change_lane(self, underway: _DrivenActor) -> None:
         changes = underway.plan.changes
         while (
             underway.turned < len(changes)
@@ -348,7 +350,7 @@ class Traffic:
         self._server.send(commands)
 
     # ------------------------------------------------------------------------------- leaving
-    def _let_go(self, underway: _Underway) -> None:
+    def _let_go(self, underway: _DrivenActor) -> None:
         """Take it from the Traffic Manager before it is destroyed, or the manager would ask."""
         if underway.handle is None:
             return
@@ -358,7 +360,7 @@ class Traffic:
             elif not underway.plan.person:
                 underway.handle.set_autopilot(False, self._port)
 
-    def _destroy_actors(self, gone: Sequence[_Underway]) -> None:
+    def _destroy_actors(self, gone: Sequence[_DrivenActor]) -> None:
         controllers = [driven.guide for driven in gone if driven.guide is not None]
         self._server.destroy([*controllers, *(driven.number for driven in gone)])
 
@@ -367,11 +369,11 @@ class Traffic:
         return self._server.package.Location(x, -y, z)
 
 
-def _arrival_event(underway: _Underway, time: float) -> Event:
+def _arrival_event(underway: _DrivenActor, time: float) -> Event:
     return Event(time, EventKind.ARRIVED, underway.plan.id, travel_time=time - underway.since)
 
 
-def _metres_left(underway: _Underway) -> float:
+def _metres_left(underway: _DrivenActor) -> float:
     """Metres of route from the last known point to the goal."""
     rest = np.diff(underway.plan.route[underway.at :, :2], axis=0)
     return float(np.sum(np.hypot(rest[:, 0], rest[:, 1])))

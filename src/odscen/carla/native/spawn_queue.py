@@ -19,7 +19,7 @@ RETRY_SECONDS = 0.5
 
 
 @dataclass(slots=True)
-class _Tries:
+class _SpawnTries:
     next: float = 0.0
     count: int = 0
     reason: str = ""
@@ -44,7 +44,7 @@ class SpawnQueue:
         self._server = server
         self._blueprints = blueprints
         self._waiting = sorted(actors, key=lambda actor: (actor.depart, actor.row))
-        self._tries: dict[int, _Tries] = {}
+        self._tries: dict[int, _SpawnTries] = {}
 
     def __len__(self) -> int:
         """How many are still to come."""
@@ -86,7 +86,7 @@ class SpawnQueue:
         return tries is None or tries.next <= time
 
     def _note_refusal(self, actor: NativeActor, reason: str, time: float) -> None:
-        tries = self._tries.setdefault(actor.row, _Tries())
+        tries = self._tries.setdefault(actor.row, _SpawnTries())
         tries.next, tries.reason = time + RETRY_SECONDS, reason
         tries.count += 1
 

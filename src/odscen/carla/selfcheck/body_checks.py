@@ -16,8 +16,8 @@ from odscen.carla.server.batch import (
     ActorPlace,
     Batch,
     Move,
-    Shine,
     Spawn,
+    SwitchLights,
     Velocity,
 )
 from odscen.carla.server.client import answering
@@ -160,7 +160,7 @@ class BodyChecks:
         """A car without physics, put elsewhere in each tick."""
         actor = self._spawn_body(self._car, self._car_at, walks=False)
         wanted = self._move_forward(actor)
-        self.server.apply(Batch(shine=(Shine(actor, BRAKE | LOW_BEAM),)))
+        self.server.apply(Batch(shine=(SwitchLights(actor, BRAKE | LOW_BEAM),)))
         with answering(self.server.address):
             (handle,) = self.server.actors([actor])
             lamps = int(handle.get_light_state())

@@ -116,17 +116,17 @@ class _Worker(subprocess.Popen[bytes]):
         self.terminate()
 
 
-class Found(NamedTuple):
+class ServerCheck(NamedTuple):
     """What is at an address, and what to do about it, in words."""
 
     state: ServerState
     message: str
 
 
-def probe(address: Address) -> Found:
+def probe(address: Address) -> ServerCheck:
     """See whether a CARLA server of the right release is at an address."""
     if not address.listens():
-        return Found("absent", f"No CARLA server is at {address}.")
+        return ServerCheck("absent", f"No CARLA server is at {address}.")
     try:
         done = subprocess.run(
             [sys.executable, "-m", PROBE, str(address)],
@@ -137,8 +137,10 @@ def probe(address: Address) -> Found:
         )
         state, message = json.loads(done.stdout.splitlines()[-1])
     except (subprocess.TimeoutExpired, ValueError, IndexError):
-        return Found("absent", f"Something is at {address}, but it does not answer as CARLA does.")
-    return Found(state, message)
+        return ServerCheck(
+            "absent", f"Something is at {address}, but it does not answer as CARLA does."
+        )
+    return ServerCheck(state, message)
 
 
 def _explain_crash(code: int) -> str:

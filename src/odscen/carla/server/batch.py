@@ -67,7 +67,7 @@ class DoorMove(NamedTuple):
     opens: bool
 
 
-class Shine(NamedTuple):
+class SwitchLights(NamedTuple):
     """Switch a vehicle's lights: bits of CARLA's ``VehicleLightState``."""
 
     actor: int
@@ -107,7 +107,7 @@ class Batch:
     destroy: tuple[int, ...] = ()
     spawn: tuple[Spawn, ...] = ()
     move: tuple[Move, ...] = ()
-    shine: tuple[Shine, ...] = ()
+    shine: tuple[SwitchLights, ...] = ()
     views: dict[int, ActorPlace] = field(default_factory=dict)
     """New places of cameras and of the spectator, by actor id."""
     signals: dict[int, str] = field(default_factory=dict)

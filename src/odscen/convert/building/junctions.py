@@ -340,7 +340,7 @@ def build_junction(
     light, rows = None, dict[int, int]()
     if signalled:
         light, rows = _build_light(name, passages, ruling, crossings, around, places.keys())
-    inside = _Inside(name, passages, signposts(ruling, rows), rows, places)
+    inside = _JunctionInterior(name, passages, signposts(ruling, rows), rows, places)
     walked, walk_links = _build_crossings(name, passages, crossings, conflicts, rows, len(passages))
     starts = [lane_id(crossing.start) for crossing in crossings]
     last = [inside.beyond[n][0] if n in places else lane for n, lane in enumerate(inside.lanes)]
@@ -394,7 +394,7 @@ def _obey_approach_signals(passages: Sequence[Passage]) -> list[Passage]:
     return result
 
 
-class _Inside:
+class _JunctionInterior:
     """Internal lanes and links of a junction's passages."""
 
     def __init__(

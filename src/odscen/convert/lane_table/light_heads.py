@@ -28,7 +28,7 @@ UNKNOWN = "-"
 """Letter of a link that no signal rules whose state is known."""
 
 
-class Heads:
+class SignalHeads:
     """The OpenDRIVE signals of a map and the links that each one rules."""
 
     def __init__(self, lights: Sequence[SumoLight]) -> None:

@@ -23,10 +23,10 @@ VERSION = "1.20"
 
 def net_xml(net: Net) -> bytes:
     """Text of ``net.net.xml``; the same network gives the same bytes."""
-    return _Written(net).whole()
+    return _NetworkWriter(net).whole()
 
 
-class _Written:
+class _NetworkWriter:
     def __init__(self, net: Net) -> None:
         self._net = net
 

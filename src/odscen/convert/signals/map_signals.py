@@ -294,7 +294,7 @@ def signal_control(
         Whether an edge (its position) ends at a place where traffic meets, and not only where the
         lanes of one road change.
     """
-    reach = _Reach(odr, table, edges, connections, is_junction)
+    reach = _SignalReach(odr, table, edges, connections, is_junction)
     homes = signal_homes(odr, [reach.junctions(number) for number in range(len(connections))])
     settled = settle_signals(list(acting(odr)), reach, homes)
     lights: list[dict[str, None]] = [{} for _ in connections]
@@ -317,7 +317,7 @@ def signal_control(
     )
 
 
-class _Reach:
+class _SignalReach:
     """Which connections lie before, behind and under signals."""
 
     def __init__(

@@ -113,9 +113,9 @@ def light_stages(links: LightLinks, rows: dict[int, int]) -> Stages:
     rows
         Position at the light of each controlled link.
     """
-    stages = plan_stages(*_Sharing(links, protect=True).grouped(rows))
+    stages = plan_stages(*_GreenSharing(links, protect=True).grouped(rows))
     if len(stages.green) > MOST_STAGES:
-        stages = plan_stages(*_Sharing(links, protect=False).grouped(rows))
+        stages = plan_stages(*_GreenSharing(links, protect=False).grouped(rows))
     return stages
 
 
@@ -127,10 +127,10 @@ def link_conflicts(links: LightLinks, rows: dict[int, int]) -> tuple[LinkConflic
     rows
         Position at the light of each controlled link.
     """
-    return _Sharing(links, protect=False).met(rows)
+    return _GreenSharing(links, protect=False).met(rows)
 
 
-class _Sharing:
+class _GreenSharing:
     """What may share green at one light."""
 
     def __init__(self, links: LightLinks, *, protect: bool) -> None:

@@ -19,10 +19,10 @@ from odscen.convert.verify.fidelity_result import (
     CROSSWALK_SHARE,
     MAX_P99,
     NEAR,
-    Cover,
     Deviation,
     FarPlace,
     Fidelity,
+    LaneCover,
     LaneRelation,
     LostCrosswalk,
     UncoveredStretch,
@@ -357,12 +357,12 @@ class _MapLanes:
         distance, row = finder.nearest(self.places, 2.0 * NEAR, directed=directed)
         return (row >= 0) & (distance <= NEAR)
 
-    def cover(self, covered: BoolArray, among: BoolArray) -> Cover:
+    def cover(self, covered: BoolArray, among: BoolArray) -> LaneCover:
         """Length of the places among which to count, and the share of it that is covered."""
         length = self.places.length[among]
         total = float(length.sum())
         share = float(length[covered[among]].sum()) / total if total else 1.0
-        return Cover(total, share)
+        return LaneCover(total, share)
 
     def gaps(self, covered: BoolArray) -> tuple[UncoveredStretch, ...]:
         """Lanes that lack more than a metre, in the order of the map."""

@@ -37,7 +37,7 @@ class Deviation:
 
 
 @dataclass(frozen=True, slots=True)
-class Cover:
+class LaneCover:
     """Length of lanes in metres and the share of it that SUMO has a lane for."""
 
     length: float
@@ -162,14 +162,14 @@ class Fidelity:
     normal: Deviation
     internal: Deviation
     far_places: tuple[FarPlace, ...]
-    coverage: Cover
-    coverage_roads: Cover
-    coverage_junctions: Cover
+    coverage: LaneCover
+    coverage_roads: LaneCover
+    coverage_junctions: LaneCover
     gaps: tuple[UncoveredStretch, ...]
     relations: int
     missing: tuple[LaneRelation, ...]
     invented: tuple[LaneRelation, ...]
-    sidewalks: Cover
+    sidewalks: LaneCover
     sidewalk_gaps: tuple[UncoveredStretch, ...]
     crosswalks: int
     lost_crosswalks: tuple[LostCrosswalk, ...]

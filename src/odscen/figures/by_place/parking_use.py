@@ -44,7 +44,7 @@ class AreaUse(NamedTuple):
     full: float
 
 
-class Taken(NamedTuple):
+class PlacesTaken(NamedTuple):
     """Places taken: ``places[k]`` from ``time[k]`` (s) until the next one, or the end."""
 
     time: FloatArray
@@ -103,7 +103,7 @@ class ParkingUse:
             full=float(np.sum(lasts[taken.places >= places])) / span,
         )
 
-    def taken(self, area: str | None = None) -> Taken:
+    def taken(self, area: str | None = None) -> PlacesTaken:
         """Places taken over time."""
         mine = self._stays_in(area)
         arrival = np.clip(mine["arrival"].to_numpy(), self.begin, self.end)
@@ -113,7 +113,7 @@ class ParkingUse:
         times = times[times < self.end]
         come = np.searchsorted(np.sort(arrival), times, side="right")
         gone = np.searchsorted(np.sort(departure), times, side="right")
-        return Taken(times, come - gone)
+        return PlacesTaken(times, come - gone)
 
     def _stays_in(self, area: str | None) -> pl.DataFrame:
         import polars as pl

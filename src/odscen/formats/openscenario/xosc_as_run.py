@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from odscen.base.categories import DEFAULT_BODY, Body, Category
 from odscen.base.errors import InputError
-from odscen.convert.lane_table.light_heads import Heads
+from odscen.convert.lane_table.light_heads import SignalHeads
 from odscen.formats.openscenario.dialect import xml
 from odscen.formats.openscenario.xosc_entities import EntityFacts, entity_of
 from odscen.formats.openscenario.xosc_lines import follow_line
@@ -121,7 +121,7 @@ class AsRun:
         table = self.recorded.states
         if table is None:
             return []
-        heads, letters = Heads(self.source.sumo_map.lights), dict[str, str]()
+        heads, letters = SignalHeads(self.source.sumo_map.lights), dict[str, str]()
         before: dict[str, str] = {}
         found = []
         for (time,), rows in table.sort("time", "light").group_by("time", maintain_order=True):

@@ -33,7 +33,7 @@ _STAYS: Final = frozenset({"appear", "stop", "brake", "lights", "horn", "signal"
 """Actions after which a standing actor is where it was, or where it appears."""
 
 
-class Making(Protocol):
+class ActionWriter(Protocol):
     """What makes the actions of rules, as lines need it."""
 
     @property
@@ -96,7 +96,7 @@ def follow_line(
     return private(xml("RoutingAction", follow))
 
 
-def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
+def path(made: ActionWriter, part: Any, actor: str, where: str) -> list[_Element]:
     """Trajectory of the reference point of an actor whose front follows a path."""
     spots, times = _spots_of_path(made, part), list(part.times or ())
     base = part.relative_to and made.actors.get(part.relative_to)
@@ -134,7 +134,7 @@ def path(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     return [found] if part.speed is None else [found, speed_action(part.speed, "step", "time", 0.0)]
 
 
-def _spots_of_path(made: Making, part: Any) -> list[GroundPose]:
+def _spots_of_path(made: ActionWriter, part: Any) -> list[GroundPose]:
     if part.relative_to is None:
         return [made.places.spot(place) for place in part.points]
     if made.dialect.for_scenario_runner:
@@ -155,7 +155,7 @@ def timed(spots: Sequence[GroundPose], speed: float) -> tuple[list[GroundPose], 
     return list(spots), times
 
 
-def replay(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
+def replay(made: ActionWriter, part: Any, actor: str, where: str) -> list[_Element]:
     """Trajectory of a recording; a jump if it only puts the actor somewhere."""
     back = made.places.centre_ahead(made.actors[actor])
     level = made.places.start(made.actors[actor]).z
@@ -167,7 +167,7 @@ def replay(made: Making, part: Any, actor: str, where: str) -> list[_Element]:
     return [made.trajectory(f"{actor}: {where}", spots, times, timed=True)]
 
 
-def _start_of_path(made: Making, part: Any, actor: str) -> GroundPose | None:
+def _start_of_path(made: ActionWriter, part: Any, actor: str) -> GroundPose | None:
     """Where the reference point of an actor is when it begins a path, if that is known.
 
     It is known at first, and of who stands until then.

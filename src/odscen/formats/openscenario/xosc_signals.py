@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.convert.lane_table.light_heads import Heads
+from odscen.convert.lane_table.light_heads import SignalHeads
 from odscen.formats.openscenario.dialect import xml
 from odscen.scenario.signals.light import find_light, find_movements
 from odscen.sumo.realize.lights.light_realization import realized_lights
@@ -107,7 +107,7 @@ def _write_controller(light: SumoLight, program: LightProgram, notes: ExportNote
         notes.approximated.append((where, "only the first plan of the day"))
     if program.control != "fixed" or any(phase.on_call or phase.most for phase in plan.phases):
         notes.approximated.append((where, "each green as long as planned: nothing prolongs it"))
-    heads, phases = Heads([light]), []
+    heads, phases = SignalHeads([light]), []
     for number, phase in enumerate(from_the_start(plan), start=1):
         shown = heads.states({light.id: phase.state})
         states = [

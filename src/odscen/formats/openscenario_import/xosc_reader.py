@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from odscen.base.categories import DEFAULT_BODY, Category
-from odscen.formats.openscenario_import.places.read_positions import Nowhere, PositionReader
+from odscen.formats.openscenario_import.places.read_positions import NoMapPositions, PositionReader
 from odscen.formats.openscenario_import.places.read_trajectories import trajectory_place
 from odscen.formats.openscenario_import.source.entity_selections import name_entities
 from odscen.formats.openscenario_import.source.kept_parameters import with_parameters
@@ -138,7 +138,7 @@ def report_without_map(source: MaplessSource, why: str, *, ego: EgoDriver = "sto
     """
     report, root = source.report, source.root
     entities = _read_all_entities(report, root)
-    positions = Nowhere(report, side=_side_of_y(root), why=why)
+    positions = NoMapPositions(report, side=_side_of_y(root), why=why)
     story, _, board, _ = _begin_story(source, positions, entities, ego)
     story.read(board)
     read_stop(report, board, story)

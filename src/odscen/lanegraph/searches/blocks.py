@@ -35,7 +35,7 @@ _BLOCKS_KEPT = 8
 """Blocks that starts came from last."""
 
 
-class Outset(NamedTuple):
+class OutwardDistances(NamedTuple):
     """How far it is from a node.
 
     Attributes
@@ -113,7 +113,7 @@ class Blocks:
             self.between = self._between_gates()
             self._beyond: dict[int, tuple[int, FloatArray | None]] = {}
 
-    def outset(self, row: int) -> Outset:
+    def outset(self, row: int) -> OutwardDistances:
         """Search from one row on."""
         home = int(self.block[row])
         first, end = self.first[home : home + 2].tolist()
@@ -122,7 +122,9 @@ class Blocks:
         )
         ahead = slice(*self._leaving[home : home + 2].tolist())
         to_gates = nearby[self._tail[ahead] - first] + self._metres[ahead]
-        return Outset(home, first, nearby, self._to_gates(home, self._entered[ahead], to_gates))
+        return OutwardDistances(
+            home, first, nearby, self._to_gates(home, self._entered[ahead], to_gates)
+        )
 
     def _from_gate(self, turn: int) -> FloatArray:
         """Metres to each row from one of the gates of its block, shape ``(N,)``; one search."""

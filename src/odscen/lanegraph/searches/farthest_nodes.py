@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from odscen.base.arrays import FloatArray, Int32Array
-    from odscen.lanegraph.searches.blocks import Blocks, Outset
+    from odscen.lanegraph.searches.blocks import Blocks, OutwardDistances
 
     Rows = NDArray[np.integer]
 
@@ -77,7 +77,7 @@ class FarthestNodes:
         first, last = (f.reduceat(self.block_of, starts) for f in (np.minimum, np.maximum))
         self.home = np.where(first == last, first, -1)
         self.certain = self._without_search()
-        self._outset: tuple[int, Outset] | None = None
+        self._outset: tuple[int, OutwardDistances] | None = None
 
     def lane_of(self, node: int) -> int:
         """Lane that a node is on."""
@@ -125,7 +125,7 @@ class FarthestNodes:
         places = np.flatnonzero((away >= least) & (away >= 0.0))
         return lanes.nodes[places], np.searchsorted(lanes.starts, places, side="right") - 1
 
-    def _outset_from(self, source: int) -> Outset:
+    def _outset_from(self, source: int) -> OutwardDistances:
         known = self._outset  # other threads may ask for theirs
         if known is None or known[0] != source:
             row = int(self._blocks.row[source])

@@ -172,7 +172,7 @@ class _Rows(NamedTuple):
     kept: float
 
 
-class _Look(NamedTuple):
+class _SnapshotRows(NamedTuple):
     """Rows of one snapshot; the vehicles come first."""
 
     x: Array
@@ -212,7 +212,7 @@ def _collect_rows(
     )
 
 
-def _looked_at(example: Example, kept: float, rng: np.random.Generator) -> _Look:
+def _looked_at(example: Example, kept: float, rng: np.random.Generator) -> _SnapshotRows:
     """Features and answers of one snapshot: all vehicles, and a share of the empty nodes."""
     site, snapshot = example.of.site, example.snapshot
     good = np.flatnonzero(placed(example))
@@ -235,7 +235,7 @@ def _looked_at(example: Example, kept: float, rng: np.random.Generator) -> _Look
         ]
     )
     limit = site.limit[node]
-    return _Look(
+    return _SnapshotRows(
         x.astype(np.float32),
         (np.arange(len(nodes)) < len(node)).astype(np.int64),
         category,

@@ -64,7 +64,7 @@ class _WayThrough:
     flow: float
 
 
-class _Standing(NamedTuple):
+class _ApproachRank(NamedTuple):
     """What makes an approach go first: m/s, number of lanes; its heading in radians."""
 
     limit: float
@@ -158,12 +158,12 @@ class _InsideJunctions:
 
 def _approach_standings(
     movements: Sequence[_WayThrough], lanes: LaneGraph, limit: FloatArray
-) -> dict[_Approach, _Standing]:
+) -> dict[_Approach, _ApproachRank]:
     roots: dict[_Approach, set[int]] = {}
     for movement in movements:
         roots.setdefault(movement.approach, set()).add(movement.root)
     return {
-        approach: _Standing(
+        approach: _ApproachRank(
             max(float(limit[root]) for root in some),
             len(some),
             float(lanes.hdg[min(some)]),
@@ -172,7 +172,7 @@ def _approach_standings(
     }
 
 
-def _first_road(standings: dict[_Approach, _Standing]) -> frozenset[_Approach]:
+def _first_road(standings: dict[_Approach, _ApproachRank]) -> frozenset[_Approach]:
     """Approaches of the road that goes first; none where no two are opposite."""
     best: tuple[tuple[float, int, float], frozenset[_Approach]] | None = None
     for (one, a), (other, b) in combinations(standings.items(), 2):
@@ -186,7 +186,7 @@ def _first_road(standings: dict[_Approach, _Standing]) -> frozenset[_Approach]:
 
 def _describe_approaches(
     movements: Sequence[_WayThrough],
-    standings: dict[_Approach, _Standing],
+    standings: dict[_Approach, _ApproachRank],
     found: list[FloatArray],
 ) -> None:
     """Write the features of the approaches of one junction."""

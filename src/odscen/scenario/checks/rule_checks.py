@@ -179,7 +179,7 @@ def _at_once(scenario: Scenario) -> Iterator[Problem]:
     listed: list[Problem] = []
     number = 0
     for rules in of_actor.values():
-        clashes = _Clashes(rules, first)
+        clashes = _RuleClashes(rules, first)
         number += clashes.number()
         for one, other in islice(clashes.pairs(), MOST_PAIRS - len(listed)):
             ids = (scenario.rules[one].id, scenario.rules[other].id)
@@ -194,7 +194,7 @@ def _at_once(scenario: Scenario) -> Iterator[Problem]:
         yield more_of_kind(listed[0], number - len(listed))
 
 
-class _Clashes:
+class _RuleClashes:
     """Pairs of the rules of one actor of which neither waits for the other, though both move it.
 
     Parameters

@@ -62,7 +62,7 @@ def geh(modelled: float, counted: float, seconds: float) -> float:
     return math.sqrt(2.0 * (m - c) ** 2 / (m + c)) if m + c > 0 else 0.0
 
 
-class Passing:
+class StationFinder:
     """Finds out which count stations a route passes.
 
     Parameters

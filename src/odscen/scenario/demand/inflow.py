@@ -173,7 +173,7 @@ class _Slice(NamedTuple):
     number: float
 
 
-class _Ends(NamedTuple):
+class _InputGoals(NamedTuple):
     """Where the vehicles of an input may go to: nodes, and the share of each."""
 
     nodes: Int32Array
@@ -315,13 +315,13 @@ def _draw_goals(
 
 def _possible_ends(
     scenario: Scenario, ground: TripEnds, part: VehicleInput, category: Category, start: int
-) -> _Ends:
+) -> _InputGoals:
     if not part.to:
         candidates = ground.router.goal_candidates(start)
-        return _Ends(candidates, np.ones(len(candidates)))
+        return _InputGoals(candidates, np.ones(len(candidates)))
     ends = [ground.ends(category, segments_of(scenario.demand, name)) for name, _ in part.to]
     shares = [
         np.full(len(nodes), share / max(len(nodes), 1))
         for nodes, (_, share) in zip(ends, part.to, strict=True)
     ]
-    return _Ends(np.concatenate(ends), np.concatenate(shares))
+    return _InputGoals(np.concatenate(ends), np.concatenate(shares))

@@ -153,7 +153,7 @@ def computed(data: dict[str, Any], *, file: str | None = None) -> dict[str, Any]
     ScenarioError
         With every formula that has no value, with its place.
     """
-    reading = _Reading({}, {}, [])
+    reading = _FormulaReader({}, {}, [])
     parameters: dict[str, Any] = {}
     for name, said in data["parameters"].items():
         parameters[name] = reading.walked(said, f"parameters/{_escape_key(name)}", name)
@@ -178,7 +178,7 @@ def computed(data: dict[str, Any], *, file: str | None = None) -> dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class _Reading:
+class _FormulaReader:
     """Formulas found so far, by place; the parameters known so far; and what has no value."""
 
     found: dict[str, str]

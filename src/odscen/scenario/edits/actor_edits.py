@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from odscen.base.categories import Category
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.placing.region import Usable
-    from odscen.scenario.sampling.sampler import Crew
+    from odscen.scenario.sampling.sampler import WantedUsers
 
 
 @edit("Add {category}")
@@ -163,7 +163,7 @@ class NamedPlacer(Protocol):
 
     def __call__(
         self, name: str, options: Mapping[str, bool | float | str], seed: int
-    ) -> Callable[[Region, Crew], tuple[Actor, ...]]:
+    ) -> Callable[[Region, WantedUsers], tuple[Actor, ...]]:
         """Make the function that places them in a region."""
 
 

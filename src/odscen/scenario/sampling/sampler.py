@@ -251,7 +251,7 @@ def sample_scenario(
     name: str,
     usable: Usable | None = None,
     roi: Iterable[str] | None = None,
-    place: Callable[[Region, Crew], tuple[Actor, ...]] | None = None,
+    place: Callable[[Region, WantedUsers], tuple[Actor, ...]] | None = None,
 ) -> Scenario:
     """Sample a scenario.
 
@@ -275,7 +275,7 @@ def sample_scenario(
     for attempt in range(attempts):
         segments = tuple(roi) if roi is not None else _draw_roi(graph, config, seed, attempt)
         region = Region.of(graph, segments)
-        crew = wanted_crew(region, config, usable, fill=fill)
+        crew = wanted_users(region, config, usable, fill=fill)
         if place is not None and (crew.vehicles or crew.walkers or fill == 0):
             actors = place(region, crew)
             break
@@ -371,7 +371,7 @@ class _ScenarioDraft(NamedTuple):
     fields: dict[str, object]
 
 
-class Crew(NamedTuple):
+class WantedUsers(NamedTuple):
     """How many road users are wanted in a region, and where they may be."""
 
     vehicles: int
@@ -380,7 +380,9 @@ class Crew(NamedTuple):
     walk_places: Supply
 
 
-def wanted_crew(region: Region, config: SamplingConfig, usable: Usable, *, fill: float) -> Crew:
+def wanted_users(
+    region: Region, config: SamplingConfig, usable: Usable, *, fill: float
+) -> WantedUsers:
     """Find the places of a region, and how many road users a share of them amounts to."""
     supply = vehicle_supply(region, config.places, config.vehicles, usable)
     walkers = walker_supply(region, usable)
@@ -391,11 +393,11 @@ def wanted_crew(region: Region, config: SamplingConfig, usable: Usable, *, fill:
         pedestrian_share=config.pedestrian_share,
         most=config.actors_max,
     )
-    return Crew(cars, people, supply, walkers)
+    return WantedUsers(cars, people, supply, walkers)
 
 
 def _sample_actors(
-    region: Region, config: SamplingConfig, usable: Usable, crew: Crew, seed: int
+    region: Region, config: SamplingConfig, usable: Usable, crew: WantedUsers, seed: int
 ) -> tuple[Actor, ...]:
     cars, people, supply, walkers = crew
     rng = stream(seed, "places")

@@ -173,7 +173,7 @@ def _pair_of_condition(part: Any, actor: str, view: RoadView) -> tuple[ActorView
     return None if one is None or other is None else (one, other)
 
 
-class _Lengthwise(NamedTuple):
+class _LengthwiseGap(NamedTuple):
     """Along the heading of the first of two, or of the one that drives if the first walks.
 
     ``ahead`` metres of the other one's centre, ``aside`` to the left; ``closing`` m/s of the gap;
@@ -187,7 +187,7 @@ class _Lengthwise(NamedTuple):
     behind: ActorView
 
 
-def _measure_lengthwise(one: ActorView, other: ActorView) -> _Lengthwise:
+def _measure_lengthwise(one: ActorView, other: ActorView) -> _LengthwiseGap:
     guide = other if one.person and not other.person else one
     c, s = math.cos(guide.hdg), math.sin(guide.hdg)
     dx, dy = other.x - one.x, other.y - one.y
@@ -197,8 +197,8 @@ def _measure_lengthwise(one: ActorView, other: ActorView) -> _Lengthwise:
     )
     gap = abs(ahead) - _reach_in_direction(one, guide.hdg) - _reach_in_direction(other, guide.hdg)
     if ahead >= 0.0:
-        return _Lengthwise(ahead, aside, faster, gap, one)
-    return _Lengthwise(ahead, aside, -faster, gap, other)
+        return _LengthwiseGap(ahead, aside, faster, gap, one)
+    return _LengthwiseGap(ahead, aside, -faster, gap, other)
 
 
 def _reach_in_direction(body: ActorView, hdg: float) -> float:

@@ -131,7 +131,7 @@ class ConditionTree:
         self._start = f"{rule.id}.when"
         self._step = step
         self._leaves: list[_Leaf] = []
-        self._late: list[_Late] = []
+        self._late: list[_Delayed] = []
         self._root = self._taken_apart(rule.when, self._start, rule.actor)
 
     def look(self, view: RoadView) -> Flips:
@@ -189,7 +189,7 @@ class ConditionTree:
         part = getattr(condition, kind)
         node: _Node
         if kind == "not_":
-            node = _Not(self._taken_apart(part, f"{where}.not", actor))
+            node = _Negated(self._taken_apart(part, f"{where}.not", actor))
         elif kind in ("all", "any"):
             below = [
                 self._taken_apart(one, f"{where}.{kind}[{n}]", actor) for n, one in enumerate(part)
@@ -202,7 +202,7 @@ class ConditionTree:
             self._leaves.append(node)
         rising = condition.edge == "rising"
         if condition.delay or rising:
-            node = _Late(where, node, condition.delay, self._step, rising=rising)
+            node = _Delayed(where, node, condition.delay, self._step, rising=rising)
             self._late.append(node)
         return node
 
@@ -291,7 +291,7 @@ class _AfterRule:
         return Flips(False, view.rule_changes(self._rule, self._has)[:1]).after(view.time)
 
 
-class _Not:
+class _Negated:
     def __init__(self, below: _Node) -> None:
         self._below = below
 
@@ -309,7 +309,7 @@ class _Combined:
         return together([below.look(view) for below in self._below], every=self._every)
 
 
-class _Late:
+class _Delayed:
     """A condition with a delay, or its risings; both need what was before this step."""
 
     def __init__(self, key: str, below: _Node, delay: float, step: float, *, rising: bool) -> None:

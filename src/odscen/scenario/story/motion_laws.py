@@ -242,16 +242,16 @@ def heading_on(line: Sequence[Point], headings: Sequence[float], along: float) -
     return headings[-1]
 
 
-class Beside(NamedTuple):
+class PlaceAlongLine(NamedTuple):
     """Where a point is along a line, and how far to its left; metres."""
 
     along: float
     left: float
 
 
-def beside(line: Sequence[Point], point: Point) -> Beside:
+def beside(line: Sequence[Point], point: Point) -> PlaceAlongLine:
     """Where a point lies by a line: by the nearest place of it, ends drawn out."""
-    best, before = (math.inf, Beside(0.0, 0.0)), 0.0
+    best, before = (math.inf, PlaceAlongLine(0.0, 0.0)), 0.0
     last = len(line) - 2
     for index, (a, b) in enumerate(itertools.pairwise(line)):
         length = math.dist(a, b)
@@ -264,6 +264,6 @@ def beside(line: Sequence[Point], point: Point) -> Beside:
         along = along if index == last and along > length else min(along, length)
         away = math.hypot(px - along * ux, py - along * uy)
         if away < best[0]:
-            best = away, Beside(before + along, math.copysign(away, ux * py - uy * px))
+            best = away, PlaceAlongLine(before + along, math.copysign(away, ux * py - uy * px))
         before += length
     return best[1]

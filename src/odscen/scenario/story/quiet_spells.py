@@ -58,7 +58,7 @@ class QuietSpells:
         self._step = step
         self._ask: dict[str, float] = {}
         self._actors: dict[str, frozenset[str]] = {}
-        self._tellers: dict[str, _Teller | None] = {}
+        self._tellers: dict[str, _QuietTeller | None] = {}
 
     def begins(self, rule: StoryRule, view: RoadView, moved: Collection[str]) -> bool:
         """Whether a rule whose condition is not met, and will not be in this step, is left now."""
@@ -98,7 +98,7 @@ class QuietSpells:
             self.until[name] = until
 
 
-def quiet_seconds(teller: _Teller, actor: str, view: RoadView) -> float:
+def quiet_seconds(teller: _QuietTeller, actor: str, view: RoadView) -> float:
     """Seconds for which a condition that is not met surely stays so; 0 if that cannot be told."""
     tell, part, below, every = teller
     if tell is not None:
@@ -110,21 +110,21 @@ def quiet_seconds(teller: _Teller, actor: str, view: RoadView) -> float:
     return max(parts) if every else min(parts)
 
 
-class _Teller(NamedTuple):
+class _QuietTeller(NamedTuple):
     """A condition, taken apart once: a leaf that can be told, or what it is combined of."""
 
     tell: Callable[[Any, str, RoadView], float] | None
     part: Any
-    below: tuple[_Teller, ...] = ()
+    below: tuple[_QuietTeller, ...] = ()
     every: bool = False
 
 
-def _make_teller(condition: Condition) -> _Teller:
+def _make_teller(condition: Condition) -> _QuietTeller:
     kind = condition.kind
     part = getattr(condition, kind)
     if kind in ("all", "any"):
-        return _Teller(None, None, tuple(map(_make_teller, part)), kind == "all")
-    return _Teller(_TELL.get(kind), part)
+        return _QuietTeller(None, None, tuple(map(_make_teller, part)), kind == "all")
+    return _QuietTeller(_TELL.get(kind), part)
 
 
 def _can_be_told(rule: StoryRule) -> bool:

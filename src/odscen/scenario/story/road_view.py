@@ -19,7 +19,7 @@ _ASIDE = 1.0
 """Metres that nobody comes aside of where he looks in one step, but by a change of lanes."""
 
 
-class Stood(NamedTuple):
+class LastPose(NamedTuple):
     """Where an actor was: centre of the body, and where it looked."""
 
     x: float
@@ -82,7 +82,7 @@ class ActorView:
         )
 
 
-def leapt(before: ActorView | Stood, now: ActorView) -> bool:
+def leapt(before: ActorView | LastPose, now: ActorView) -> bool:
     """Whether an actor was put aside between two steps, as SUMO changes lanes within one.
 
     Who follows a bend comes in the middle between where he looked and where he looks.

@@ -219,7 +219,7 @@ class ProposalKind:
     learns: bool = False
 
 
-class _Listed:
+class _ListedPlaces:
     """Places that do not depend on what becomes of them."""
 
     def __init__(self, places: FloatArray) -> None:
@@ -277,14 +277,14 @@ class _Tpe:
 
 def _start_grid(plan: SweepPlan) -> Proposer:
     shares = list(product(*(axis.shares for axis in plan.axes)))
-    return _Listed(np.array(shares, dtype=np.float64).reshape(-1, len(plan.axes)))
+    return _ListedPlaces(np.array(shares, dtype=np.float64).reshape(-1, len(plan.axes)))
 
 
 def _start_latin(plan: SweepPlan) -> Proposer:
     from scipy.stats import qmc
 
     cube = qmc.LatinHypercube(len(plan.axes), rng=np.random.default_rng(plan.seed))
-    return _Listed(cube.random(plan.samples or 0))
+    return _ListedPlaces(cube.random(plan.samples or 0))
 
 
 def _start_sobol(plan: SweepPlan) -> Proposer:
@@ -293,12 +293,12 @@ def _start_sobol(plan: SweepPlan) -> Proposer:
     # The sequence is balanced in powers of two only.
     power = max(math.ceil(math.log2(plan.samples or 1)), 0)
     cube = qmc.Sobol(len(plan.axes), rng=np.random.default_rng(plan.seed))
-    return _Listed(cube.random_base2(power)[: plan.samples])
+    return _ListedPlaces(cube.random_base2(power)[: plan.samples])
 
 
 def _start_random(plan: SweepPlan) -> Proposer:
     generator = np.random.default_rng(plan.seed)
-    return _Listed(generator.random((plan.samples or 0, len(plan.axes))))
+    return _ListedPlaces(generator.random((plan.samples or 0, len(plan.axes))))
 
 
 PROPOSALS: Final[dict[str, ProposalKind]] = {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.scenario.templates.scene_sites import LaneStretch, Unfit, first_fit
+from odscen.scenario.templates.scene_sites import LaneStretch, UnfitPlaceError, first_fit
 from odscen.scenario.templates.scene_template import (
     LEFT,
     RIGHT,
@@ -97,12 +97,12 @@ def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
 def _stretch_on_either_side(site: TemplateSite, stretch: LaneStretch, near: int) -> LaneStretch:
     try:
         return beside(site, stretch, near)
-    except Unfit:
+    except UnfitPlaceError:
         pass
     try:
         return beside(site, stretch, -near)
-    except Unfit:
-        raise Unfit("have no second lane of the same direction all along") from None
+    except UnfitPlaceError:
+        raise UnfitPlaceError("have no second lane of the same direction all along") from None
 
 
 def _is_left(site: TemplateSite, lane: LaneStretch, of: LaneStretch) -> bool:

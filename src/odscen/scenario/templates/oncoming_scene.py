@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.scenario.templates.scene_sites import LaneStretch, Unfit, first_fit
+from odscen.scenario.templates.scene_sites import LaneStretch, UnfitPlaceError, first_fit
 from odscen.scenario.templates.scene_template import (
     SceneTemplate,
     TemplateParameter,
@@ -152,13 +152,15 @@ def _opposite_stretch(site: TemplateSite, stretch: LaneStretch, side: int) -> La
 
     Raises
     ------
-    Unfit
+    UnfitPlaceError
         If there is none all along.
     """
     lanes, plain = site.region.graph.lanes, np.flatnonzero(site.stretches.plain)
     rows = lanes.left_lane if side > 0 else lanes.right_lane
     if (rows[stretch.nodes] >= 0).any():
-        raise Unfit("have another lane of their own direction between them and oncoming traffic")
+        raise UnfitPlaceError(
+            "have another lane of their own direction between them and oncoming traffic"
+        )
     tree = cKDTree(np.stack([lanes.x[plain], lanes.y[plain], lanes.z[plain]], axis=1))
     hdg = lanes.hdg[stretch.nodes]
     middle = (lanes.width[stretch.nodes] * side, np.zeros(len(hdg)))
@@ -168,16 +170,16 @@ def _opposite_stretch(site: TemplateSite, stretch: LaneStretch, side: int) -> La
     found = plain[index]
     alongside = np.less(away, lanes.spacing + 0.5) & np.less(np.cos(lanes.hdg[found] - hdg), -0.9)
     if not np.all(alongside):
-        raise Unfit("have no lane for oncoming traffic beside them all along")
+        raise UnfitPlaceError("have no lane for oncoming traffic beside them all along")
     if apart(site, int(stretch.nodes[0]), int(found[0])) > _WIDEST:
-        raise Unfit(f"have oncoming traffic more than {_WIDEST:.0f} m away")
+        raise UnfitPlaceError(f"have oncoming traffic more than {_WIDEST:.0f} m away")
     order = found[::-1]
     # Followed from its first node, so that every node is there once and in order.
     nodes, along = [int(order[0])], [0.0]
     while nodes[-1] != int(order[-1]):
         after = int(site.stretches.next[nodes[-1]])
         if after < 0 or not site.stretches.plain[after] or len(nodes) > 2 * len(order):
-            raise Unfit("have a lane for oncoming traffic that does not go through")
+            raise UnfitPlaceError("have a lane for oncoming traffic that does not go through")
         along.append(along[-1] + float(site.stretches.step[nodes[-1]]))
         nodes.append(after)
     return LaneStretch(np.array(nodes), np.array(along), stretch.bend)

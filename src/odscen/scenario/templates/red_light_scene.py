@@ -11,7 +11,7 @@ import numpy as np
 from shapely import LineString
 
 from odscen.lanegraph.query import node_id
-from odscen.scenario.templates.scene_sites import LaneStretch, Unfit, first_fit
+from odscen.scenario.templates.scene_sites import LaneStretch, UnfitPlaceError, first_fit
 from odscen.scenario.templates.scene_template import (
     SceneTemplate,
     TemplateParameter,
@@ -76,16 +76,18 @@ def _at_light(
     needed = ego**2 / (2.0 * _STARTING) + ego * _STEADY
     at = min(found.stop_line - _FRONT, metres_at(found.ego, mine) - needed)
     if at < _FRONT:
-        raise Unfit("have a lane before the light that is too short for the ego")
+        raise UnfitPlaceError("have a lane before the light that is too short for the ego")
     start = node_near(site, found.ego, at)
     ego_metres = metres_at(found.ego, mine) - metres_at(found.ego, start)
     # Both begin at rest, and the other one's speed is in the proportion of their metres.
     runner_metres = ego_metres * fast / ego
     spot = metres_at(found.runner, theirs) - runner_metres
     if spot < 0.0:
-        raise Unfit("have a lane before the light that is too short for the other vehicle")
+        raise UnfitPlaceError(
+            "have a lane before the light that is too short for the other vehicle"
+        )
     if spot > found.runner_line - _FRONT:
-        raise Unfit("would have the other vehicle start behind its stop line")
+        raise UnfitPlaceError("would have the other vehicle start behind its stop line")
     runner = node_near(site, found.runner, spot)
     shows = {"light": found.light.names[0], "movement": found.movement.exact_name}
     green = {"signal": shows | {"shows": "green"}, "edge": "rising"}
@@ -182,7 +184,7 @@ def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, in
 
     Raises
     ------
-    Unfit
+    UnfitPlaceError
         If they do not cross.
     """
     lanes = site.region.graph.lanes
@@ -192,7 +194,7 @@ def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, in
     ]
     crossed = lines[0].intersection(lines[1])
     if crossed.is_empty or crossed.geom_type != "Point":
-        raise Unfit("are two movements whose paths do not cross at one place")
+        raise UnfitPlaceError("are two movements whose paths do not cross at one place")
     nodes = []
     for stretch in (found.ego, found.runner):
         away = np.hypot(lanes.x[stretch.nodes] - crossed.x, lanes.y[stretch.nodes] - crossed.y)
@@ -200,7 +202,7 @@ def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, in
     if not all(metres_at(one, node) > line for one, node, line in (
         (found.ego, nodes[0], found.stop_line), (found.runner, nodes[1], found.runner_line),
     )):  # fmt: skip
-        raise Unfit("cross before the stop line")
+        raise UnfitPlaceError("cross before the stop line")
     return nodes[0], nodes[1]
 
 

@@ -27,7 +27,7 @@ class NoPlaceError(ScenarioError):
     """No place of a map has room for a template; the message says where was looked and why not."""
 
 
-class Unfit(Exception):  # noqa: N818 (no error: the next place is tried)
+class UnfitPlaceError(Exception):
     """A place does not fit; the reason reads on from "of so many places"."""
 
 
@@ -153,7 +153,7 @@ def first_fit(
     for candidate in candidates:
         try:
             return place(candidate)
-        except Unfit as unfit:
+        except UnfitPlaceError as unfit:
             why[str(unfit)] += 1
     number = sum(why.values())
     reasons = "; ".join(f"{count} {reason}" for reason, count in why.most_common() if count)
@@ -242,14 +242,14 @@ class WalkSides:
 
         Raises
         ------
-        Unfit
+        UnfitPlaceError
             If there is none.
         """
         lanes, walks = self._graph.lanes, self._graph.walks
         place = int(np.argmin(np.abs(stretch.along - along)))
         node = int(stretch.nodes[place])
         if self._walk_node_tree is None:
-            raise Unfit("have no sidewalk")
+            raise UnfitPlaceError("have no sidewalk")
         c, s = math.cos(lanes.hdg[node]), math.sin(lanes.hdg[node])
         around = np.array(
             sorted(self._walk_node_tree.query_ball_point((lanes.x[node], lanes.y[node]), 32))
@@ -262,24 +262,24 @@ class WalkSides:
             around, ahead, left * near, beyond + float(lanes.width[node]) / 2.0
         )
         if start is None:
-            raise Unfit("have no sidewalk on the near side")
+            raise UnfitPlaceError("have no sidewalk on the near side")
         met = float(ahead[around == start][0])
         end = _nearest_to_side(around, ahead - met, -left * near, float(lanes.width[node]) / 2.0)
         if end is None:
-            raise Unfit("have no sidewalk on the far side")
+            raise UnfitPlaceError("have no sidewalk on the far side")
         across = float(abs(left[around == start][0]))
         if across + float(abs(left[around == end][0])) > WIDEST:
-            raise Unfit(f"are wider than {WIDEST:.0f} m")
+            raise UnfitPlaceError(f"are wider than {WIDEST:.0f} m")
         meets = float(lanes.x[node] + met * c), float(lanes.y[node] + met * s)
         if self._near_crosswalk(meets):
-            raise Unfit(f"have a crosswalk within {_FROM_CORNER:.0f} m")
+            raise UnfitPlaceError(f"have a crosswalk within {_FROM_CORNER:.0f} m")
         goal = self._goal_behind(start, end)
         there: str | list[float] = walk_node_id(self._graph, end)
         if goal is None:  # nothing joins the two sides: it stays where it gets to
             goal = self._goal_behind(start, start)
             there = [round(float(at[end]), 3) for at in (walks.x, walks.y)]
         if goal is None:
-            raise Unfit("have a sidewalk from which no path leads on")
+            raise UnfitPlaceError("have a sidewalk from which no path leads on")
         return RoadCrossing(
             walk_node_id(self._graph, start),
             there,

@@ -11,7 +11,7 @@ import numpy as np
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.lanegraph.query import node_id
-from odscen.scenario.templates.scene_sites import LaneStretch, Unfit
+from odscen.scenario.templates.scene_sites import LaneStretch, UnfitPlaceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -155,7 +155,7 @@ def node_near(site: TemplateSite, stretch: LaneStretch, along: float) -> int:
 
     Raises
     ------
-    Unfit
+    UnfitPlaceError
         If there is none within a node's spacing.
     """
     spacing = site.region.graph.lanes.spacing
@@ -165,7 +165,7 @@ def node_near(site: TemplateSite, stretch: LaneStretch, along: float) -> int:
             break
         if site.stretches.spawnable[stretch.nodes[place]]:
             return int(stretch.nodes[place])
-    raise Unfit("have no node for a vehicle where it is to start")
+    raise UnfitPlaceError("have no node for a vehicle where it is to start")
 
 
 def metres_at(stretch: LaneStretch, node: int) -> float:
@@ -178,14 +178,14 @@ def beside(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretch:
 
     Raises
     ------
-    Unfit
+    UnfitPlaceError
         If there is none all along, or it is not for all vehicles.
     """
     lanes = site.region.graph.lanes
     rows = (lanes.left_lane if side == LEFT else lanes.right_lane)[stretch.nodes]
     name = "left" if side == LEFT else "right"
     if (rows < 0).any():
-        raise Unfit(f"have no lane to the {name} all along")
+        raise UnfitPlaceError(f"have no lane to the {name} all along")
     first = lanes.lanes.first_node
     found = np.empty(len(rows), dtype=np.int64)
     for row in np.unique(rows).tolist():
@@ -194,7 +194,7 @@ def beside(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretch:
         away = np.abs(lanes.s[stretch.nodes[mine]][:, None] - lanes.s[its][None, :])
         found[mine] = its[np.argmin(away, axis=1)]
     if not site.stretches.plain[found].all():
-        raise Unfit(f"have a lane to the {name} that is not for all vehicles")
+        raise UnfitPlaceError(f"have a lane to the {name} that is not for all vehicles")
     return LaneStretch(found, stretch.along, stretch.bend)
 
 

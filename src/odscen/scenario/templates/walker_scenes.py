@@ -8,7 +8,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.categories import Category
-from odscen.scenario.templates.scene_sites import NoPlaceError, Unfit, first_fit
+from odscen.scenario.templates.scene_sites import NoPlaceError, UnfitPlaceError, first_fit
 from odscen.scenario.templates.scene_template import (
     CHILD,
     SceneTemplate,
@@ -86,7 +86,7 @@ def _crossing_scene(
         beyond = _HIDDEN if hidden is _HiddenBy.AT_KERB else 0.0
         crossing = site.sides.crossing(stretch, along, near=near, beyond=beyond)
         if crossing.metres > reach:
-            raise Unfit(f"are more than {reach:.0f} m from the sidewalk")
+            raise UnfitPlaceError(f"are more than {reach:.0f} m from the sidewalk")
         distance = speed * crossing.metres / walking
         start = node_near(site, stretch, crossing.along - distance - lead_in)
         ego = vehicle(site, "ego", start, int(stretch.nodes[-1]), speed=speed, ego=True)
@@ -129,7 +129,7 @@ def _park_vehicle(site: TemplateSite, lane: LaneStretch, front: float) -> dict[s
     centre = front - half - site.region.graph.lanes.spacing / 2.0
     node = node_near(site, lane, centre)
     if metres_at(lane, node) > front - half:
-        raise Unfit("have no node for a vehicle where it is to stand")
+        raise UnfitPlaceError("have no node for a vehicle where it is to stand")
     last = int(lane.nodes[-1])
     return vehicle(site, "parked", node, last, speed=CHILD, moving=False)
 

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.scenario.demand.count_stations import GOOD, Passing, contradictions, geh, observations
+from odscen.scenario.demand.count_stations import (
+    GOOD,
+    StationFinder,
+    contradictions,
+    geh,
+    observations,
+)
 from odscen.scenario.demand.zones import TripEnds
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.counted_traffic import routes_past
@@ -182,7 +188,7 @@ def _fit_counts(
     vehicles: int,
 ) -> CountFits:
     opposed, problems = counts_apart(scenario, sumo_map)
-    passable = _Passable(scenario, sumo_map)
+    passable = _PassablePlaces(scenario, sumo_map)
     rows = []
     for name, place, begin, end, counted in observations(scenario.demand):
         modelled = passages.get((place, begin, end), 0)
@@ -231,7 +237,7 @@ def _explain_difference(modelled: float, counted: float, source: str) -> str:
     return "other counts on the routes past this place allow no more"
 
 
-class _Passable:
+class _PassablePlaces:
     """Places that some route inside the region passes; found out when first asked."""
 
     def __init__(self, scenario: Scenario, sumo_map: SumoMap) -> None:
@@ -247,7 +253,7 @@ class _Passable:
         ground = TripEnds(region, usable_places(self._map))
         found: set[str] = set()
         for part in self._scenario.demand.counts:
-            passing = Passing(region.graph, [row[0] for row in part.rows])
+            passing = StationFinder(region.graph, [row[0] for row in part.rows])
             kinds = routes_past(ground, part, passing)
             found.update(passing.places[place] for kind in kinds for place in kind)
         return found

@@ -25,7 +25,7 @@ from scipy.optimize import lsq_linear
 
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.scenario.demand.count_stations import GOOD, Passing, geh, observations
+from odscen.scenario.demand.count_stations import GOOD, StationFinder, geh, observations
 from odscen.scenario.demand.day_profiles import curve
 from odscen.scenario.demand.trips import SLOWER, window
 from odscen.scenario.demand.zones import TripEnds
@@ -110,7 +110,7 @@ def pair_passages(
     region = Region.of(sumo_map.graph, scenario.roi)
     ground = TripEnds(region, usable_places(sumo_map))
     places = [observation.place for observation in observations(scenario.demand)]
-    passing = Passing(region.graph, places)
+    passing = StationFinder(region.graph, places)
     until = scenario.simulation.duration
     named, sampled = _sample_matrices(scenario)
     users, _ = all_road_users(sampled, sumo_map, region, until=until)

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from odscen.base.errors import InputError
 from odscen.lanegraph.segments import segment_name
-from odscen.scenario.demand.count_stations import Passing, transitions
+from odscen.scenario.demand.count_stations import StationFinder, transitions
 from odscen.scenario.demand.day_profiles import DAY, Curve, known_profiles
 from odscen.scenario.document.scenario_document import Background, Demand
 from odscen.scenario.placing.region import Region
@@ -136,7 +136,7 @@ def carried_background(
     return SPARE * float(np.min(capacity[passed > 0] / passed[passed > 0], initial=_MOST))
 
 
-class _Sampled(NamedTuple):
+class _SampledTrips(NamedTuple):
     """Trips anywhere in a region.
 
     ``uses`` is how often each passes each approach to a junction, shape ``(trips, places)``;
@@ -149,10 +149,10 @@ class _Sampled(NamedTuple):
     places: Sequence[str]
 
 
-def _sample_day(scenario: Scenario, sumo_map: SumoMap, mix: Mapping[Any, float]) -> _Sampled:
+def _sample_day(scenario: Scenario, sumo_map: SumoMap, mix: Mapping[Any, float]) -> _SampledTrips:
     region = Region.of(sumo_map.graph, scenario.roi)
     carried = approach_capacities(sumo_map)
-    passing = Passing(sumo_map.graph, sorted(carried))
+    passing = StationFinder(sumo_map.graph, sorted(carried))
     sample = Background.model_validate({"id": "sample", "trips": SAMPLE, "mix": mix})
     drawn = scenario.model_copy(update={"demand": Demand(background=(sample,))})
     users, _ = all_road_users(drawn, sumo_map, region, until=DAY)
@@ -169,7 +169,7 @@ def _sample_day(scenario: Scenario, sumo_map: SumoMap, mix: Mapping[Any, float])
         shape=(len(routes), len(passing.places)),
     )
     capacity = np.array([carried[place] for place in passing.places])
-    return _Sampled([user for user, _ in routes], uses, capacity, passing.places)
+    return _SampledTrips([user for user, _ in routes], uses, capacity, passing.places)
 
 
 def balanced(uses: sparse.csr_array, most: FloatArray, total: float) -> FloatArray | None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.base.atomic_folders import scratch_folder
-from odscen.scenario.demand.count_stations import Passing
+from odscen.scenario.demand.count_stations import StationFinder
 from odscen.scenario.demand.trips import FIRST, Trips, drawn_categories
 from odscen.scenario.document.distributions import stream
 from odscen.sumo.realize.sumo_tools import run_tool
@@ -74,7 +74,7 @@ def counted_trips(
     others
         Vehicles of the rest of the scenario by place, begin and end of the slice.
     """
-    passing = Passing(ground.region.graph, [row[0] for row in counts.rows])
+    passing = StationFinder(ground.region.graph, [row[0] for row in counts.rows])
     kinds = routes_past(ground, counts, passing)
     wanted = [
         (place, begin, end, max(0.0, number - others.get((place, begin, end), 0.0)))
@@ -102,7 +102,7 @@ def counted_trips(
 
 
 def routes_past(
-    ground: TripEnds, counts: Counts, passing: Passing
+    ground: TripEnds, counts: Counts, passing: StationFinder
 ) -> dict[PassedStations, list[StationRoute]]:
     """Ways through the region that pass a place of counting, by the places that they pass."""
     segment = ground.region.graph.lanes.segment
@@ -152,7 +152,7 @@ def _select_kinds(often: Mapping[PassedStations, int], places: int) -> list[Pass
 
 def _choose_routes(
     kinds: Sequence[PassedStations],
-    passing: Passing,
+    passing: StationFinder,
     wanted: Sequence[tuple[str, float, float, float]],
     *,
     seed: int,
@@ -189,7 +189,7 @@ def _routes_xml(kinds: Sequence[PassedStations]) -> str:
     return "\n".join(["<routes>", *rows, "</routes>", ""])
 
 
-def _counts_xml(passing: Passing, wanted: Sequence[tuple[str, float, float, float]]) -> str:
+def _counts_xml(passing: StationFinder, wanted: Sequence[tuple[str, float, float, float]]) -> str:
     number = {place: index for index, place in enumerate(passing.places)}
     slices: dict[tuple[float, float], list[str]] = defaultdict(list)
     for place, begin, end, vehicles in wanted:

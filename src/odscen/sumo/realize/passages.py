@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.scenario.demand.count_stations import Passing, transitions
+from odscen.scenario.demand.count_stations import StationFinder, transitions
 from odscen.sumo.realize.route_paths import each_path
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def planned_passages(
     routes
         Those that trips choose; the shortest if not given.
     """
-    passing = Passing(region.graph, [observation.place for observation in seen])
+    passing = StationFinder(region.graph, [observation.place for observation in seen])
     clock = _Slices(seen)
     found: Passages = Counter()
     for _, passed in each_passing(users, region, drivable, passing, routes=routes):
@@ -63,7 +63,7 @@ def each_passing(
     users: Sequence[RoadUser],
     region: Region,
     drivable: Router,
-    passing: Passing,
+    passing: StationFinder,
     *,
     routes: RoutesOfDemand | None = None,
     assigned: Mapping[str, Int32Array] | None = None,
@@ -106,7 +106,7 @@ def seen_passages(
     """
     import polars as pl
 
-    passing = Passing(sumo_map.graph, [observation.place for observation in seen])
+    passing = StationFinder(sumo_map.graph, [observation.place for observation in seen])
     clock = _Slices(seen)
     found: Passages = Counter()
     segments = _segment_of_lane(sumo_map)
@@ -128,7 +128,7 @@ def seen_passages(
         .agg("time", "segment", pl.col("arrived").first())
         .collect()
     )
-    between = _Between(sumo_map.graph)
+    between = _SegmentFiller(sumo_map.graph)
     junctions = np.array(sumo_map.graph.segments.kinds) == "junction"
     for times, route, arrived in changes.select("time", "segment", "arrived").iter_rows():
         whole, moments = between.filled(route, times)
@@ -156,7 +156,7 @@ class _Slices:
             passages[place, *slices[row]] += 1
 
 
-class _Between:
+class _SegmentFiller:
     """Fills segments in that a vehicle crossed from one record to the next.
 
     Such as a junction, or several short sections of a road that are one SUMO lane together.

@@ -68,7 +68,7 @@ def each_path(
             by_goal[user.person, user.goal].append(index)
         else:
             by_spawn[user.person, user.spawn].append(index)
-    leads = _Leads(region.graph.lanes)
+    leads = _LeadPaths(region.graph.lanes)
     for (person, spawn), group in by_spawn.items():
         goals = {index: users[index].places[0] for index in group}
         paths: dict[int, Int32Array] = {}
@@ -100,7 +100,7 @@ def _paths_of_trips(
         there = region.walk_router.paths_to(goal)
         for first in range(0, len(group), TOGETHER):
             part = group[first : first + TOGETHER]
-            begun = [[_Lead((users[index].spawn,), 0.0, 0.0)] for index in part]
+            begun = [[_LeadPath((users[index].spawn,), 0.0, 0.0)] for index in part]
             yield from zip(part, _to_goal(goal, begun, there), strict=True)
 
 
@@ -119,7 +119,7 @@ class CostRouter:
 
     def __init__(self, router: Router, lanes: LaneGraph, costs: FloatArray | None = None) -> None:
         self._router = router
-        self._leads = _Leads(lanes, costs)
+        self._leads = _LeadPaths(lanes, costs)
 
     def paths_to(
         self, goal: int, spawns: Mapping[int, int], bodies: Sequence[Body]
@@ -180,7 +180,7 @@ def _path_through(
     return path
 
 
-class _Lead(NamedTuple):
+class _LeadPath(NamedTuple):
     """A path straight on from a spawn: its nodes, from the spawn on, its metres and its cost."""
 
     nodes: tuple[int, ...]
@@ -188,7 +188,7 @@ class _Lead(NamedTuple):
     cost: float
 
 
-class _Leads:
+class _LeadPaths:
     """Ways straight on from spawns, on which no vehicle changes lanes yet."""
 
     def __init__(self, lanes: LaneGraph, costs: FloatArray | None = None) -> None:
@@ -197,11 +197,11 @@ class _Leads:
         self._target, self._length = lanes.target[follows], lanes.length[follows]
         self._first = np.searchsorted(lanes.source[follows], np.arange(len(lanes.x) + 1))
 
-    def of(self, spawn: int, body: Body, mask: BoolArray) -> list[_Lead]:
+    def of(self, spawn: int, body: Body, mask: BoolArray) -> list[_LeadPath]:
         """Straight paths of a vehicle that departs, inside the mask, and last the spawn alone."""
         least = body.length / 2.0 + LANE_CHANGE
-        found: list[_Lead] = []
-        open_ = [_Lead((spawn,), 0.0, 0.0)]
+        found: list[_LeadPath] = []
+        open_ = [_LeadPath((spawn,), 0.0, 0.0)]
         while open_:
             lead = open_.pop()
             if lead.metres >= least:
@@ -209,7 +209,7 @@ class _Leads:
                 continue
             first, end = self._first[lead.nodes[-1] : lead.nodes[-1] + 2].tolist()
             open_ += [
-                _Lead(
+                _LeadPath(
                     (*lead.nodes, int(self._target[k])),
                     lead.metres + float(self._length[k]),
                     lead.cost + float(self._cost[k]),
@@ -217,7 +217,7 @@ class _Leads:
                 for k in range(first, end)
                 if mask[self._target[k]]
             ]
-        return [*found, _Lead((spawn,), 0.0, 0.0)]
+        return [*found, _LeadPath((spawn,), 0.0, 0.0)]
 
 
 def _from_spawn(
@@ -225,7 +225,7 @@ def _from_spawn(
     goals: Mapping[int, int],
     bodies: Sequence[Body],
     router: Router,
-    leads: _Leads,
+    leads: _LeadPaths,
 ) -> dict[int, Int32Array]:
     """Ways of the members of a flow, or of one actor, as far as there are any."""
     if not goals or not router.mask[spawn]:
@@ -246,7 +246,7 @@ def _from_spawn(
     return {index: path for index, path in paths.items() if len(path)}
 
 
-def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: PathsTo) -> list[Int32Array]:
+def _to_goal(goal: int, begun: Sequence[Sequence[_LeadPath]], there: PathsTo) -> list[Int32Array]:
     """Ways of trips to one goal; empty where there is none."""
     ends = [lead.nodes[-1] for leads in begun for lead in leads[:-1]]
     costs = iter(there.distance(np.array(ends, dtype=np.int32)).tolist())
@@ -255,7 +255,7 @@ def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: PathsTo) -> lis
     return [_join_lead(lead, path) for lead, path in zip(chosen, paths, strict=True)]
 
 
-def _choose_best_lead(goal: int, leads: Sequence[_Lead], onwards: Sequence[float]) -> _Lead:
+def _choose_best_lead(goal: int, leads: Sequence[_LeadPath], onwards: Sequence[float]) -> _LeadPath:
     """Lead with the best path in all; the last, which is no lead, where no other leads there.
 
     ``onwards`` is the cost from the end of each but the last, for which nobody needs to search.
@@ -269,6 +269,6 @@ def _choose_best_lead(goal: int, leads: Sequence[_Lead], onwards: Sequence[float
     return ahead[min(fit)[1]] if fit else none
 
 
-def _join_lead(lead: _Lead, path: Int32Array) -> Int32Array:
+def _join_lead(lead: _LeadPath, path: Int32Array) -> Int32Array:
     before = np.array(lead.nodes[:-1], dtype=np.int32)
     return np.concatenate([before, path]) if len(path) else path

@@ -35,7 +35,7 @@ _ASTRAY = 6.0
 does not stand on it."""
 
 
-class Lie(NamedTuple):
+class GroundSlope(NamedTuple):
     """Height (metres) and slope of the ground in a direction (radians, positive uphill)."""
 
     z: FloatArray
@@ -81,7 +81,7 @@ class ElevationLookup:
         hdg: FloatArray,
         near_z: FloatArray,
         walks: NDArray[np.bool_],
-    ) -> Lie:
+    ) -> GroundSlope:
         """Ground at places; shape ``(N,)`` each.
 
         Parameters
@@ -95,7 +95,7 @@ class ElevationLookup:
         """
         if self._flat or self._tree is None:
             z = self._z[0] if len(self._z) else 0.0
-            return Lie(np.full(len(x), z), np.zeros(len(x)))
+            return GroundSlope(np.full(len(x), z), np.zeros(len(x)))
         count = min(_NEIGHBOURS, len(self._z))
         far, node = self._tree.query(np.column_stack([x, y]), k=count, distance_upper_bound=_REACH)
         far = np.asarray(far).reshape(len(x), count)
@@ -112,7 +112,7 @@ class ElevationLookup:
         own = node[np.arange(len(x)), best]
         lie = self._interpolate_between(own, x, y, hdg)
         lost = ~known.any(axis=1)
-        return Lie(
+        return GroundSlope(
             np.where(lost, np.where(np.isnan(near_z), 0.0, near_z), lie.z),
             np.where(lost, 0.0, lie.pitch),
         )
@@ -138,7 +138,7 @@ class ElevationLookup:
 
     def _interpolate_between(
         self, node: NDArray[np.int64], x: FloatArray, y: FloatArray, hdg: FloatArray
-    ) -> Lie:
+    ) -> GroundSlope:
         """Between a node and the next one on the same lane, that way or the other."""
         ahead = np.cos(self._hdg[node]) * (x - self._xy[node, 0])
         ahead += np.sin(self._hdg[node]) * (y - self._xy[node, 1])
@@ -159,7 +159,7 @@ class ElevationLookup:
         steep = rise + share * (2 * bend + share * 3 * twist)
         slope = np.arctan(np.where(usable, steep, rise) * sense)
         turn = hdg - self._hdg[node]
-        return Lie(z, np.arctan(np.tan(slope) * np.cos(turn)))
+        return GroundSlope(z, np.arctan(np.tan(slope) * np.cos(turn)))
 
 
 def _direction_cost(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -40,7 +40,7 @@ class LivePicture:
 
 
 @dataclass(slots=True)
-class _Seen:
+class _LatestSeen:
     picture: LivePicture = field(default_factory=LivePicture)
     shot: LivePicture = field(default_factory=LivePicture)
     lights: dict[str, str] = field(default_factory=dict)
@@ -64,7 +64,7 @@ class Live:
         self._process: subprocess.Popen[bytes] | None = None
         self._ended = False
         self._asked = False
-        self._seen = _Seen()
+        self._seen = _LatestSeen()
         self._watchers: list[Callable[[], None]] = []
         self._early: list[Command] = []
 

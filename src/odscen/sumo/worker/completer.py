@@ -47,7 +47,7 @@ _CONTENTS = (STATE_FILE, EVENTS_LINES, *layout.RECORDED)
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenSlice:
     """A slice that SUMO has written into ``part``, and that is not complete.
 
     Attributes
@@ -99,7 +99,7 @@ def main() -> int:
     while True:
         outcomes.settle()  # while the worker simulates
         try:
-            written: Written | None = connection.recv()
+            written: WrittenSlice | None = connection.recv()
         except (EOFError, ConnectionError):  # the worker is gone; what it asked for is done
             return 1
         try:

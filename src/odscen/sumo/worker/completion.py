@@ -13,7 +13,7 @@ from odscen.base.errors import SimulationError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.sumo.worker.completer import Written
+    from odscen.sumo.worker.completer import WrittenSlice
 
 COMPLETER = "odscen.sumo.worker.completer"
 
@@ -51,7 +51,7 @@ class Completion:
         self._connection.close()
         self._process.wait()
 
-    def complete(self, written: Written) -> None:
+    def complete(self, written: WrittenSlice) -> None:
         """Complete a slice.
 
         Raises
@@ -77,7 +77,7 @@ class Completion:
         """Say how the process has ended that this one has started."""
         return CompleterGoneError(self._process.wait())
 
-    def _ask_completer(self, what: Written | None) -> None:
+    def _ask_completer(self, what: WrittenSlice | None) -> None:
         try:
             self._connection.send(what)
             error = self._connection.recv()

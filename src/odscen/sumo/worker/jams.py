@@ -17,7 +17,7 @@ from odscen.records.run_events import Event, EventKind
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from odscen.sumo.worker.simulation.observed import Ahead, StoppedVehicle
+    from odscen.sumo.worker.simulation.observed import StoppedVehicle, ViewAhead
     from odscen.sumo.worker.simulation.session import Session
     from odscen.sumo.worker.simulation.stopped_vehicles import StoppedVehicles
 
@@ -96,7 +96,7 @@ class JamWatch:
         over = [lane for lane, seen in self._seen.items() if time - seen >= RELEASE]
         events = [self._end_jam(time, lane) for lane in sorted(over)]
         before, self.stops = self.stops, {}
-        known: dict[str, Ahead | None] = {}
+        known: dict[str, ViewAhead | None] = {}
         for lane, queue in sorted(queues.items()):
             first = max(queue, key=lambda vehicle: (vehicle.pos, vehicle.vehicle))
             reason: StopReason | str
@@ -149,7 +149,7 @@ class JamWatch:
 
 
 def explain(
-    stopped: StoppedVehicles, vehicle: str, known: dict[str, Ahead | None] | None = None
+    stopped: StoppedVehicles, vehicle: str, known: dict[str, ViewAhead | None] | None = None
 ) -> tuple[StopReason, str]:
     """Why a vehicle is stopped, and the vehicle at the head of its queue.
 
@@ -174,14 +174,14 @@ def explain(
 
 
 def _vehicle_ahead(
-    stopped: StoppedVehicles, vehicle: str, known: dict[str, Ahead | None]
-) -> Ahead | None:
+    stopped: StoppedVehicles, vehicle: str, known: dict[str, ViewAhead | None]
+) -> ViewAhead | None:
     if vehicle not in known:
         known[vehicle] = stopped.ahead(vehicle)
     return known[vehicle]
 
 
-def _own_reason(ahead: Ahead) -> StopReason | None:
+def _own_reason(ahead: ViewAhead) -> StopReason | None:
     """Return the reason that is not just the vehicle ahead."""
     if not ahead.onwards:
         return StopReason.WRONG_LANE if ahead.beside else StopReason.NO_CONNECTION

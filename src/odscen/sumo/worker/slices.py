@@ -29,7 +29,7 @@ from odscen.runs.checkpoint import (
 )
 from odscen.runs.parts import check_room
 from odscen.sumo.outputs.output_tables import outputs_to
-from odscen.sumo.worker.completer import Written
+from odscen.sumo.worker.completer import WrittenSlice
 from odscen.sumo.worker.protocol import Done
 from odscen.sumo.worker.route_slices import RouteSlices
 from odscen.sumo.worker.simulation.session import open_session
@@ -93,7 +93,7 @@ class _RunningSlice:
         length = plan.slice_length or plan.until
         self._end = min(self._number * length, plan.until)
 
-    def run(self, stepper: Stepper) -> Written:
+    def run(self, stepper: Stepper) -> WrittenSlice:
         """Simulate it."""
         before, start = self._before, time.perf_counter()
         if before is not None:
@@ -135,7 +135,9 @@ class _RunningSlice:
             driven=[] if stepper.behaviour is None else stepper.behaviour.state(),
         )
         parked = frozenset(before.recorder["parked"]) if before else frozenset()
-        return Written(part, checkpoint, events, lengths, before.lanes if before else {}, parked)
+        return WrittenSlice(
+            part, checkpoint, events, lengths, before.lanes if before else {}, parked
+        )
 
     def _slice_arguments(self, part: Path) -> list[str]:
         sumo = self._run / layout.SUMO_FOLDER

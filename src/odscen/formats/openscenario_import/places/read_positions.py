@@ -378,7 +378,7 @@ class PositionReader:
 
 
 @dataclass(frozen=True, slots=True, init=False)
-class Nowhere(PositionReader):
+class NoMapPositions(PositionReader):
     """Reads positions of a file without a map: each is refused.
 
     Who has no place asks for no lanes, so that there are none.

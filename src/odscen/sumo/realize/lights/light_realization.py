@@ -124,7 +124,7 @@ def realized_lights(
         timing = own[0] if own else JunctionTiming(junction=view.names[0])
         asked = signals.bus_priority if timing.bus_priority is None else timing.bus_priority
         control = timing.control or signals.control
-        realizing = _Realizing(light, view, timing, control, sumo_map, buses=asked)
+        realizing = _LightRealizer(light, view, timing, control, sumo_map, buses=asked)
         found.append(
             realizing.designed(scenario.demand.clock, until) if timing.stages else realizing.kept()
         )
@@ -137,14 +137,14 @@ def _mapped_lights(
 ) -> tuple[RealizedLight, ...]:
     """All lights as the map has them: the same for all scenarios that say no more of them."""
     return tuple(
-        _Realizing(
+        _LightRealizer(
             light, view, JunctionTiming(junction=view.names[0]), control, sumo_map, buses=buses
         ).kept()
         for light, view in zip(sumo_map.lights, scenario_lights(sumo_map), strict=True)
     )
 
 
-class _Realizing:
+class _LightRealizer:
     """One light."""
 
     def __init__(

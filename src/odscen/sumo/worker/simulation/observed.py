@@ -97,7 +97,7 @@ class StoppedVehicle(NamedTuple):
     waited: float
 
 
-class Ahead(NamedTuple):
+class ViewAhead(NamedTuple):
     """What a vehicle has before it.
 
     Attributes

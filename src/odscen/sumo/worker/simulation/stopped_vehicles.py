@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from odscen.sumo.worker.simulation.foreign_traffic import is_foreign
-from odscen.sumo.worker.simulation.observed import Ahead, StoppedVehicle
+from odscen.sumo.worker.simulation.observed import StoppedVehicle, ViewAhead
 
 if TYPE_CHECKING:
     from odscen.sumo.worker.simulation.road_lanes import RoadLanes
@@ -47,7 +47,7 @@ class StoppedVehicles:
                 found.append(StoppedVehicle(name, lane, vehicle.getLanePosition(name), waited))
         return found
 
-    def ahead(self, name: str) -> Ahead | None:
+    def ahead(self, name: str) -> ViewAhead | None:
         """What a vehicle has before it; ``None`` if it is not on the road."""
         vehicle = self._sumo.vehicle
         try:
@@ -56,7 +56,7 @@ class StoppedVehicles:
             at_end = vehicle.getRouteIndex(name) >= len(vehicle.getRoute(name)) - 1
             lane = str(vehicle.getLaneID(name))
             if leader is None and not at_end and (wrong := self._leads_astray(name)) is not None:
-                return Ahead(False, "", False, None, people=False, beside=wrong)
+                return ViewAhead(False, "", False, None, people=False, beside=wrong)
             inside = lane in self._lanes.internal
             goes = bool(links) and links[0][5] not in _RED  # else that is the reason
             through = lane if inside else str(links[0][4]) if goes else ""
@@ -66,11 +66,11 @@ class StoppedVehicles:
             return None
         if not links:  # inside a junction the link out of it is not among them
             onwards = at_end or inside
-            return Ahead(onwards, "", onwards, leader, people=False)
+            return ViewAhead(onwards, "", onwards, leader, people=False)
         link = links[0]
         # approachedLane, hasPrio, isOpen, hasFoe, approachedInternal, state, direction, length
         people = bool(link[3]) and self._people_cross(link[4])
-        return Ahead(True, str(link[5]), bool(link[2]), leader, people)
+        return ViewAhead(True, str(link[5]), bool(link[2]), leader, people)
 
     def _leads_astray(self, name: str) -> bool | None:
         """Whether another lane continues along a vehicle's route; ``None`` if its own lane does."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import SumoPose, body_centre, sumo_to_xodr
 from odscen.scenario.story.motion_laws import beside, line_length
-from odscen.scenario.story.road_view import MOST_GAIN, ActorView, Stood, leapt
+from odscen.scenario.story.road_view import MOST_GAIN, ActorView, LastPose, leapt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -64,8 +64,8 @@ class StoryView:
         self._driven: Mapping[str, float] = {}
         self._road: MovedActors
         self._views: dict[str, ActorView | None] = {}
-        self._before: Mapping[str, ActorView | Stood | None] = {}
-        self._restored: Mapping[str, Stood] = {}
+        self._before: Mapping[str, ActorView | LastPose | None] = {}
+        self._restored: Mapping[str, LastPose] = {}
         self._nearest: dict[Point, tuple[str, float, int]] = {}
         self._half_widths: dict[str, float] = {}
         self._gains: dict[str, float] = {}
@@ -209,7 +209,7 @@ class StoryView:
         self._standing = dict(state["standing"])
         self._gone = set(state["gone"])
         self._last = {name: (x, y, v) for name, (x, y, v) in state["last"].items()}
-        self._restored = {name: Stood(*one) for name, one in state.get("seen", {}).items()}
+        self._restored = {name: LastPose(*one) for name, one in state.get("seen", {}).items()}
 
     def _lane_position_of(self, place: str | Point) -> tuple[str, float, int]:
         if not isinstance(place, str):

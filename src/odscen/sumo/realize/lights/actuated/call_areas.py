@@ -78,7 +78,7 @@ def called(
 
 
 @dataclass(frozen=True, slots=True)
-class Callers:
+class CallDetectors:
     """Detectors of a light that call stages, as SUMO's expressions."""
 
     areas: Sequence[CallArea]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from odscen.sumo.realize.lights.actuated.call_areas import Callers, call_areas
+from odscen.sumo.realize.lights.actuated.call_areas import CallDetectors, call_areas
 from odscen.sumo.realize.lights.actuated.called_phases import called_phases
 from odscen.sumo.realize.lights.actuated.stage_variants import StageVariants, shorter
 from odscen.sumo.realize.lights.light_detectors import (
@@ -83,7 +83,7 @@ def called_light(
     walks = {n for n, one in enumerate(view.movements) if one.walk}
     places = waiting_places(light, net, {name: own & walks for name, own in green.items()})
     areas = call_areas(light, view, net, loops)
-    callers = Callers(areas, places, buses)
+    callers = CallDetectors(areas, places, buses)
     plan = called_phases(variants, callers, ends=ends, conditions=conditions)
     return CalledLight(plan, (*loops, *places), areas, conditions)
 

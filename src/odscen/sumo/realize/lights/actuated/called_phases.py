@@ -17,7 +17,7 @@ from odscen.sumo.realize.lights.stage_phases import PhasePlan, SumoPhase
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.sumo.realize.lights.actuated.call_areas import Callers
+    from odscen.sumo.realize.lights.actuated.call_areas import CallDetectors
     from odscen.sumo.realize.lights.actuated.stage_variants import StageVariant, StageVariants
 
 RESTING = 3600.0
@@ -28,7 +28,7 @@ _Key = tuple[int, bool]
 
 def called_phases(
     variants: StageVariants,
-    callers: Callers,
+    callers: CallDetectors,
     *,
     ends: Mapping[str, str],
     conditions: dict[str, str],
@@ -42,13 +42,13 @@ def called_phases(
     conditions
         Conditions of the program, to which those of calls are added.
     """
-    return _Called(variants, callers, ends, conditions).build()
+    return _CalledPhases(variants, callers, ends, conditions).build()
 
 
 @dataclass
-class _Called:
+class _CalledPhases:
     variants: StageVariants
-    callers: Callers
+    callers: CallDetectors
     ends: Mapping[str, str]
     conditions: dict[str, str]
     phases: list[SumoPhase] = field(default_factory=list)
